@@ -1,0 +1,1 @@
+#define gs4_sphere              gs4_sphere_f64

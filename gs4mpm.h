@@ -1,0 +1,4352 @@
+#ifndef GS4MPM_H
+#define GS4MPM_H
+
+/* ==== [[config]] version, precision, linkage ======================================================= */
+
+#define GS4_VERSION 100                 /* major * 10000 + minor * 100 + patch */
+#define GS4_VERSION_STRING "0.1.0"
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef GS4_DOUBLE                       /* defined before every include of the header, or never */
+typedef double gs4_real;
+#define gs4_add_collider        gs4_add_collider_f64
+#define gs4_add_emitter         gs4_add_emitter_f64
+#define gs4_add_material        gs4_add_material_f64
+#define gs4_add_particles       gs4_add_particles_f64
+#define gs4_add_points          gs4_add_points_f64
+#define gs4_advance             gs4_advance_f64
+#define gs4_box                 gs4_box_f64
+#define gs4_create              gs4_create_f64
+#define gs4_cylinder            gs4_cylinder_f64
+#define gs4_destroy             gs4_destroy_f64
+#define gs4_edit_particles      gs4_edit_particles_f64
+#define gs4_get_desc            gs4_get_desc_f64
+#define gs4_get_stats           gs4_get_stats_f64
+#define gs4_last_error          gs4_last_error_f64
+#define gs4_load                gs4_load_f64
+#define gs4_material_preset     gs4_material_preset_f64
+#define gs4_mesh                gs4_mesh_f64
+#define gs4_move_collider       gs4_move_collider_f64
+#define gs4_move_emitter        gs4_move_emitter_f64
+#define gs4_particle_ids        gs4_particle_ids_f64
+#define gs4_particle_materials  gs4_particle_materials_f64
+#define gs4_particles           gs4_particles_f64
+#define gs4_plane               gs4_plane_f64
+#define gs4_real_size           gs4_real_size_f64
+#define gs4_result_string       gs4_result_string_f64
+#define gs4_save                gs4_save_f64
+#define gs4_sdf                 gs4_sdf_f64
+#define gs4_sphere              gs4_sphere_f64
+#define gs4_stable_dt           gs4_stable_dt_f64
+#define gs4_state_hash          gs4_state_hash_f64
+#define gs4_step                gs4_step_f64
+#define gs4_version             gs4_version_f64
+#define gs4_write_ply           gs4_write_ply_f64
+#define gs4_write_raw           gs4_write_raw_f64
+#else
+typedef float gs4_real;
+#endif
+
+#ifdef GS4_STATIC
+#if defined(__GNUC__)
+#define GS4_API static __attribute__((unused))
+#else
+#define GS4_API static
+#endif
+#else
+#define GS4_API extern
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ==== [[types]] results, vectors, shapes, hooks, views ============================================= */
+
+typedef struct gs4_vec3 { gs4_real x, y, z; } gs4_vec3;
+
+/* 0 is success, every error is negative, so an id-returning call needs no second channel. */
+typedef enum gs4_result {
+    GS4_OK = 0,
+    GS4_ERROR_ARGUMENT      = -1,  /* a field is out of its range; gs4_last_error names it and its value */
+    GS4_ERROR_MEMORY        = -2,
+    GS4_ERROR_IO            = -3,  /* a file could not be opened, written whole or read */
+    GS4_ERROR_FORMAT        = -4,  /* a file is not what it says it is, or is damaged */
+    GS4_ERROR_UNSTABLE      = -5,  /* the state would become non-finite or leave the physical range: the step
+                                      was not taken, the state is that of the last good step */
+    GS4_ERROR_NOT_CONVERGED = -6,  /* a linear solve did not reach its tolerance; same promise */
+    GS4_ERROR_ABI           = -7   /* header and implementation were compiled with different settings */
+} gs4_result;
+
+GS4_API const char *gs4_result_string(int result);
+GS4_API int gs4_version(void);          /* GS4_VERSION of the implementation */
+GS4_API int gs4_real_size(void);        /* bytes of gs4_real in the implementation */
+
+/* A shape is its signed distance (m, negative inside): for filling, obstacles and nozzles alike.
+ * A plain value, copied; build it with the functions below, its fields are the implementation's. */
+typedef gs4_real (*gs4_sdf_fn)(gs4_vec3 point, void *user);     /* called from several threads at once when there are */
+typedef enum gs4_shape_kind { GS4_SHAPE_NONE = 0, GS4_SHAPE_BOX, GS4_SHAPE_SPHERE, GS4_SHAPE_CYLINDER,
+                              GS4_SHAPE_PLANE, GS4_SHAPE_SDF, GS4_SHAPE_MESH } gs4_shape_kind;
+typedef struct gs4_shape {
+    gs4_shape_kind kind;
+    gs4_vec3 a, b;                      /* corners, ends, or point and outward normal */
+    gs4_real radius;
+    gs4_sdf_fn distance; void *user;
+    const gs4_real *vertices; const int *triangles;
+    int vertex_count, triangle_count;
+} gs4_shape;
+GS4_API gs4_shape gs4_box(gs4_vec3 low, gs4_vec3 high);
+GS4_API gs4_shape gs4_sphere(gs4_vec3 centre, gs4_real radius);
+GS4_API gs4_shape gs4_cylinder(gs4_vec3 a, gs4_vec3 b, gs4_real radius);          /* capped, from a to b */
+GS4_API gs4_shape gs4_plane(gs4_vec3 point, gs4_vec3 outward_normal);             /* solid behind the plane */
+GS4_API gs4_shape gs4_sdf(gs4_sdf_fn distance, void *user, gs4_vec3 low, gs4_vec3 high); /* bounds of the zero set */
+GS4_API gs4_shape gs4_mesh(const gs4_real *vertices_xyz, int vertex_count,        /* closed triangle surface, counter-clockwise */
+                           const int *triangles, int triangle_count);             /* from outside; arrays must outlive the simulation */
+
+typedef struct gs4_allocator {           /* both functions or neither */
+    void *(*alloc_fn)(size_t bytes, size_t alignment, void *user);
+    void  (*free_fn)(void *memory, size_t bytes, void *user);
+    void   *user;
+} gs4_allocator;
+typedef void (*gs4_task_fn)(int index, void *context);
+typedef void (*gs4_parallel_for_fn)(int count, gs4_task_fn task, void *context, void *user); /* runs all, in any order, then returns */
+typedef void (*gs4_log_fn)(int level, const char *message, void *user);    /* level 0: information, 1: warning, 2: error */
+typedef double (*gs4_now_fn)(void *user);                                  /* seconds; absent: timings stay 0 */
+
+/* ==== [[materials]] ================================================================================ */
+
+typedef enum gs4_liquid { GS4_NEWTONIAN = 0, GS4_OLDROYD_B, GS4_POM_POM } gs4_liquid; /* UCM: Oldroyd-B, F_v 0 */
+typedef enum gs4_solid  { GS4_NO_SOLID = 0, GS4_NEO_HOOKEAN, GS4_FIXED_COROTATED } gs4_solid;
+typedef enum gs4_viscosity_law { GS4_VISCOSITY_CONSTANT = 0, GS4_VISCOSITY_CROSS_WLF, GS4_VISCOSITY_CALLBACK } gs4_viscosity_law;
+typedef gs4_real (*gs4_viscosity_fn)(gs4_real temperature, gs4_real shear_rate, void *user);   /* Pa s of K and 1/s; thread-safe */
+
+typedef struct gs4_material {
+    gs4_real density;               /* kg/m^3, required, > 0 */
+    /* liquid phase */
+    gs4_liquid liquid;
+    gs4_real viscosity;             /* total mu, Pa s, >= 0 */
+    gs4_real local_fraction;        /* F_v in [0,1]; ignored (taken as 1) for GS4_NEWTONIAN */
+    gs4_real relaxation_time;       /* lambda_b, s, > 0 for viscoelastic liquids; G0 = (1 - F_v) mu / lambda_b */
+    gs4_real stretch_time;          /* lambda_0s, s, > 0 for GS4_POM_POM */
+    gs4_real anisotropy;            /* alpha, >= 0 */
+    gs4_real arms;                  /* Q, >= 1; nu = 2/Q */
+    gs4_viscosity_law viscosity_law;
+    struct {                        /* mu = mu0 / (1 + a (mu0 rate)^n), mu0 = d1 exp(-a1 (T - t1) / (T - t2)); */
+        gs4_real a, n, d1, a1, t1, t2;  /* all zero: the constants of the paper */
+    } cross_wlf;
+    gs4_viscosity_fn viscosity_fn; void *viscosity_user;
+    /* volume response, both phases */
+    gs4_real bulk_modulus;          /* K, Pa; 0: density * sound_speed^2 */
+    gs4_real sound_speed;           /* c0, m/s, of the Tait equation (gamma 7); 0: chosen so that compression stays below 1 % */
+    int      incompressible;        /* non-zero: K is infinite (partitioned and semi-implicit schemes) */
+    /* solid phase, below melting_temperature or always when the material never melts */
+    gs4_solid solid;
+    gs4_real shear_modulus;         /* Pa */
+    gs4_real yield_compression;     /* theta_c, 0: elastic */
+    gs4_real yield_stretch;         /* theta_s, 0: elastic */
+    /* heat: a scene with no conductivity and no heat source carries no temperature at all */
+    gs4_real heat_capacity;         /* c, J/(kg K) */
+    gs4_real conductivity;          /* k, W/(m K) */
+    gs4_real flux_relaxation_time;  /* tau, s; 0: Fourier */
+    gs4_real fourier_fraction;      /* F_T in [0,1]; 0 with tau > 0: Cattaneo */
+    gs4_real melting_temperature;   /* T_m */
+    gs4_real latent_heat;           /* L, J/kg; 0: sharp switch at T_m */
+    int      can_melt;              /* non-zero: phase follows temperature; zero: phase is fixed by `solid` */
+    int      viscous_heating;       /* non-zero: sigma : D heats the material */
+} gs4_material;
+
+/* ==== [[sim]] description, scene, stepping, views, files =========================================== */
+
+typedef enum gs4_scheme { GS4_EXPLICIT = 0, GS4_PARTITIONED, GS4_SEMI_IMPLICIT } gs4_scheme;
+typedef enum gs4_integrator {
+    GS4_INTEGRATOR_GS4 = 0,             /* second order */
+    GS4_INTEGRATOR_BACKWARD_EULER,      /* first order; partitioned and semi-implicit schemes */
+    GS4_INTEGRATOR_SYMPLECTIC_EULER     /* first order, one transfer each way: the fast tier of the explicit scheme */
+} gs4_integrator;
+typedef enum gs4_wall { GS4_WALL_STICK = 0, GS4_WALL_SLIP, GS4_WALL_SEPARATE, GS4_WALL_OPEN /* particles leave and are dropped */,
+                        GS4_WALL_PERIODIC /* both walls of an axis */ } gs4_wall;
+
+typedef struct gs4_sim gs4_sim;
+
+typedef struct gs4_sim_desc {
+    int      cells[3];              /* required, each >= 4 */
+    gs4_real cell_size;             /* m, required, > 0 */
+    gs4_vec3 origin;                /* low corner of the grid */
+    gs4_vec3 gravity;               /* m/s^2 */
+    gs4_scheme scheme;
+    gs4_integrator integrator;
+    gs4_real rho_inf, rho_inf_spurious; /* 0 <= spurious <= rho_inf <= 1 */
+    gs4_real flip_decay_time;       /* s over which particle motion that the grid cannot see fades; 0: 0.1 s (symplectic
+                                       Euler: at once, affine PIC); INFINITY: pure FLIP */
+    gs4_wall walls[6];              /* -x +x -y +y -z +z */
+    gs4_real wall_temperature[6];   int wall_is_isothermal[6];   /* 0: insulated */
+    gs4_real ambient_temperature;   int air_is_isothermal;       /* 0: insulated free surface */
+    gs4_real cfl;                   /* fraction of the stability limit that gs4_advance uses; 0: 0.5 */
+    gs4_real max_dt;                /* s; 0: no bound but stability */
+    gs4_real solver_tolerance;      /* relative residual; 0: 1e-6 double, 1e-4 float */
+    int      solver_max_iterations; /* 0: 200 */
+    int      max_particles;         /* 0: grows as needed */
+    int      threads;               /* 0 or 1: serial; more needs GS4_PTHREADS or parallel_for; results do not depend on it */
+    gs4_parallel_for_fn parallel_for; void *parallel_user;
+    gs4_allocator allocator;        /* zero: malloc and free */
+    gs4_log_fn log; void *log_user; /* silent when absent */
+    gs4_now_fn now; void *now_user;
+} gs4_sim_desc;
+
+GS4_API int  gs4_create(const gs4_sim_desc *desc, gs4_sim **sim);
+GS4_API void gs4_destroy(gs4_sim *sim);                       /* NULL is fine */
+GS4_API const char *gs4_last_error(const gs4_sim *sim);       /* a sentence: what was wrong, which field, what value; NULL sim: of gs4_create */
+GS4_API gs4_sim_desc gs4_get_desc(const gs4_sim *sim);        /* with every default filled in */
+GS4_API uint64_t gs4_state_hash(const gs4_sim *sim);          /* of the whole state; equal for any thread count */
+
+GS4_API int gs4_add_material(gs4_sim *sim, const gs4_material *material);      /* id >= 0, or an error */
+GS4_API int gs4_material_preset(const char *name, gs4_material *material);     /* names and sources: [[liquid]] */
+
+typedef struct gs4_fill {
+    int      material;
+    gs4_real spacing;               /* m between particles; 0: half a cell (8 per cell) */
+    gs4_vec3 velocity;
+    gs4_vec3 angular_velocity;      /* about the shape's centre, rad/s */
+    gs4_real temperature;
+    gs4_real jitter;                /* 0..1 of the spacing */
+    uint32_t random_seed;
+} gs4_fill;
+GS4_API int gs4_add_particles(gs4_sim *sim, gs4_shape shape, const gs4_fill *fill);                  /* count added, or an error */
+GS4_API int gs4_add_points(gs4_sim *sim, const gs4_real *xyz, int count, gs4_real volume_each, const gs4_fill *fill);
+
+typedef struct gs4_collider {
+    gs4_shape shape;
+    gs4_wall  contact;              /* stick, slip or separate */
+    gs4_real  friction;             /* Coulomb, for separate */
+    gs4_vec3  velocity, angular_velocity;   /* of the body; its pose follows */
+    gs4_vec3  pivot;
+    gs4_real  temperature; int is_isothermal;
+} gs4_collider;
+GS4_API int gs4_add_collider(gs4_sim *sim, const gs4_collider *collider);                            /* id */
+GS4_API int gs4_move_collider(gs4_sim *sim, int collider, gs4_vec3 velocity, gs4_vec3 angular_velocity);     /* from now on */
+
+typedef struct gs4_emitter {        /* a nozzle: every particle that leaves it is at rest relative to `velocity` */
+    gs4_shape shape;                /* the mouth's volume; refilled as material leaves */
+    gs4_fill  fill;
+    gs4_vec3  travel;               /* velocity of the nozzle itself */
+    gs4_real  start, stop;          /* s; stop 0: never */
+} gs4_emitter;
+GS4_API int gs4_add_emitter(gs4_sim *sim, const gs4_emitter *emitter);                               /* id */
+GS4_API int gs4_move_emitter(gs4_sim *sim, int emitter, gs4_vec3 travel);
+
+GS4_API int      gs4_step(gs4_sim *sim, gs4_real dt);          /* one step of exactly dt; beyond gs4_stable_dt it is refused */
+GS4_API int      gs4_advance(gs4_sim *sim, gs4_real duration); /* as many stable steps as it takes; ends exactly there */
+GS4_API gs4_real gs4_stable_dt(const gs4_sim *sim);            /* the limit itself, before `cfl` */
+
+/* No copies; a view stays valid until the next call that changes the simulation; looking changes nothing. */
+typedef enum gs4_field {
+    GS4_FIELD_POSITION = 0, GS4_FIELD_VELOCITY, GS4_FIELD_VOLUME_RATIO /* J */, GS4_FIELD_STRESS /* non-local, xx yy zz xy xz yz */,
+    GS4_FIELD_DEFORMATION /* F, row-major */, GS4_FIELD_TEMPERATURE, GS4_FIELD_LIQUID_FRACTION, GS4_FIELD_FLUX /* non-local */,
+    GS4_FIELD_MASS
+} gs4_field;
+typedef struct gs4_view { const gs4_real *data; int count, components, stride; } gs4_view; /* element i: data + i*stride; data NULL: no such field */
+typedef struct gs4_edit { gs4_real *data; int count, components, stride; } gs4_edit;
+GS4_API gs4_view        gs4_particles(const gs4_sim *sim, gs4_field field);
+GS4_API gs4_edit        gs4_edit_particles(gs4_sim *sim, gs4_field field);  /* position, velocity; the next step starts the integrator afresh */
+GS4_API const uint32_t *gs4_particle_ids(const gs4_sim *sim);          /* stable names: order changes as particles are sorted */
+GS4_API const uint8_t  *gs4_particle_materials(const gs4_sim *sim);
+
+typedef struct gs4_stats {
+    double   time; uint64_t steps; double dt;
+    int      particles, active_cells; uint64_t memory_bytes;
+    double   mass, momentum[3], angular_momentum[3] /* about the origin of coordinates */, kinetic_energy, thermal_energy, volume;
+    double   max_speed, min_volume_ratio, max_volume_ratio, min_temperature, max_temperature;
+    int      pressure_iterations, viscous_iterations, heat_iterations, elastic_iterations; double solver_residual;
+    uint64_t stress_substeps;       /* particles that needed the robust local integrator so far */
+    double   seconds_transfer, seconds_stress, seconds_solve, seconds_sort, seconds_total;    /* so far */
+} gs4_stats;
+GS4_API gs4_stats gs4_get_stats(gs4_sim *sim);
+
+/* Frames and checkpoints are written beside the target and renamed, so a reader never sees half a file. */
+GS4_API int gs4_write_ply(gs4_sim *sim, const char *path);     /* binary little-endian PLY: x y z, vx vy vz, and the fields the scene has */
+GS4_API int gs4_write_raw(gs4_sim *sim, const char *path);     /* NumPy .npy, one record a particle: numpy.load(path)['velocity'] */
+GS4_API int gs4_save(gs4_sim *sim, const char *path);          /* whole state: loading it continues bit for bit */
+GS4_API int gs4_load(gs4_sim *sim, const char *path);          /* into a simulation made with the same description */
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* GS4MPM_H */
+
+/* ######################################################################################################
+ * ##  The implementation. Readers of the interface can stop here.                                     ##
+ * ###################################################################################################### */
+#if defined(GS4MPM_IMPLEMENTATION) && !defined(GS4I_IMPLEMENTED)
+#define GS4I_IMPLEMENTED
+
+/* ==== [[base]] arithmetic rules, memory, text, tasks =============================================== */
+
+#include <stdlib.h>
+#include <string.h>
+#include <stdio.h>
+#include <math.h>
+#include <float.h>
+#include <limits.h>
+#include <assert.h>
+#if defined(__unix__) || defined(__APPLE__)
+#include <sys/types.h>
+#include <sys/stat.h>
+#endif
+#ifdef GS4_PTHREADS
+#include <pthread.h>
+#endif
+
+/* One product and one sum are rounded twice, always: fused operations would make results depend on compiler
+ * flags. Undone at the end of the file, so that the code around keeps its own rule. */
+#if defined(__clang__)
+#pragma STDC FP_CONTRACT OFF
+#elif defined(__GNUC__) && !defined(__TINYC__)
+#pragma GCC push_options
+#pragma GCC optimize ("fp-contract=off")
+#endif
+
+#define GS4I_C(x) ((gs4_real)(x))
+#ifdef GS4_DOUBLE
+#define GS4I_SQRT sqrt
+#define GS4I_TINY GS4I_C(1e-290)
+#define GS4I_EPSILON GS4I_C(DBL_EPSILON)
+#define GS4I_HUGE GS4I_C(1e100)         /* beyond this an input is called absurd */
+#else
+#define GS4I_SQRT sqrtf
+#define GS4I_TINY GS4I_C(1e-36)
+#define GS4I_EPSILON GS4I_C(FLT_EPSILON)
+#define GS4I_HUGE GS4I_C(1e18)
+#endif
+
+#if defined(__GNUC__)
+#define GS4I_RESTRICT __restrict__
+#define GS4I_INLINE static inline __attribute__((always_inline))
+#elif defined(_MSC_VER)
+#define GS4I_RESTRICT __restrict
+#define GS4I_INLINE static __forceinline
+#else
+#define GS4I_RESTRICT
+#define GS4I_INLINE static inline
+#endif
+
+/* Every allocation of one simulation goes through here: 64-byte aligned, zeroed, counted. */
+typedef struct gs4i_memory { gs4_allocator hook; uint64_t bytes; } gs4i_memory;
+
+static void *gs4i_default_alloc(size_t bytes, size_t alignment, void *user)
+{
+    char *raw, *aligned;
+    (void)user;
+    if (bytes > SIZE_MAX - alignment - sizeof(void *)) return NULL;
+    raw = (char *)malloc(bytes + alignment + sizeof(void *));
+    if (!raw) return NULL;
+    aligned = raw + sizeof(void *);
+    aligned += (alignment - (size_t)((uintptr_t)aligned % alignment)) % alignment;
+    memcpy(aligned - sizeof(void *), &raw, sizeof(void *));
+    return aligned;
+}
+
+static void gs4i_default_free(void *memory, size_t bytes, void *user)
+{
+    char *raw;
+    (void)bytes; (void)user;
+    memcpy(&raw, (char *)memory - sizeof(void *), sizeof(void *));
+    free(raw);
+}
+
+/* Scratch that is kept from step to step. */
+typedef struct gs4i_scratch { void *data; size_t bytes; } gs4i_scratch;
+
+static void *gs4i_alloc(gs4i_memory *m, size_t count, size_t size)
+{
+    void *p;
+    if (count == 0) count = 1;
+    if (size && count > (SIZE_MAX / 2) / size) return NULL;
+    p = m->hook.alloc_fn(count * size, 64, m->hook.user);
+    if (!p) return NULL;
+    memset(p, 0, count * size);
+    m->bytes += (uint64_t)count * size;
+    return p;
+}
+
+static void gs4i_free(gs4i_memory *m, void *p, size_t count, size_t size)
+{
+    if (!p) return;
+    if (count == 0) count = 1;
+    m->bytes -= (uint64_t)count * size;
+    m->hook.free_fn(p, count * size, m->hook.user);
+}
+
+/* At least `bytes` of scratch; what was in the first `keep` bytes stays. NULL when memory is refused. */
+static void *gs4i_scratch_reserve(gs4i_memory *m, gs4i_scratch *s, size_t bytes, size_t keep)
+{
+    void *grown;
+    if (bytes <= s->bytes && s->data) return s->data;
+    bytes += bytes / 4 + 64;
+    grown = gs4i_alloc(m, bytes, 1);
+    if (!grown) return NULL;
+    if (keep) memcpy(grown, s->data, keep);
+    gs4i_free(m, s->data, s->bytes, 1);
+    s->data = grown; s->bytes = bytes;
+    return grown;
+}
+
+/* A sentence put together piece by piece: no printf, whose numbers depend on the locale. */
+typedef struct gs4i_text { char *at; size_t left; } gs4i_text;
+
+static void gs4i_put(gs4i_text *t, const char *s)
+{
+    while (*s && t->left > 1) { *t->at++ = *s++; t->left--; }
+    if (t->left) *t->at = 0;
+}
+
+static void gs4i_put_integer(gs4i_text *t, int64_t value)
+{
+    char digits[24], *d = digits + sizeof digits - 1;
+    uint64_t u = value < 0 ? 0 - (uint64_t)value : (uint64_t)value;
+    *d = 0;
+    do { *--d = (char)('0' + (int)(u % 10)); u /= 10; } while (u);
+    if (value < 0) *--d = '-';
+    gs4i_put(t, d);
+}
+
+/* Six significant digits, like %g in the C locale. */
+static void gs4i_put_real(gs4i_text *t, double v)
+{
+    char digits[8];
+    int exponent = 0, n, i;
+    int64_t m;
+    if (v != v) { gs4i_put(t, "NaN"); return; }
+    if (v < 0) { gs4i_put(t, "-"); v = -v; }
+    if (v > DBL_MAX) { gs4i_put(t, "infinity"); return; }
+    if (v == 0) { gs4i_put(t, "0"); return; }
+    while (v >= 1e6) { v /= 10; exponent++; }
+    while (v < 1e5) { v *= 10; exponent--; }
+    m = (int64_t)(v + 0.5);
+    if (m == 1000000) { m = 100000; exponent++; }
+    exponent += 5;                                  /* now digits are d.ddddd x 10^exponent */
+    for (i = 5; i >= 0; i--) { digits[i] = (char)('0' + (int)(m % 10)); m /= 10; }
+    n = 6;
+    while (n > 1 && digits[n - 1] == '0') n--;
+    {
+        char out[32], *o = out;
+        int scientific = exponent < -4 || exponent > 6;
+        int point = scientific ? 0 : exponent;      /* index of the digit before the decimal point */
+        if (point < 0) { *o++ = '0'; *o++ = '.'; for (i = -1; i > point; i--) *o++ = '0'; }
+        for (i = 0; i < n || i <= point; i++) {
+            *o++ = i < n ? digits[i] : '0';
+            if (i == point && i + 1 < n) *o++ = '.';
+        }
+        *o = 0;
+        gs4i_put(t, out);
+        if (scientific) { gs4i_put(t, "e"); gs4i_put_integer(t, exponent); }
+    }
+}
+
+/* Finite, whatever flags the file is compiled with. */
+GS4I_INLINE int gs4i_finite(gs4_real v)
+{
+#ifdef GS4_DOUBLE
+    uint64_t u; memcpy(&u, &v, sizeof u);
+    return (u & 0x7ff0000000000000u) != 0x7ff0000000000000u;
+#else
+    uint32_t u; memcpy(&u, &v, sizeof u);
+    return (u & 0x7f800000u) != 0x7f800000u;
+#endif
+}
+
+/* Tasks: `count` calls of `task`, in any order, on any threads; nothing may depend on either. */
+#ifdef GS4_PTHREADS
+typedef struct gs4i_pool {
+    pthread_mutex_t lock;
+    pthread_cond_t  wake, done;
+    pthread_t *threads; int thread_count;
+    gs4_task_fn task; void *context;
+    int count, next, running, batch, quit;
+    unsigned generation;
+} gs4i_pool;
+#endif
+
+typedef struct gs4i_tasks {
+    gs4_parallel_for_fn parallel_for; void *user;
+#ifdef GS4_PTHREADS
+    gs4i_pool *pool;
+#endif
+} gs4i_tasks;
+
+#ifdef GS4_PTHREADS
+/* Take batches of indices until none is left. Called and returns with the lock held. */
+static void gs4i_pool_work(gs4i_pool *pool)
+{
+    while (pool->next < pool->count) {
+        int i = pool->next, end = i + pool->batch;
+        gs4_task_fn task = pool->task; void *context = pool->context;
+        if (end > pool->count) end = pool->count;
+        pool->next = end;
+        pthread_mutex_unlock(&pool->lock);
+        for (; i < end; i++) task(i, context);
+        pthread_mutex_lock(&pool->lock);
+    }
+}
+
+static void *gs4i_pool_main(void *argument)
+{
+    gs4i_pool *pool = (gs4i_pool *)argument;
+    unsigned seen = 0;
+    pthread_mutex_lock(&pool->lock);
+    for (;;) {
+        while (!pool->quit && pool->generation == seen) pthread_cond_wait(&pool->wake, &pool->lock);
+        if (pool->quit) break;
+        seen = pool->generation;
+        pool->running++;
+        gs4i_pool_work(pool);
+        if (--pool->running == 0) pthread_cond_signal(&pool->done);
+    }
+    pthread_mutex_unlock(&pool->lock);
+    return NULL;
+}
+
+static void gs4i_pool_run(gs4i_pool *pool, int count, gs4_task_fn task, void *context)
+{
+    pthread_mutex_lock(&pool->lock);
+    pool->task = task; pool->context = context;
+    pool->count = count; pool->next = 0;
+    pool->batch = count / (8 * (pool->thread_count + 1));
+    if (pool->batch < 1) pool->batch = 1;
+    pool->generation++;
+    pthread_cond_broadcast(&pool->wake);
+    gs4i_pool_work(pool);
+    while (pool->running) pthread_cond_wait(&pool->done, &pool->lock);
+    pthread_mutex_unlock(&pool->lock);
+}
+
+static void gs4i_pool_destroy(gs4i_memory *memory, gs4i_pool *pool, int capacity)
+{
+    int i;
+    if (!pool) return;
+    pthread_mutex_lock(&pool->lock);
+    pool->quit = 1;
+    pthread_cond_broadcast(&pool->wake);
+    pthread_mutex_unlock(&pool->lock);
+    for (i = 0; i < pool->thread_count; i++) pthread_join(pool->threads[i], NULL);
+    pthread_cond_destroy(&pool->wake); pthread_cond_destroy(&pool->done);
+    pthread_mutex_destroy(&pool->lock);
+    gs4i_free(memory, pool->threads, (size_t)capacity, sizeof(pthread_t));
+    gs4i_free(memory, pool, 1, sizeof *pool);
+}
+
+/* `workers` threads beside the calling one; NULL when memory or threads are refused. */
+static gs4i_pool *gs4i_pool_create(gs4i_memory *memory, int workers)
+{
+    gs4i_pool *pool = (gs4i_pool *)gs4i_alloc(memory, 1, sizeof *pool);
+    if (!pool) return NULL;
+    pool->threads = (pthread_t *)gs4i_alloc(memory, (size_t)workers, sizeof(pthread_t));
+    if (!pool->threads) { gs4i_free(memory, pool, 1, sizeof *pool); return NULL; }
+    pthread_mutex_init(&pool->lock, NULL);
+    pthread_cond_init(&pool->wake, NULL); pthread_cond_init(&pool->done, NULL);
+    for (; pool->thread_count < workers; pool->thread_count++)
+        if (pthread_create(&pool->threads[pool->thread_count], NULL, gs4i_pool_main, pool) != 0) {
+            gs4i_pool_destroy(memory, pool, workers);
+            return NULL;
+        }
+    return pool;
+}
+#endif
+
+static void gs4i_parallel_for(const gs4i_tasks *tasks, int count, gs4_task_fn task, void *context)
+{
+    int i;
+    if (count > 1) {
+        if (tasks->parallel_for) { tasks->parallel_for(count, task, context, tasks->user); return; }
+#ifdef GS4_PTHREADS
+        if (tasks->pool) { gs4i_pool_run(tasks->pool, count, task, context); return; }
+#endif
+    }
+    for (i = 0; i < count; i++) task(i, context);
+}
+
+/* Ascending heap sort of block numbers: in place, no recursion, no libc qsort whose order of equals varies. */
+static void gs4i_sort(uint32_t *v, int n)
+{
+    int start = n / 2, end = n;
+    while (end > 1) {
+        int root, child;
+        if (start > 0) start--;
+        else { uint32_t t = v[--end]; v[end] = v[0]; v[0] = t; }
+        for (root = start; (child = 2 * root + 1) < end; root = child) {
+            uint32_t t;
+            if (child + 1 < end && v[child] < v[child + 1]) child++;
+            if (v[root] >= v[child]) break;
+            t = v[root]; v[root] = v[child]; v[child] = t;
+        }
+    }
+}
+
+/* splitmix64: hashes and jitter */
+static uint64_t gs4i_mix(uint64_t z)
+{
+    z += 0x9e3779b97f4a7c15u;
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    return z ^ (z >> 31);
+}
+
+static uint64_t gs4i_hash_bytes(uint64_t h, const void *data, size_t bytes)
+{
+    const unsigned char *p = (const unsigned char *)data;
+    while (bytes >= 8) { uint64_t u; memcpy(&u, p, 8); h = gs4i_mix(h ^ u); p += 8; bytes -= 8; }
+    if (bytes) { uint64_t u = 0; memcpy(&u, p, bytes); h = gs4i_mix(h ^ u ^ ((uint64_t)bytes << 56)); }
+    return h;
+}
+
+/* ==== [[vec]] three-vectors and shapes ============================================================= */
+
+GS4I_INLINE gs4_vec3 gs4i_vec3(gs4_real x, gs4_real y, gs4_real z) { gs4_vec3 v; v.x = x; v.y = y; v.z = z; return v; }
+GS4I_INLINE gs4_vec3 gs4i_add(gs4_vec3 a, gs4_vec3 b) { return gs4i_vec3(a.x + b.x, a.y + b.y, a.z + b.z); }
+GS4I_INLINE gs4_vec3 gs4i_sub(gs4_vec3 a, gs4_vec3 b) { return gs4i_vec3(a.x - b.x, a.y - b.y, a.z - b.z); }
+GS4I_INLINE gs4_vec3 gs4i_scale(gs4_vec3 a, gs4_real s) { return gs4i_vec3(a.x * s, a.y * s, a.z * s); }
+GS4I_INLINE gs4_real gs4i_dot(gs4_vec3 a, gs4_vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+GS4I_INLINE gs4_vec3 gs4i_cross(gs4_vec3 a, gs4_vec3 b)
+{
+    return gs4i_vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
+}
+GS4I_INLINE gs4_real gs4i_length(gs4_vec3 a) { return GS4I_SQRT(gs4i_dot(a, a)); }
+GS4I_INLINE gs4_real gs4i_min(gs4_real a, gs4_real b) { return a < b ? a : b; }
+GS4I_INLINE gs4_real gs4i_max(gs4_real a, gs4_real b) { return a > b ? a : b; }
+GS4I_INLINE gs4_real gs4i_abs(gs4_real a) { return a < 0 ? -a : a; }
+static void gs4i_to_double(gs4_vec3 a, double out[3]) { out[0] = (double)a.x; out[1] = (double)a.y; out[2] = (double)a.z; }
+
+/* Signed distances. Box: exact outside and inside. Cylinder: capped, exact. */
+static gs4_real gs4i_box_distance(const gs4_shape *s, gs4_vec3 p)
+{
+    gs4_vec3 c = gs4i_scale(gs4i_add(s->a, s->b), GS4I_C(0.5)), e = gs4i_scale(gs4i_sub(s->b, s->a), GS4I_C(0.5));
+    gs4_vec3 q = gs4i_vec3(gs4i_abs(p.x - c.x) - e.x, gs4i_abs(p.y - c.y) - e.y, gs4i_abs(p.z - c.z) - e.z);
+    gs4_vec3 out = gs4i_vec3(gs4i_max(q.x, 0), gs4i_max(q.y, 0), gs4i_max(q.z, 0));
+    return gs4i_length(out) + gs4i_min(gs4i_max(q.x, gs4i_max(q.y, q.z)), 0);
+}
+
+static gs4_real gs4i_cylinder_distance(const gs4_shape *s, gs4_vec3 p)
+{
+    gs4_vec3 axis = gs4i_sub(s->b, s->a), r = gs4i_sub(p, s->a);
+    gs4_real length = gs4i_length(axis), along = gs4i_dot(r, axis) / length;
+    gs4_vec3 side = gs4i_sub(r, gs4i_scale(axis, along / length));
+    gs4_real radial = gs4i_length(side) - s->radius, half = GS4I_C(0.5) * length;
+    gs4_real cap = gs4i_abs(along - half) - half;
+    gs4_real ro = gs4i_max(radial, 0), co = gs4i_max(cap, 0);
+    return GS4I_SQRT(ro * ro + co * co) + gs4i_min(gs4i_max(radial, cap), 0);
+}
+
+/* Distance of every kind but a mesh, which needs its own structure ([[boundary]]). */
+static gs4_real gs4i_shape_distance(const gs4_shape *s, gs4_vec3 p)
+{
+    switch (s->kind) {
+    case GS4_SHAPE_BOX:      return gs4i_box_distance(s, p);
+    case GS4_SHAPE_SPHERE:   return gs4i_length(gs4i_sub(p, s->a)) - s->radius;
+    case GS4_SHAPE_CYLINDER: return gs4i_cylinder_distance(s, p);
+    case GS4_SHAPE_PLANE:    return gs4i_dot(gs4i_sub(p, s->a), s->b);     /* b is of unit length once checked */
+    case GS4_SHAPE_SDF:      return s->distance(p, s->user);
+    case GS4_SHAPE_NONE: case GS4_SHAPE_MESH: break;
+    }
+    return GS4I_HUGE;
+}
+
+/* Box around a shape; a plane has none and takes the box given. */
+static void gs4i_shape_bounds(const gs4_shape *s, gs4_vec3 *low, gs4_vec3 *high)
+{
+    int i;
+    switch (s->kind) {
+    case GS4_SHAPE_BOX: case GS4_SHAPE_SDF: *low = s->a; *high = s->b; break;
+    case GS4_SHAPE_SPHERE:
+        *low  = gs4i_sub(s->a, gs4i_vec3(s->radius, s->radius, s->radius));
+        *high = gs4i_add(s->a, gs4i_vec3(s->radius, s->radius, s->radius));
+        break;
+    case GS4_SHAPE_CYLINDER: {
+        gs4_vec3 r = gs4i_vec3(s->radius, s->radius, s->radius);
+        *low  = gs4i_sub(gs4i_vec3(gs4i_min(s->a.x, s->b.x), gs4i_min(s->a.y, s->b.y), gs4i_min(s->a.z, s->b.z)), r);
+        *high = gs4i_add(gs4i_vec3(gs4i_max(s->a.x, s->b.x), gs4i_max(s->a.y, s->b.y), gs4i_max(s->a.z, s->b.z)), r);
+        break;
+    }
+    case GS4_SHAPE_MESH:
+        *low = *high = gs4i_vec3(s->vertices[0], s->vertices[1], s->vertices[2]);
+        for (i = 1; i < s->vertex_count; i++) {
+            const gs4_real *v = s->vertices + 3 * (size_t)i;
+            *low  = gs4i_vec3(gs4i_min(low->x, v[0]), gs4i_min(low->y, v[1]), gs4i_min(low->z, v[2]));
+            *high = gs4i_vec3(gs4i_max(high->x, v[0]), gs4i_max(high->y, v[1]), gs4i_max(high->z, v[2]));
+        }
+        break;
+    case GS4_SHAPE_NONE: case GS4_SHAPE_PLANE: break;
+    }
+}
+
+/* ==== [[kernel]] quadratic B-splines on 27 nodes =================================================== *
+ *
+ * Nodes are cell centres. A particle in cell c sees nodes c-1, c, c+1 along each axis; with its offset
+ * xi in [-1/2, 1/2) from the centre of c, in cells:
+ *
+ *        node c-1         node c        node c+1            w  = (1/2 - xi)^2 / 2,  3/4 - xi^2,  (1/2 + xi)^2 / 2
+ *     ------o-------|-------o---x---|-------o------         w' = -(1/2 - xi),       -2 xi,        1/2 + xi
+ *                   |<--- cell c -->|                       sum w = 1, sum w (x_i - x) = 0, sum w (x_i - x)^2 = h^2/4
+ *
+ * A block is 4 x 4 x 4 nodes, its particles are neighbours in memory. Transfers work on a tile of 8 x 8 x 8 nodes,
+ * which is a block with two nodes around it, so that a particle may stray one cell from its block before it must be
+ * sorted anew. A node is four numbers, and three nodes of a row are twelve contiguous ones: the `row` below. */
+
+#define GS4I_BLOCK 4                    /* nodes along the edge of a block */
+#define GS4I_BLOCK_NODES 64
+#define GS4I_TILE 8                     /* nodes along the edge of a tile */
+#define GS4I_TILE_REALS (4 * GS4I_TILE * GS4I_TILE * GS4I_TILE + 16)   /* a row read may run 4 numbers over the end */
+
+#if defined(__GNUC__) && !defined(__TINYC__) && !defined(GS4_NO_VECTORS)
+typedef gs4_real gs4i_row  __attribute__((vector_size(16 * sizeof(gs4_real))));
+typedef gs4_real gs4i_quad __attribute__((vector_size(4 * sizeof(gs4_real))));
+#define GS4I_LANE(v, i) ((v)[i])
+#define GS4I_MUL(r, a, b) ((r) = (a) * (b))                  /* r = a b   lane by lane */
+#define GS4I_MAD(r, a, b) ((r) += (a) * (b))                 /* r += a b  lane by lane */
+#define GS4I_SPLAT_MUL(r, s, a) ((r) = (a) * (s))            /* r = s a   for a number s */
+#define GS4I_SPLAT_MAD(r, s, a) ((r) += (a) * (s))           /* r += s a */
+#define GS4I_SUM(r, a, b) ((r) = (a) + (b))
+#if defined(__has_builtin)
+#if __has_builtin(__builtin_shufflevector)
+#define GS4I_SHUFFLE 1
+#endif
+#endif
+#else
+typedef struct gs4i_row  { gs4_real lane[16]; } gs4i_row;
+typedef struct gs4i_quad { gs4_real lane[4]; } gs4i_quad;
+#define GS4I_LANE(v, i) ((v).lane[i])
+#define GS4I_LANES(type) ((int)(sizeof(type) / sizeof(gs4_real)))
+#define GS4I_EACH(r, expression) do { int gs4i_l; \
+    for (gs4i_l = 0; gs4i_l < GS4I_LANES(r); gs4i_l++) { expression; } } while (0)
+#define GS4I_MUL(r, a, b) GS4I_EACH(r, (r).lane[gs4i_l] = (a).lane[gs4i_l] * (b).lane[gs4i_l])
+#define GS4I_MAD(r, a, b) GS4I_EACH(r, (r).lane[gs4i_l] += (a).lane[gs4i_l] * (b).lane[gs4i_l])
+#define GS4I_SPLAT_MUL(r, s, a) GS4I_EACH(r, (r).lane[gs4i_l] = (a).lane[gs4i_l] * (s))
+#define GS4I_SPLAT_MAD(r, s, a) GS4I_EACH(r, (r).lane[gs4i_l] += (a).lane[gs4i_l] * (s))
+#define GS4I_SUM(r, a, b) GS4I_EACH(r, (r).lane[gs4i_l] = (a).lane[gs4i_l] + (b).lane[gs4i_l])
+#endif
+
+#define GS4I_LOAD(v, p) memcpy(&(v), (p), sizeof(v))
+#define GS4I_STORE(p, v) memcpy((p), &(v), sizeof(v))
+
+/* (a a a a  b b b b  c c c c  0 0 0 0): one number a node, spread over its four lanes */
+GS4I_INLINE void gs4i_row_of_nodes(gs4i_row *r, gs4_real a, gs4_real b, gs4_real c)
+{
+#ifdef GS4I_SHUFFLE
+    gs4i_quad q = { a, b, c, 0 };
+    *r = __builtin_shufflevector(q, q, 0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3);
+#else
+    int i;
+    for (i = 0; i < 4; i++) {
+        GS4I_LANE(*r, i) = a; GS4I_LANE(*r, 4 + i) = b; GS4I_LANE(*r, 8 + i) = c; GS4I_LANE(*r, 12 + i) = 0;
+    }
+#endif
+}
+
+/* (x y z w  x y z w  x y z w  x y z w): the same four numbers for each node */
+GS4I_INLINE void gs4i_row_of_quad(gs4i_row *r, gs4_real x, gs4_real y, gs4_real z, gs4_real w)
+{
+#ifdef GS4I_SHUFFLE
+    gs4i_quad q = { x, y, z, w };
+    *r = __builtin_shufflevector(q, q, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3);
+#else
+    int i;
+    for (i = 0; i < 16; i += 4) {
+        GS4I_LANE(*r, i) = x; GS4I_LANE(*r, i + 1) = y; GS4I_LANE(*r, i + 2) = z; GS4I_LANE(*r, i + 3) = w;
+    }
+#endif
+}
+
+/* q = sum over the nodes of a row of a_i b_i: ((node 0 + node 2) + (node 1 + nothing)) */
+GS4I_INLINE void gs4i_row_dot(gs4i_quad *q, const gs4i_row *a, const gs4i_row *b)
+{
+#ifdef GS4I_SHUFFLE
+    gs4i_row t = *a * *b;
+    gs4i_quad q0 = __builtin_shufflevector(t, t, 0, 1, 2, 3), q1 = __builtin_shufflevector(t, t, 4, 5, 6, 7);
+    gs4i_quad q2 = __builtin_shufflevector(t, t, 8, 9, 10, 11);
+    *q = (q0 + q2) + q1;
+#else
+    int i;
+    for (i = 0; i < 4; i++)
+        GS4I_LANE(*q, i) = (GS4I_LANE(*a, i) * GS4I_LANE(*b, i) + GS4I_LANE(*a, 8 + i) * GS4I_LANE(*b, 8 + i))
+                         + GS4I_LANE(*a, 4 + i) * GS4I_LANE(*b, 4 + i);
+#endif
+}
+
+/* Weights and derivatives (1/m) of one particle along the three axes, and where its first node is in the tile. */
+typedef struct gs4i_stencil {
+    gs4_real w[3][3], d[3][3];          /* [axis][node] */
+    gs4_real xi[3];                     /* offset from the centre of its cell, in cells */
+    int base;                           /* number of its first node in the tile, or -1: outside of it */
+} gs4i_stencil;
+
+/* `x` in cells from the first node of the tile, plus 1/2: the particle is in the cell of node floor(x). */
+GS4I_INLINE void gs4i_stencil_at(gs4i_stencil *s, const gs4_real x[3], gs4_real inv_h)
+{
+    int cell[3], a;
+    for (a = 0; a < 3; a++) {
+        gs4_real f, lo, hi;
+        int inside = x[a] >= 1 && x[a] < GS4I_TILE - 1;         /* false for NaN, too */
+        cell[a] = inside ? (int)x[a] : 0;
+        f = inside ? x[a] - GS4I_C(cell[a]) - GS4I_C(0.5) : GS4I_C(0);
+        lo = GS4I_C(0.5) - f; hi = GS4I_C(0.5) + f;
+        s->w[a][0] = GS4I_C(0.5) * lo * lo; s->w[a][1] = GS4I_C(0.75) - f * f; s->w[a][2] = GS4I_C(0.5) * hi * hi;
+        s->d[a][0] = -lo * inv_h; s->d[a][1] = GS4I_C(-2) * f * inv_h; s->d[a][2] = hi * inv_h;
+        s->xi[a] = f;
+    }
+    s->base = cell[0] > 0 && cell[1] > 0 && cell[2] > 0
+            ? ((cell[2] - 1) * GS4I_TILE + (cell[1] - 1)) * GS4I_TILE + (cell[0] - 1) : -1;
+}
+
+/* tile += sum of  w P0 + (dy w) P1 + (dz w) P2  row by row, where the x-weights are in P0, P1, P2 already and
+ * y, z, ey, ez are the plain and the other weights of the two axes:  row_jk = y_j z_k P0 + ey_j z_k P1 + y_j ez_k P2 */
+GS4I_INLINE void gs4i_scatter_rows(gs4_real *GS4I_RESTRICT at, const gs4i_row *p0, const gs4i_row *p1, const gs4i_row *p2,
+                                   const gs4_real y[3], const gs4_real ey[3], const gs4_real z[3], const gs4_real ez[3])
+{
+    int j, k;
+    for (j = 0; j < 3; j++) {
+        gs4i_row a, b;
+        GS4I_SPLAT_MUL(a, y[j], *p0); GS4I_SPLAT_MAD(a, ey[j], *p1);
+        GS4I_SPLAT_MUL(b, y[j], *p2);
+        for (k = 0; k < 3; k++) {
+            gs4_real *row = at + 4 * GS4I_TILE * (GS4I_TILE * k + j);
+            gs4i_row r, t;
+            GS4I_LOAD(r, row);
+            GS4I_SPLAT_MUL(t, z[k], a); GS4I_SPLAT_MAD(t, ez[k], b);
+            GS4I_SUM(r, r, t);
+            GS4I_STORE(row, r);
+        }
+    }
+}
+
+/* The three rows of one z: sums with the weights and with the derivatives along y */
+GS4I_INLINE void gs4i_gather_plane(const gs4_real *at, const gs4_real w[3], const gs4_real d[3], gs4i_row *plain, gs4i_row *slope)
+{
+    gs4i_row r;
+    GS4I_LOAD(r, at);
+    GS4I_SPLAT_MUL(*plain, w[0], r); GS4I_SPLAT_MUL(*slope, d[0], r);
+    GS4I_LOAD(r, at + 4 * GS4I_TILE);
+    GS4I_SPLAT_MAD(*plain, w[1], r); GS4I_SPLAT_MAD(*slope, d[1], r);
+    GS4I_LOAD(r, at + 8 * GS4I_TILE);
+    GS4I_SPLAT_MAD(*plain, w[2], r); GS4I_SPLAT_MAD(*slope, d[2], r);
+}
+
+/* s0 = sum_jk w_j w_k row_jk, s1 and s2 with the derivative along y and along z: what is left is the sum along x */
+GS4I_INLINE void gs4i_gather_rows(const gs4_real *at, const gs4i_stencil *s, gs4i_row *s0, gs4i_row *s1, gs4i_row *s2)
+{
+    const int next = 4 * GS4I_TILE * GS4I_TILE;
+    gs4i_row plain, slope;
+    gs4i_gather_plane(at, s->w[1], s->d[1], &plain, &slope);
+    GS4I_SPLAT_MUL(*s0, s->w[2][0], plain); GS4I_SPLAT_MUL(*s1, s->w[2][0], slope); GS4I_SPLAT_MUL(*s2, s->d[2][0], plain);
+    gs4i_gather_plane(at + next, s->w[1], s->d[1], &plain, &slope);
+    GS4I_SPLAT_MAD(*s0, s->w[2][1], plain); GS4I_SPLAT_MAD(*s1, s->w[2][1], slope); GS4I_SPLAT_MAD(*s2, s->d[2][1], plain);
+    gs4i_gather_plane(at + 2 * next, s->w[1], s->d[1], &plain, &slope);
+    GS4I_SPLAT_MAD(*s0, s->w[2][2], plain); GS4I_SPLAT_MAD(*s1, s->w[2][2], slope); GS4I_SPLAT_MAD(*s2, s->d[2][2], plain);
+}
+
+/* The x-weights of a particle, spread over rows. */
+GS4I_INLINE void gs4i_x_weights(const gs4i_stencil *s, gs4i_row *w, gs4i_row *d)
+{
+    gs4i_row_of_nodes(w, s->w[0][0], s->w[0][1], s->w[0][2]);
+    gs4i_row_of_nodes(d, s->d[0][0], s->d[0][1], s->d[0][2]);
+}
+
+/* ==== [[grid]] blocks of nodes where there is material ============================================= *
+ *
+ * Nodes -4 .. n+3 exist along each axis (images of the walls live outside 0 .. n-1). One number per block of the
+ * domain says where its nodes are; only blocks within reach of particles have any: time and memory follow the
+ * material, not the domain. Per node: (momentum, mass) -> (velocity, mass); (force, -) -> (acceleration, -); and,
+ * for GS4, the acceleration it remembers from step to step (`memory`, fourth number: 1 where there is one). */
+
+#define GS4I_NODE_REALS (4 * GS4I_BLOCK_NODES)
+
+typedef struct gs4i_grid {
+    int cells[3], blocks[3];            /* domain in cells; table in blocks, one block more on every side */
+    gs4_real h, inv_h; gs4_vec3 origin;
+    int periodic[3];
+    int32_t *table; size_t table_count; /* per block: 1 + its slot, 0: no nodes */
+    int active, capacity;               /* blocks with nodes, ascending by number: slot s is block[s] */
+    uint32_t *block; int32_t *occupant; /* per slot: its number; which occupied block it is, or -1 */
+    gs4_real *momentum, *force, *memory;/* GS4I_NODE_REALS per slot; memory NULL when not needed */
+    int occupied, occupied_capacity;    /* blocks with particles, ascending */
+    uint32_t *occupied_block;
+    int32_t *first;                     /* per occupied block: its first particle; one more at the end */
+    int32_t *neighbour;                 /* per occupied block: slots of the 27 blocks around, x fastest */
+    int32_t *by_colour; int colour_first[9];    /* occupied blocks by parity of their coordinates: same colour, disjoint tiles */
+    int32_t *jump_of; gs4_real *jump; int jump_count, jump_capacity;   /* [[boundary]]: per slot, 1 + its place in `jump` */
+    gs4i_scratch lists[2], histogram;   /* of sorting */
+} gs4i_grid;
+
+GS4I_INLINE void gs4i_block_coordinates(const gs4i_grid *g, uint32_t block, int at[3])
+{
+    at[0] = (int)(block % (uint32_t)g->blocks[0]);
+    at[1] = (int)(block / (uint32_t)g->blocks[0] % (uint32_t)g->blocks[1]);
+    at[2] = (int)(block / (uint32_t)g->blocks[0] / (uint32_t)g->blocks[1]);
+}
+
+GS4I_INLINE uint32_t gs4i_block_number(const gs4i_grid *g, int x, int y, int z)
+{
+    return ((uint32_t)z * (uint32_t)g->blocks[1] + (uint32_t)y) * (uint32_t)g->blocks[0] + (uint32_t)x;
+}
+
+/* Where node (x, y, z), each from -4, is in the arrays of four numbers; -1: it does not exist now. */
+GS4I_INLINE ptrdiff_t gs4i_node_at(const gs4i_grid *g, int x, int y, int z)
+{
+    int32_t slot = g->table[gs4i_block_number(g, (x + 4) >> 2, (y + 4) >> 2, (z + 4) >> 2)];
+    if (!slot) return -1;
+    return (ptrdiff_t)(slot - 1) * GS4I_NODE_REALS + 4 * ((((z & 3) << 2 | (y & 3)) << 2) | (x & 3));
+}
+
+/* Block that holds the particles of cell (x, y, z). Cells beyond the domain belong to the nearest one inside. */
+GS4I_INLINE uint32_t gs4i_home_block(const gs4i_grid *g, const int cell[3])
+{
+    int at[3], a;
+    for (a = 0; a < 3; a++) {
+        int c = cell[a] < 0 ? 0 : cell[a] >= g->cells[a] ? g->cells[a] - 1 : cell[a];
+        at[a] = (c >> 2) + 1;
+    }
+    return gs4i_block_number(g, at[0], at[1], at[2]);
+}
+
+static void gs4i_grid_free(gs4i_memory *m, gs4i_grid *g)
+{
+    size_t c = (size_t)g->capacity, o = (size_t)g->occupied_capacity;
+    gs4i_free(m, g->table, g->table_count, sizeof *g->table);
+    gs4i_free(m, g->block, c, sizeof *g->block);
+    gs4i_free(m, g->occupant, c, sizeof *g->occupant);
+    gs4i_free(m, g->jump_of, c, sizeof *g->jump_of);
+    gs4i_free(m, g->momentum, c, GS4I_NODE_REALS * sizeof(gs4_real));
+    gs4i_free(m, g->force, c, GS4I_NODE_REALS * sizeof(gs4_real));
+    gs4i_free(m, g->memory, c, GS4I_NODE_REALS * sizeof(gs4_real));
+    gs4i_free(m, g->occupied_block, o, sizeof *g->occupied_block);
+    gs4i_free(m, g->first, o + 1, sizeof *g->first);
+    gs4i_free(m, g->neighbour, o, 27 * sizeof *g->neighbour);
+    gs4i_free(m, g->by_colour, o, sizeof *g->by_colour);
+    gs4i_free(m, g->jump, (size_t)g->jump_capacity, GS4I_NODE_REALS * sizeof(gs4_real));
+    gs4i_free(m, g->lists[0].data, g->lists[0].bytes, 1);
+    gs4i_free(m, g->lists[1].data, g->lists[1].bytes, 1);
+    gs4i_free(m, g->histogram.data, g->histogram.bytes, 1);
+}
+
+/* Room for `count` blocks with nodes; the old ones stay. All or nothing. */
+static int gs4i_grid_reserve(gs4i_memory *m, gs4i_grid *g, int count, int with_memory)
+{
+    gs4i_grid n = *g;
+    size_t c, old = (size_t)g->capacity, keep = (size_t)g->active, node = GS4I_NODE_REALS * sizeof(gs4_real);
+    if (count <= g->capacity) return GS4_OK;
+    n.capacity = count + count / 16;
+    c = (size_t)n.capacity;
+    n.block = (uint32_t *)gs4i_alloc(m, c, sizeof *n.block);
+    n.occupant = (int32_t *)gs4i_alloc(m, c, sizeof *n.occupant);
+    n.jump_of = (int32_t *)gs4i_alloc(m, c, sizeof *n.jump_of);
+    n.momentum = (gs4_real *)gs4i_alloc(m, c, node);
+    n.force = (gs4_real *)gs4i_alloc(m, c, node);
+    n.memory = with_memory ? (gs4_real *)gs4i_alloc(m, c, node) : NULL;
+    if (!n.block || !n.occupant || !n.jump_of || !n.momentum || !n.force || (with_memory && !n.memory)) {
+        gs4i_free(m, n.block, c, sizeof *n.block); gs4i_free(m, n.occupant, c, sizeof *n.occupant);
+        gs4i_free(m, n.jump_of, c, sizeof *n.jump_of); gs4i_free(m, n.momentum, c, node);
+        gs4i_free(m, n.force, c, node); gs4i_free(m, n.memory, c, node);
+        return GS4_ERROR_MEMORY;
+    }
+    if (g->block) memcpy(n.block, g->block, keep * sizeof *n.block);
+    if (g->memory) memcpy(n.memory, g->memory, keep * node);
+    gs4i_free(m, g->block, old, sizeof *g->block); gs4i_free(m, g->occupant, old, sizeof *g->occupant);
+    gs4i_free(m, g->jump_of, old, sizeof *g->jump_of); gs4i_free(m, g->momentum, old, node);
+    gs4i_free(m, g->force, old, node); gs4i_free(m, g->memory, old, node);
+    *g = n;
+    return GS4_OK;
+}
+
+/* Room for `count` blocks with particles; the list of their numbers stays. All or nothing. */
+static int gs4i_grid_reserve_occupied(gs4i_memory *m, gs4i_grid *g, int count)
+{
+    size_t c, old = (size_t)g->occupied_capacity;
+    uint32_t *block; int32_t *first, *neighbour, *by_colour;
+    if (count <= g->occupied_capacity) return GS4_OK;
+    c = (size_t)count + (size_t)count / 4 + 64;
+    block = (uint32_t *)gs4i_alloc(m, c, sizeof *block);
+    first = (int32_t *)gs4i_alloc(m, c + 1, sizeof *first);
+    neighbour = (int32_t *)gs4i_alloc(m, c, 27 * sizeof *neighbour);
+    by_colour = (int32_t *)gs4i_alloc(m, c, sizeof *by_colour);
+    if (!block || !first || !neighbour || !by_colour) {
+        gs4i_free(m, block, c, sizeof *block); gs4i_free(m, first, c + 1, sizeof *first);
+        gs4i_free(m, neighbour, c, 27 * sizeof *neighbour); gs4i_free(m, by_colour, c, sizeof *by_colour);
+        return GS4_ERROR_MEMORY;
+    }
+    if (g->occupied_block) {
+        memcpy(block, g->occupied_block, old * sizeof *block);
+        memcpy(first, g->first, (old + 1) * sizeof *first);
+        memcpy(neighbour, g->neighbour, old * 27 * sizeof *neighbour);
+        memcpy(by_colour, g->by_colour, old * sizeof *by_colour);
+    }
+    gs4i_free(m, g->occupied_block, old, sizeof *block); gs4i_free(m, g->first, old + 1, sizeof *first);
+    gs4i_free(m, g->neighbour, old, 27 * sizeof *neighbour); gs4i_free(m, g->by_colour, old, sizeof *by_colour);
+    g->occupied_block = block; g->first = first; g->neighbour = neighbour; g->by_colour = by_colour;
+    g->occupied_capacity = (int)c;
+    return GS4_OK;
+}
+
+/* Blocks along one axis that tiles of block `b` reach, those behind a periodic wall included; at most 6. */
+static int gs4i_reach(const gs4i_grid *g, int axis, int b, int out[6])
+{
+    int n = 0, n_cells = g->cells[axis], i;
+    for (i = -1; i <= 1; i++) out[n++] = b + i;
+    if (g->periodic[axis]) {
+        int first = 4 * (b - 1) - 2, node;                  /* tile nodes first .. first + 7 */
+        for (node = first; node < first + GS4I_TILE; node++) {
+            int wrapped = node < 0 ? node + n_cells : node >= n_cells ? node - n_cells : node, at = (wrapped >> 2) + 1;
+            if (wrapped == node) continue;
+            for (i = 0; i < n && out[i] != at; i++) {}
+            if (i == n && n < 6) out[n++] = at;
+        }
+    }
+    return n;
+}
+
+#define GS4I_SEEN 0x40000000            /* mark in the table while lists are made; slots stay below it */
+
+/* Make the list of blocks that need nodes, all that the occupied ones reach, in lists[1]. Returns how many, or an error. */
+static int gs4i_grid_collect(gs4i_memory *m, gs4i_grid *g, const uint32_t *occupied, int count)
+{
+    uint32_t *list = (uint32_t *)g->lists[1].data;
+    int o, n = 0, result = GS4_OK;
+    for (o = 0; o < count && result == GS4_OK; o++) {
+        int at[3], rx[6], ry[6], rz[6], nx, ny, nz, i, j, k;
+        gs4i_block_coordinates(g, occupied[o], at);
+        nx = gs4i_reach(g, 0, at[0], rx); ny = gs4i_reach(g, 1, at[1], ry); nz = gs4i_reach(g, 2, at[2], rz);
+        list = (uint32_t *)gs4i_scratch_reserve(m, &g->lists[1], (size_t)(n + nx * ny * nz) * sizeof *list, (size_t)n * sizeof *list);
+        if (!list) { list = (uint32_t *)g->lists[1].data; result = GS4_ERROR_MEMORY; break; }
+        for (k = 0; k < nz; k++) for (j = 0; j < ny; j++) for (i = 0; i < nx; i++) {
+            uint32_t b = gs4i_block_number(g, rx[i], ry[j], rz[k]);
+            if (g->table[b] & GS4I_SEEN) continue;
+            g->table[b] |= GS4I_SEEN;
+            list[n++] = b;
+        }
+    }
+    for (o = 0; o < n; o++) g->table[list[o]] &= ~GS4I_SEEN;
+    return result == GS4_OK ? n : result;
+}
+
+static void gs4i_grid_link(gs4i_grid *g)
+{
+    int o, s, i, j, k, colour, n = 0;
+    for (s = 0; s < g->active; s++) g->occupant[s] = -1;
+    for (o = 0; o < g->occupied; o++) {
+        int at[3], slot = 0;
+        gs4i_block_coordinates(g, g->occupied_block[o], at);
+        for (k = -1; k <= 1; k++) for (j = -1; j <= 1; j++) for (i = -1; i <= 1; i++)
+            g->neighbour[27 * (size_t)o + (size_t)slot++] = g->table[gs4i_block_number(g, at[0] + i, at[1] + j, at[2] + k)] - 1;
+        g->occupant[g->neighbour[27 * (size_t)o + 13]] = o;
+    }
+    for (colour = 0; colour < 8; colour++) {
+        g->colour_first[colour] = n;
+        for (o = 0; o < g->occupied; o++) {
+            int at[3];
+            gs4i_block_coordinates(g, g->occupied_block[o], at);
+            if (((at[0] & 1) | (at[1] & 1) << 1 | (at[2] & 1) << 2) == colour) g->by_colour[n++] = o;
+        }
+    }
+    g->colour_first[8] = n;
+}
+
+/* Give nodes to the occupied blocks and all within their reach; what nodes remember moves with them.
+ * `occupied` ascending. Nothing changes when memory is refused. */
+static int gs4i_grid_occupy(gs4i_memory *m, gs4i_grid *g, const uint32_t *occupied, int count, int with_memory)
+{
+    const size_t node = GS4I_NODE_REALS;
+    uint32_t *list;
+    int n = gs4i_grid_collect(m, g, occupied, count), s;
+    if (n < 0) return n;
+    if (gs4i_grid_reserve(m, g, n, with_memory) != GS4_OK || gs4i_grid_reserve_occupied(m, g, count) != GS4_OK) return GS4_ERROR_MEMORY;
+    list = (uint32_t *)g->lists[1].data;
+    gs4i_sort(list, n);
+    for (s = 0; with_memory && s < n; s++) {                /* `force` is free between steps: fill it, then swap */
+        int32_t old = g->table[list[s]];
+        if (old) memcpy(g->force + node * (size_t)s, g->memory + node * (size_t)(old - 1), node * sizeof(gs4_real));
+        else memset(g->force + node * (size_t)s, 0, node * sizeof(gs4_real));
+    }
+    if (with_memory) { gs4_real *t = g->force; g->force = g->memory; g->memory = t; }
+    for (s = 0; s < g->active; s++) g->table[g->block[s]] = 0;
+    for (s = 0; s < n; s++) { g->table[list[s]] = s + 1; g->block[s] = list[s]; }
+    g->active = n;
+    memmove(g->occupied_block, occupied, (size_t)count * sizeof *occupied);
+    g->occupied = count;
+    gs4i_grid_link(g);
+    return GS4_OK;
+}
+
+/* Where row (y, z) of the tile of occupied block o continues in the blocks left, of it and right. */
+GS4I_INLINE void gs4i_tile_row(const gs4i_grid *g, int o, int y, int z, ptrdiff_t at[3])
+{
+    const int32_t *nb = g->neighbour + 27 * (size_t)o;
+    int by = (y + 2) >> 2, bz = (z + 2) >> 2, row = ((((z + 2) & 3) << 2) | ((y + 2) & 3)) << 4, i;
+    for (i = 0; i < 3; i++) at[i] = (ptrdiff_t)nb[(bz * 3 + by) * 3 + i] * GS4I_NODE_REALS + row;
+}
+
+static void gs4i_tile_load(const gs4i_grid *g, int o, const gs4_real *GS4I_RESTRICT field, gs4_real *GS4I_RESTRICT tile)
+{
+    int y, z;
+    for (z = 0; z < GS4I_TILE; z++) for (y = 0; y < GS4I_TILE; y++) {
+        ptrdiff_t at[3];
+        gs4i_tile_row(g, o, y, z, at);
+        memcpy(tile, field + at[0] + 8, 8 * sizeof(gs4_real));
+        memcpy(tile + 8, field + at[1], 16 * sizeof(gs4_real));
+        memcpy(tile + 24, field + at[2], 8 * sizeof(gs4_real));
+        tile += 4 * GS4I_TILE;
+    }
+    memset(tile, 0, 16 * sizeof(gs4_real));
+}
+
+static void gs4i_tile_add(const gs4i_grid *g, int o, const gs4_real *GS4I_RESTRICT tile, gs4_real *GS4I_RESTRICT field)
+{
+    int y, z, i;
+    for (z = 0; z < GS4I_TILE; z++) for (y = 0; y < GS4I_TILE; y++) {
+        ptrdiff_t at[3];
+        gs4_real *to;
+        gs4i_tile_row(g, o, y, z, at);
+        for (to = field + at[0] + 8, i = 0; i < 8; i++) to[i] += tile[i];
+        for (to = field + at[1], i = 0; i < 16; i++) to[i] += tile[8 + i];
+        for (to = field + at[2], i = 0; i < 8; i++) to[i] += tile[24 + i];
+        tile += 4 * GS4I_TILE;
+    }
+}
+
+/* ==== [[particles]] the store, and how it is sorted by block ======================================= *
+ *
+ * Arrays of small vectors, each 16 bytes in float where it can be: (x y z mass), (vx vy vz J) and their rates
+ * (ax ay az dJ/dt), the velocity gradient, and how much v differs from the grid's velocity there. Sorting permutes in
+ * place along the cycles of the permutation: no second copy of anything. */
+
+#ifdef GS4_DOUBLE
+typedef float gs4i_half;                /* half of gs4_real's width: enough for a small difference, see S2 in [[transfer]] */
+GS4I_INLINE gs4i_half gs4i_to_half(gs4_real v) { return (gs4i_half)v; }
+GS4I_INLINE gs4_real gs4i_from_half(gs4i_half v) { return (gs4_real)v; }
+#else
+typedef uint16_t gs4i_half;             /* the upper half of a float, rounded */
+GS4I_INLINE gs4i_half gs4i_to_half(gs4_real v)
+{
+    uint32_t u; memcpy(&u, &v, sizeof u);
+    return (gs4i_half)((u + 0x7fffu + ((u >> 16) & 1u)) >> 16);
+}
+GS4I_INLINE gs4_real gs4i_from_half(gs4i_half v)
+{
+    uint32_t u = (uint32_t)v << 16; gs4_real r;
+    memcpy(&r, &u, sizeof r);
+    return r;
+}
+#endif
+
+typedef struct gs4i_particles {
+    int count, capacity, with_rates;
+    gs4_real *position;                 /* 4: x y z, mass */
+    gs4_real *velocity;                 /* 4: v, volume ratio J */
+    gs4_real *rate;                     /* 4: dv/dt, dJ/dt; NULL for symplectic Euler */
+    gs4_real *affine;                   /* 9: [3 j + i] = dv_i/dx_j, expected at the next stage */
+    gs4i_half *lag;                     /* 3: v minus the grid's velocity; NULL for symplectic Euler */
+    uint32_t *id; uint8_t *material;
+    uint32_t *order;                    /* scratch: block, then destination of each particle */
+} gs4i_particles;
+
+enum { GS4I_ARRAYS = 8 };
+typedef struct gs4i_array { void **data; size_t size; int wanted; } gs4i_array;
+
+/* The arrays of a store with the size of one element, largest first: for growing, sorting, hashing, saving. */
+static void gs4i_particle_arrays(gs4i_particles *p, gs4i_array out[GS4I_ARRAYS])
+{
+    int i;
+    out[0].data = (void **)&p->affine;   out[0].size = 9 * sizeof(gs4_real);
+    out[1].data = (void **)&p->position; out[1].size = 4 * sizeof(gs4_real);
+    out[2].data = (void **)&p->velocity; out[2].size = 4 * sizeof(gs4_real);
+    out[3].data = (void **)&p->rate;     out[3].size = 4 * sizeof(gs4_real);
+    out[4].data = (void **)&p->lag;      out[4].size = 3 * sizeof(gs4i_half);
+    out[5].data = (void **)&p->id;       out[5].size = sizeof(uint32_t);
+    out[6].data = (void **)&p->material; out[6].size = 1;
+    out[7].data = (void **)&p->order;    out[7].size = sizeof(uint32_t);
+    for (i = 0; i < GS4I_ARRAYS; i++) out[i].wanted = p->with_rates || (i != 3 && i != 4);
+}
+
+static void gs4i_particles_free(gs4i_memory *m, gs4i_particles *p)
+{
+    gs4i_array a[GS4I_ARRAYS];
+    int i;
+    gs4i_particle_arrays(p, a);
+    for (i = 0; i < GS4I_ARRAYS; i++) { gs4i_free(m, *a[i].data, (size_t)p->capacity, a[i].size); *a[i].data = NULL; }
+    p->capacity = 0;
+}
+
+/* Room for `wanted` particles in all. All or nothing. */
+static int gs4i_particles_reserve(gs4i_memory *m, gs4i_particles *p, int wanted)
+{
+    gs4i_particles grown = *p;
+    gs4i_array from[GS4I_ARRAYS], to[GS4I_ARRAYS];
+    int i, failed = 0;
+    if (wanted <= p->capacity) return GS4_OK;
+    gs4i_particle_arrays(p, from);
+    gs4i_particle_arrays(&grown, to);
+    for (i = 0; i < GS4I_ARRAYS; i++) *to[i].data = NULL;
+    grown.capacity = wanted;
+    for (i = 0; i < GS4I_ARRAYS && !failed; i++)
+        if (to[i].wanted) failed = (*to[i].data = gs4i_alloc(m, (size_t)wanted, to[i].size)) == NULL;
+    if (failed) { gs4i_particles_free(m, &grown); return GS4_ERROR_MEMORY; }
+    for (i = 0; i < GS4I_ARRAYS; i++)
+        if (*from[i].data) memcpy(*to[i].data, *from[i].data, (size_t)p->count * from[i].size);
+    gs4i_particles_free(m, p);
+    *p = grown;
+    return GS4_OK;
+}
+
+#define GS4I_LEADER 0x80000000u         /* in `order`: start of a cycle that moves something */
+#define GS4I_VISITED 0x40000000u
+#define GS4I_DESTINATION 0x3fffffffu
+#define GS4I_MAX_PARTICLES 0x3ffffff0
+
+static void gs4i_mark_cycles(uint32_t *order, int count)
+{
+    int i;
+    for (i = 0; i < count; i++) {
+        uint32_t j = (uint32_t)i;
+        if (order[i] & GS4I_VISITED) continue;
+        if ((order[i] & GS4I_DESTINATION) != j) order[i] |= GS4I_LEADER;
+        do { order[j] |= GS4I_VISITED; j = order[j] & GS4I_DESTINATION; } while (j != (uint32_t)i);
+    }
+}
+
+GS4I_INLINE void gs4i_permute_sized(char *data, size_t size, const uint32_t *order, int count)
+{
+    char carried[9 * sizeof(double)], swapped[9 * sizeof(double)];
+    int i;
+    for (i = 0; i < count; i++) {
+        uint32_t j = (uint32_t)i;
+        if (!(order[i] & GS4I_LEADER)) continue;
+        memcpy(carried, data + j * size, size);
+        do {
+            j = order[j] & GS4I_DESTINATION;
+            memcpy(swapped, data + j * size, size);
+            memcpy(data + j * size, carried, size);
+            memcpy(carried, swapped, size);
+        } while (j != (uint32_t)i);
+    }
+}
+
+/* Move every element to its destination; the sizes are spelled out so that copies are plain moves. */
+static void gs4i_permute_task(int index, void *context)
+{
+    gs4i_particles *p = (gs4i_particles *)context;
+    gs4i_array a[GS4I_ARRAYS];
+    char *data;
+    gs4i_particle_arrays(p, a);
+    data = (char *)*a[index].data;
+    if (!data) return;
+    switch (a[index].size) {
+    case 72: gs4i_permute_sized(data, 72, p->order, p->count); break;
+    case 36: gs4i_permute_sized(data, 36, p->order, p->count); break;
+    case 32: gs4i_permute_sized(data, 32, p->order, p->count); break;
+    case 16: gs4i_permute_sized(data, 16, p->order, p->count); break;
+    case 12: gs4i_permute_sized(data, 12, p->order, p->count); break;
+    case 6:  gs4i_permute_sized(data, 6, p->order, p->count); break;
+    case 4:  gs4i_permute_sized(data, 4, p->order, p->count); break;
+    default: gs4i_permute_sized(data, a[index].size, p->order, p->count); break;
+    }
+}
+
+/* Counting sort by block, stable, in a number of chunks that depends on the number of particles alone. */
+typedef struct gs4i_sorting {
+    gs4i_particles *p; gs4i_grid *g;
+    gs4_real reach;                     /* s: sorted by where v carries particles in this time (alpha_f dt) */
+    int chunks;
+    uint32_t *histogram;                /* [chunk][occupied block] */
+} gs4i_sorting;
+
+GS4I_INLINE void gs4i_chunk(const gs4i_sorting *s, int index, int *begin, int *end)
+{
+    *begin = (int)((int64_t)s->p->count * index / s->chunks);
+    *end = (int)((int64_t)s->p->count * (index + 1) / s->chunks);
+}
+
+/* The predicted position of particle i (S2): with the grid's velocity, which is v - lag. */
+GS4I_INLINE void gs4i_predicted_position(const gs4i_particles *p, size_t i, gs4_real reach, gs4_real x[3])
+{
+    int a;
+    for (a = 0; a < 3; a++) {
+        gs4_real v = p->velocity[4 * i + (size_t)a];
+        if (p->lag) v -= gs4i_from_half(p->lag[3 * i + (size_t)a]);
+        x[a] = p->position[4 * i + (size_t)a] + reach * v;
+    }
+}
+
+static void gs4i_sort_keys_task(int index, void *context)
+{
+    gs4i_sorting *s = (gs4i_sorting *)context;
+    const gs4_real origin[3] = { s->g->origin.x, s->g->origin.y, s->g->origin.z };
+    int i, end, a;
+    gs4i_chunk(s, index, &i, &end);
+    for (; i < end; i++) {
+        gs4_real x[3];
+        int cell[3];
+        gs4i_predicted_position(s->p, (size_t)i, s->reach, x);
+        for (a = 0; a < 3; a++) {
+            gs4_real c = (x[a] - origin[a]) * s->g->inv_h;
+            cell[a] = c >= 0 ? (c < GS4I_C(s->g->cells[a]) ? (int)c : s->g->cells[a] - 1) : 0;
+        }
+        s->p->order[i] = gs4i_home_block(s->g, cell);
+    }
+}
+
+static void gs4i_sort_count_task(int index, void *context)
+{
+    gs4i_sorting *s = (gs4i_sorting *)context;
+    uint32_t *h = s->histogram + (size_t)index * (size_t)s->g->occupied;
+    int i, end;
+    gs4i_chunk(s, index, &i, &end);
+    for (; i < end; i++) h[s->g->occupant[s->g->table[s->p->order[i]] - 1]]++;
+}
+
+static void gs4i_sort_place_task(int index, void *context)
+{
+    gs4i_sorting *s = (gs4i_sorting *)context;
+    uint32_t *h = s->histogram + (size_t)index * (size_t)s->g->occupied;
+    int i, end;
+    gs4i_chunk(s, index, &i, &end);
+    for (; i < end; i++) s->p->order[i] = h[s->g->occupant[s->g->table[s->p->order[i]] - 1]]++;
+}
+
+/* List of the blocks that particles are in, ascending, from the keys in `order`, in lists[0]. Returns how many, or an error. */
+static int gs4i_list_occupied(gs4i_memory *m, gs4i_sorting *s)
+{
+    uint32_t last = UINT32_MAX, *list = (uint32_t *)s->g->lists[0].data;
+    int i, n = 0, result = GS4_OK;
+    for (i = 0; i < s->p->count; i++) {
+        uint32_t b = s->p->order[i];
+        if (b == last || (s->g->table[b] & GS4I_SEEN)) continue;
+        list = (uint32_t *)gs4i_scratch_reserve(m, &s->g->lists[0], (size_t)(n + 1) * sizeof *list, (size_t)n * sizeof *list);
+        if (!list) { list = (uint32_t *)s->g->lists[0].data; result = GS4_ERROR_MEMORY; break; }
+        s->g->table[b] |= GS4I_SEEN;
+        list[n++] = last = b;
+    }
+    for (i = 0; i < n; i++) s->g->table[list[i]] &= ~GS4I_SEEN;
+    if (result != GS4_OK) return result;
+    gs4i_sort(list, n);
+    return n;
+}
+
+/* S1. Sort the particles by the block of their predicted position and give nodes to all blocks in reach.
+ * Nothing has changed when memory is refused. */
+static int gs4i_particles_sort(gs4i_memory *m, const gs4i_tasks *tasks, gs4i_particles *p, gs4i_grid *g, gs4_real reach)
+{
+    gs4i_sorting s;
+    uint32_t sum = 0;
+    int count, o, c;
+    s.p = p; s.g = g; s.reach = reach;
+    s.chunks = p->count / 4096 < 1 ? 1 : p->count / 4096 > 64 ? 64 : p->count / 4096;
+    gs4i_parallel_for(tasks, s.chunks, gs4i_sort_keys_task, &s);
+    count = gs4i_list_occupied(m, &s);
+    if (count < 0) return count;
+    s.histogram = (uint32_t *)gs4i_scratch_reserve(m, &g->histogram, (size_t)s.chunks * (size_t)count * sizeof *s.histogram, 0);
+    if (!s.histogram || gs4i_grid_occupy(m, g, (const uint32_t *)g->lists[0].data, count, p->with_rates) != GS4_OK) return GS4_ERROR_MEMORY;
+    memset(s.histogram, 0, (size_t)s.chunks * (size_t)count * sizeof *s.histogram);
+    gs4i_parallel_for(tasks, s.chunks, gs4i_sort_count_task, &s);
+    for (o = 0; o < count; o++) {
+        g->first[o] = (int32_t)sum;
+        for (c = 0; c < s.chunks; c++) {
+            uint32_t *h = s.histogram + (size_t)c * (size_t)count + o, n = *h;
+            *h = sum; sum += n;
+        }
+    }
+    g->first[count] = (int32_t)sum;
+    gs4i_parallel_for(tasks, s.chunks, gs4i_sort_place_task, &s);
+    gs4i_mark_cycles(p->order, p->count);
+    gs4i_parallel_for(tasks, GS4I_ARRAYS - 1, gs4i_permute_task, p);
+    return GS4_OK;
+}
+
+/* ==== [[liquid]] pressure, viscosity, presets ====================================================== */
+
+/* What the particles need of a material, ready for use. */
+typedef struct gs4i_law {
+    gs4_real inv_density, tait;         /* 1 / rho0; rho0 c0^2 / 7 */
+    gs4_real viscosity, sound_speed, density;
+    gs4_viscosity_fn viscosity_fn; void *viscosity_user;
+    gs4_material is;                    /* as described */
+} gs4i_law;
+
+/* Tait: p = (rho0 c0^2 / 7) (J^-7 - 1) in Pa; grows without bound as J -> 0, never below -rho0 c0^2 / 7. */
+GS4I_INLINE gs4_real gs4i_pressure(const gs4i_law *law, gs4_real J)
+{
+    gs4_real i = GS4I_C(1) / J, i2 = i * i, i4 = i2 * i2;
+    return law->tait * (i4 * i2 * i - GS4I_C(1));
+}
+
+/* Speed of sound at J over that at rest: sqrt(-(J^2/rho0) dp/dJ) / c0 = J^-3. */
+GS4I_INLINE gs4_real gs4i_stiffening(gs4_real J) { return GS4I_C(1) / (J * J * J); }
+
+/* Viscosity (Pa s) at the shear rate sqrt(2 D:D); D = (L + L^T)/2, grad[3 j + i] = dv_i/dx_j. */
+GS4I_INLINE gs4_real gs4i_viscosity(const gs4i_law *law, const gs4_real D[6])
+{
+    if (!law->viscosity_fn) return law->viscosity;
+    return law->viscosity_fn(0, GS4I_SQRT(2 * (D[0] * D[0] + D[1] * D[1] + D[2] * D[2]
+                                              + 2 * (D[3] * D[3] + D[4] * D[4] + D[5] * D[5]))), law->viscosity_user);
+}
+
+/* D as xx yy zz xy xz yz. */
+GS4I_INLINE void gs4i_strain_rate(const gs4_real grad[9], gs4_real D[6])
+{
+    D[0] = grad[0]; D[1] = grad[4]; D[2] = grad[8];
+    D[3] = GS4I_C(0.5) * (grad[1] + grad[3]); D[4] = GS4I_C(0.5) * (grad[2] + grad[6]); D[5] = GS4I_C(0.5) * (grad[5] + grad[7]);
+}
+
+/* Liquids to start from, density (kg/m^3) and viscosity (Pa s) near the temperature given. */
+static const struct gs4i_preset_row { const char *name; double density, viscosity; } gs4i_presets[] = {
+    { "water",     998.2, 1.002e-3 },   /* 20 C; Kestin, Sokolov & Wakeham, J. Phys. Chem. Ref. Data 7 (1978) 941 */
+    { "olive oil", 911,   0.084 },      /* 20 C; Fellows, Food Processing Technology (2000), table 1.6 */
+    { "glycerol",  1261,  1.41 },       /* 20 C; Segur & Oberstar, Ind. Eng. Chem. 43 (1951) 2117 */
+    { "honey",     1420,  10 },         /* 20-25 C, 17 % water; Yanniotis, Skaltsi & Karaburnioti, J. Food Eng. 72 (2006) 372 */
+    { "lava",      2600,  1000 }        /* basalt at 1130 C, few crystals; Shaw, J. Petrology 10 (1969) 510 */
+};
+
+static int gs4i_preset(const char *name, gs4_material *material)
+{
+    size_t i;
+    for (i = 0; i < sizeof gs4i_presets / sizeof gs4i_presets[0]; i++) {
+        if (strcmp(name, gs4i_presets[i].name) != 0) continue;
+        memset(material, 0, sizeof *material);
+        material->density = GS4I_C(gs4i_presets[i].density);
+        material->viscosity = GS4I_C(gs4i_presets[i].viscosity);
+        return GS4_OK;
+    }
+    return GS4_ERROR_ARGUMENT;
+}
+
+/* ==== [[boundary]] walls by images, bodies by nodes, what contact does to velocities =============== *
+ *
+ * Walls lie on cell faces, so the node pairs  ... -2 -1 | 0 1 ...  mirror each other:  image -1-k <-> k. Mass and momentum
+ * that reach an image are folded back onto its mirror node, forces too, with the sign S of the reflection (stick: -1 in
+ * all components; slip: -1 in the normal one; periodic: the node a period away, S = 1); afterwards images hold S times
+ * the field of their mirror node. A body holds the nodes inside of it.
+ *
+ * What contact takes from the velocity of a node at once is no acceleration: it is kept as a jump, which goes to the
+ * velocity of the particles directly and never into their rates (METHOD: "contact stays out of the rates"). */
+
+typedef struct gs4i_image { uint32_t image, mirror; } gs4i_image;      /* node numbers: 64 slot + place in the block */
+
+/* A body or a mouth: a shape with a pose. World point p is shape point R^T (p - at) + pivot. */
+typedef struct gs4i_field {             /* sampled distance of a mesh: trilinear in n[0] x n[1] x n[2] samples */
+    int n[3]; double low[3], spacing, band;
+    gs4_real *distance; size_t count;
+} gs4i_field;
+
+typedef struct gs4i_body {
+    gs4_collider is;                    /* as described */
+    double at[3], turn[4];              /* where the pivot is now; orientation, unit quaternion w x y z */
+    gs4_real axes[9];                   /* R, row-major */
+    gs4i_field field;                   /* for a mesh */
+    int is_mouth, asleep;               /* of an emitter: holds what is inside at the velocity `flow`; not in use now */
+    gs4_vec3 flow;
+} gs4i_body;
+
+typedef struct gs4i_boundary {
+    gs4_wall walls[6];
+    gs4i_image *images[6]; int image_count[6], image_capacity[6];      /* per wall, while the blocks stay */
+    gs4i_body *bodies; int body_count, body_capacity;
+    gs4_real h;
+} gs4i_boundary;
+
+static void gs4i_body_orient(gs4i_body *b)
+{
+    double w = b->turn[0], x = b->turn[1], y = b->turn[2], z = b->turn[3];
+    const double r[9] = { 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
+                          2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+                          2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y) };
+    int i;
+    for (i = 0; i < 9; i++) b->axes[i] = GS4I_C(r[i]);
+}
+
+/* Pose after dt: the pivot moves, the body turns about it by the angle |omega| dt. */
+static void gs4i_body_move(gs4i_body *b, double dt)
+{
+    double o[3], rate, half, norm = 0, q[4], s, c, x, y, z;
+    const double *t = b->turn;
+    int i;
+    gs4i_to_double(b->is.angular_velocity, o);
+    rate = sqrt(o[0] * o[0] + o[1] * o[1] + o[2] * o[2]); half = 0.5 * rate * dt;
+    s = rate > 0 ? sin(half) / rate : 0; c = cos(half);
+    x = o[0] * s; y = o[1] * s; z = o[2] * s;
+    b->at[0] += (double)b->is.velocity.x * dt; b->at[1] += (double)b->is.velocity.y * dt; b->at[2] += (double)b->is.velocity.z * dt;
+    if (rate <= 0) return;
+    q[0] = c * t[0] - x * t[1] - y * t[2] - z * t[3];
+    q[1] = c * t[1] + x * t[0] + y * t[3] - z * t[2];
+    q[2] = c * t[2] - x * t[3] + y * t[0] + z * t[1];
+    q[3] = c * t[3] + x * t[2] - y * t[1] + z * t[0];
+    for (i = 0; i < 4; i++) norm += q[i] * q[i];
+    for (i = 0; i < 4; i++) b->turn[i] = q[i] / sqrt(norm);
+    gs4i_body_orient(b);
+}
+
+/* World velocity of the body at p. */
+static gs4_vec3 gs4i_body_velocity(const gs4i_body *b, gs4_vec3 p)
+{
+    gs4_vec3 r = gs4i_sub(p, gs4i_vec3(GS4I_C(b->at[0]), GS4I_C(b->at[1]), GS4I_C(b->at[2])));
+    if (b->is_mouth) return b->flow;
+    return gs4i_add(b->is.velocity, gs4i_cross(b->is.angular_velocity, r));
+}
+
+/* Trilinear; outside of the samples the distance to them is added. */
+static gs4_real gs4i_field_distance(const gs4i_field *f, gs4_vec3 p)
+{
+    double x[3], out = 0, value = 0;
+    int c[3], a, i;
+    gs4i_to_double(p, x);
+    for (a = 0; a < 3; a++) {
+        double t = (x[a] - f->low[a]) / f->spacing, inside = t < 0 ? 0 : t > f->n[a] - 1 ? f->n[a] - 1 : t;
+        out += (t - inside) * (t - inside);
+        c[a] = (int)inside; if (c[a] > f->n[a] - 2) c[a] = f->n[a] - 2;
+        x[a] = inside - c[a];
+    }
+    for (i = 0; i < 8; i++) {
+        size_t at = ((size_t)(c[2] + (i >> 2)) * (size_t)f->n[1] + (size_t)(c[1] + (i >> 1 & 1))) * (size_t)f->n[0]
+                  + (size_t)(c[0] + (i & 1));
+        value += (double)f->distance[at] * (i & 1 ? x[0] : 1 - x[0]) * (i & 2 ? x[1] : 1 - x[1]) * (i & 4 ? x[2] : 1 - x[2]);
+    }
+    return GS4I_C(value + sqrt(out) * f->spacing);
+}
+
+/* The same in the coordinates of the shape. */
+static gs4_real gs4i_shape_or_field(const gs4i_body *b, gs4_vec3 p)
+{
+    return b->field.distance ? gs4i_field_distance(&b->field, p) : gs4i_shape_distance(&b->is.shape, p);
+}
+
+/* Signed distance (m) from the body's surface to the world point p. */
+static gs4_real gs4i_body_distance(const gs4i_body *b, gs4_vec3 p)
+{
+    const gs4_real *r = b->axes;
+    gs4_vec3 d = gs4i_sub(p, gs4i_vec3(GS4I_C(b->at[0]), GS4I_C(b->at[1]), GS4I_C(b->at[2])));
+    gs4_vec3 q = gs4i_add(gs4i_vec3(r[0] * d.x + r[3] * d.y + r[6] * d.z, r[1] * d.x + r[4] * d.y + r[7] * d.z,
+                                    r[2] * d.x + r[5] * d.y + r[8] * d.z), b->is.pivot);
+    return gs4i_shape_or_field(b, q);
+}
+
+/* Outward unit normal: gradient of the distance over `step`; zero where it has none. */
+static gs4_vec3 gs4i_body_normal(const gs4i_body *b, gs4_vec3 p, gs4_real step)
+{
+    gs4_vec3 g;
+    gs4_real length;
+    g.x = gs4i_body_distance(b, gs4i_vec3(p.x + step, p.y, p.z)) - gs4i_body_distance(b, gs4i_vec3(p.x - step, p.y, p.z));
+    g.y = gs4i_body_distance(b, gs4i_vec3(p.x, p.y + step, p.z)) - gs4i_body_distance(b, gs4i_vec3(p.x, p.y - step, p.z));
+    g.z = gs4i_body_distance(b, gs4i_vec3(p.x, p.y, p.z + step)) - gs4i_body_distance(b, gs4i_vec3(p.x, p.y, p.z - step));
+    length = gs4i_length(g);
+    return length > 0 ? gs4i_scale(g, 1 / length) : gs4i_vec3(0, 0, 0);
+}
+
+/* --- closed triangle meshes ---------------------------------------------------------------------- */
+
+static const char *const gs4i_mesh_faults[] = { NULL,
+    "has a vertex that is not a finite number", "has a triangle with a vertex index out of range",
+    "is not closed: an edge belongs to one triangle only, or to more than two, or to two that disagree about the outside",
+    "is inside out: its triangles face inwards; swap two vertices of each", "encloses no volume" };
+
+/* 0 when the surface is closed and faces outwards, the number of its fault, or GS4_ERROR_MEMORY. */
+static int gs4i_mesh_check(gs4i_memory *m, const gs4_shape *s)
+{
+    size_t nv = (size_t)s->vertex_count, edges = 3 * (size_t)s->triangle_count, i, k;
+    size_t *first = NULL; int *target = NULL, fault = 0;
+    double volume = 0, extent = 0;
+    for (i = 0; i < 3 * nv; i++) {
+        if (!gs4i_finite(s->vertices[i])) return 1;
+        if (fabs((double)s->vertices[i]) > extent) extent = fabs((double)s->vertices[i]);
+    }
+    for (i = 0; i < edges; i++) if (s->triangles[i] < 0 || s->triangles[i] >= s->vertex_count) return 2;
+    first = (size_t *)gs4i_alloc(m, nv + 2, sizeof *first);
+    target = (int *)gs4i_alloc(m, edges, sizeof *target);
+    if (!first || !target) fault = GS4_ERROR_MEMORY;
+    else {
+        for (i = 0; i < edges; i++) first[s->triangles[i] + 2]++;
+        for (i = 2; i < nv + 2; i++) first[i] += first[i - 1];
+        for (i = 0; i < edges; i++)                         /* directed edge i: triangles[i] -> next corner */
+            target[first[s->triangles[i] + 1]++] = s->triangles[i % 3 == 2 ? i - 2 : i + 1];
+        for (i = 0; i < edges && !fault; i++) {             /* each edge once, its reverse once */
+            int from = s->triangles[i], to = s->triangles[i % 3 == 2 ? i - 2 : i + 1], same = 0, reverse = 0;
+            for (k = first[from]; k < first[from + 1]; k++) same += target[k] == to;
+            for (k = first[to]; k < first[to + 1]; k++) reverse += target[k] == from;
+            if (same != 1 || reverse != 1) fault = 3;
+        }
+        for (i = 0; i < edges; i += 3) {
+            const gs4_real *a = s->vertices + 3 * (size_t)s->triangles[i], *b = s->vertices + 3 * (size_t)s->triangles[i + 1];
+            const gs4_real *c = s->vertices + 3 * (size_t)s->triangles[i + 2];
+            const double p[9] = { (double)a[0], (double)a[1], (double)a[2], (double)b[0], (double)b[1], (double)b[2], (double)c[0], (double)c[1], (double)c[2] };
+            volume += (p[0] * (p[4] * p[8] - p[5] * p[7]) + p[1] * (p[5] * p[6] - p[3] * p[8]) + p[2] * (p[3] * p[7] - p[4] * p[6])) / 6;
+        }
+        if (!fault && fabs(volume) <= 1e-12 * extent * extent * extent) fault = 5;
+        if (!fault && volume < 0) fault = 4;
+    }
+    gs4i_free(m, first, nv + 2, sizeof *first);
+    gs4i_free(m, target, edges, sizeof *target);
+    return fault;
+}
+
+/* Squared distance of p to triangle abc: Voronoi regions of corners, edges and face. */
+static double gs4i_triangle_distance2(const double p[3], const double a[3], const double b[3], const double c[3])
+{
+    double ab[3], ac[3], ap[3], q[3], d1 = 0, d2 = 0, d3, d4, d5, d6, va, vb, vc, u = 0, v = 0, bb = 0, bc = 0, cc = 0, r = 0;
+    int i;
+    for (i = 0; i < 3; i++) {
+        ab[i] = b[i] - a[i]; ac[i] = c[i] - a[i]; ap[i] = p[i] - a[i];
+        d1 += ab[i] * ap[i]; d2 += ac[i] * ap[i];
+        bb += ab[i] * ab[i]; bc += ab[i] * ac[i]; cc += ac[i] * ac[i];
+    }
+    d3 = d1 - bb; d4 = d2 - bc; d5 = d1 - bc; d6 = d2 - cc;             /* the same from b and from c */
+    va = d3 * d6 - d5 * d4; vb = d5 * d2 - d1 * d6; vc = d1 * d4 - d3 * d2;
+    if (d1 <= 0 && d2 <= 0) { u = 0; v = 0; }
+    else if (d3 >= 0 && d4 <= d3) { u = 1; v = 0; }
+    else if (d6 >= 0 && d5 <= d6) { u = 0; v = 1; }
+    else if (vc <= 0 && d1 >= 0 && d3 <= 0) { u = d1 / (d1 - d3); v = 0; }
+    else if (vb <= 0 && d2 >= 0 && d6 <= 0) { u = 0; v = d2 / (d2 - d6); }
+    else if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) { v = (d4 - d3) / ((d4 - d3) + (d5 - d6)); u = 1 - v; }
+    else if (va + vb + vc > 0) { u = vb / (va + vb + vc); v = vc / (va + vb + vc); }
+    for (i = 0; i < 3; i++) { q[i] = a[i] + u * ab[i] + v * ac[i] - p[i]; r += q[i] * q[i]; }
+    return r;
+}
+
+/* Which side of edge ij of the projection to (y, z) the point is on: the same number for both triangles of the edge. */
+static int gs4i_edge_side(const gs4_shape *s, int i, int j, double y, double z)
+{
+    int low = i < j ? i : j, high = i < j ? j : i, positive;
+    const gs4_real *a = s->vertices + 3 * (size_t)low, *b = s->vertices + 3 * (size_t)high;
+    positive = ((double)b[1] - y) * ((double)a[2] - z) - ((double)a[1] - y) * ((double)b[2] - z) > 0;
+    return (i < j) == positive;
+}
+
+/* Distances exact within `band` of the surface, +-band beyond; inside by counting crossings along rows of x. */
+static void gs4i_field_sample(gs4i_field *f, const gs4_shape *s)
+{
+    int t, a, i, j, k;
+    size_t n = f->count, e;
+    for (e = 0; e < n; e++) f->distance[e] = GS4I_C(f->band);
+    for (t = 0; t < s->triangle_count; t++) {
+        const int *v = s->triangles + 3 * (size_t)t;
+        double corner[3][3];
+        int lo[3], hi[3], c;
+        for (a = 0; a < 3; a++) {
+            double mn = 1e300, mx = -1e300;
+            for (c = 0; c < 3; c++) {
+                corner[c][a] = (double)s->vertices[3 * (size_t)v[c] + (size_t)a];
+                if (corner[c][a] < mn) mn = corner[c][a];
+                if (corner[c][a] > mx) mx = corner[c][a];
+            }
+            lo[a] = (int)ceil((mn - f->band - f->low[a]) / f->spacing); if (lo[a] < 0) lo[a] = 0;
+            hi[a] = (int)floor((mx + f->band - f->low[a]) / f->spacing); if (hi[a] > f->n[a] - 1) hi[a] = f->n[a] - 1;
+        }
+        for (k = lo[2]; k <= hi[2]; k++) for (j = lo[1]; j <= hi[1]; j++) for (i = lo[0]; i <= hi[0]; i++) {
+            gs4_real *d = f->distance + ((size_t)k * (size_t)f->n[1] + (size_t)j) * (size_t)f->n[0] + (size_t)i;
+            double p[3], r2;
+            p[0] = f->low[0] + i * f->spacing; p[1] = f->low[1] + j * f->spacing; p[2] = f->low[2] + k * f->spacing;
+            r2 = gs4i_triangle_distance2(p, corner[0], corner[1], corner[2]);
+            if (r2 < (double)*d * (double)*d) *d = GS4I_C(sqrt(r2));
+        }
+    }
+    for (t = 0; t < s->triangle_count; t++) {               /* each crossing flips the sign of all samples behind it */
+        const int *v = s->triangles + 3 * (size_t)t;
+        double q[3][3];                                     /* the corners */
+        int j0, j1, k0, k1;
+        for (i = 0; i < 9; i++) q[i / 3][i % 3] = (double)s->vertices[3 * (size_t)v[i / 3] + (size_t)(i % 3)];
+        j0 = (int)floor((fmin(q[0][1], fmin(q[1][1], q[2][1])) - f->low[1]) / f->spacing);
+        j1 = (int)ceil((fmax(q[0][1], fmax(q[1][1], q[2][1])) - f->low[1]) / f->spacing);
+        k0 = (int)floor((fmin(q[0][2], fmin(q[1][2], q[2][2])) - f->low[2]) / f->spacing);
+        k1 = (int)ceil((fmax(q[0][2], fmax(q[1][2], q[2][2])) - f->low[2]) / f->spacing);
+        for (k = k0 < 0 ? 0 : k0; k <= k1 && k < f->n[2]; k++) for (j = j0 < 0 ? 0 : j0; j <= j1 && j < f->n[1]; j++) {
+            double y = f->low[1] + j * f->spacing, z = f->low[2] + k * f->spacing, area, w1, w2, x;
+            int side = gs4i_edge_side(s, v[0], v[1], y, z), from;
+            if (side != gs4i_edge_side(s, v[1], v[2], y, z) || side != gs4i_edge_side(s, v[2], v[0], y, z)) continue;
+            area = (q[1][1] - q[0][1]) * (q[2][2] - q[0][2]) - (q[2][1] - q[0][1]) * (q[1][2] - q[0][2]);
+            if (area == 0) continue;
+            w1 = ((y - q[0][1]) * (q[2][2] - q[0][2]) - (q[2][1] - q[0][1]) * (z - q[0][2])) / area;
+            w2 = ((q[1][1] - q[0][1]) * (z - q[0][2]) - (y - q[0][1]) * (q[1][2] - q[0][2])) / area;
+            x = q[0][0] + w1 * (q[1][0] - q[0][0]) + w2 * (q[2][0] - q[0][0]);
+            from = (int)ceil((x - f->low[0]) / f->spacing);
+            for (i = from < 0 ? 0 : from; i < f->n[0]; i++) {
+                gs4_real *d = f->distance + ((size_t)k * (size_t)f->n[1] + (size_t)j) * (size_t)f->n[0] + (size_t)i;
+                *d = -*d;
+            }
+        }
+    }
+}
+
+/* Sample the mesh `s` every `spacing` (coarser where that would be more than 512 along an axis). */
+static int gs4i_field_create(gs4i_memory *m, gs4i_field *f, const gs4_shape *s, double spacing)
+{
+    gs4_vec3 low, high;
+    double lo[3], hi[3], extent = 0;
+    int a;
+    gs4i_shape_bounds(s, &low, &high);
+    gs4i_to_double(low, lo); gs4i_to_double(high, hi);
+    for (a = 0; a < 3; a++) if (hi[a] - lo[a] > extent) extent = hi[a] - lo[a];
+    if (spacing < extent / 512) spacing = extent / 512;
+    f->spacing = spacing; f->band = 6 * spacing; f->count = 1;
+    for (a = 0; a < 3; a++) {
+        f->low[a] = lo[a] - 6.49 * spacing;
+        f->n[a] = (int)ceil((hi[a] - lo[a]) / spacing) + 14;
+        f->count *= (size_t)f->n[a];
+    }
+    f->distance = (gs4_real *)gs4i_alloc(m, f->count, sizeof *f->distance);
+    if (!f->distance) return GS4_ERROR_MEMORY;
+    gs4i_field_sample(f, s);
+    return GS4_OK;
+}
+
+static void gs4i_field_free(gs4i_memory *m, gs4i_field *f)
+{
+    gs4i_free(m, f->distance, f->count, sizeof *f->distance);
+    f->distance = NULL;
+}
+
+/* --- images of the walls --------------------------------------------------------------------------- */
+
+/* Mirror of node `at` (which is outside 0 .. n-1) at its wall. */
+GS4I_INLINE int gs4i_mirror(gs4_wall wall, int at, int n)
+{
+    if (wall == GS4_WALL_PERIODIC) return at < 0 ? at + n : at - n;
+    return at < 0 ? -1 - at : 2 * n - 1 - at;
+}
+
+/* List the pairs of every wall; called when the blocks have changed. */
+static int gs4i_list_images(gs4i_memory *m, gs4i_boundary *b, const gs4i_grid *g)
+{
+    int wall, s, pass, i;
+    for (wall = 0; wall < 6; wall++) {
+        int axis = wall / 2, n = g->cells[axis], count = 0;
+        if (b->walls[wall] == GS4_WALL_OPEN) continue;
+        for (pass = 0; pass < 2; pass++) {                  /* count, then fill */
+            if (pass && count > b->image_capacity[wall]) {
+                int wanted = count + count / 4;
+                gs4i_image *list = (gs4i_image *)gs4i_alloc(m, (size_t)wanted, sizeof *list);
+                if (!list) return GS4_ERROR_MEMORY;
+                gs4i_free(m, b->images[wall], (size_t)b->image_capacity[wall], sizeof *list);
+                b->images[wall] = list; b->image_capacity[wall] = wanted;
+            }
+            count = 0;
+            for (s = 0; s < g->active; s++) {
+                int at[3], first;
+                gs4i_block_coordinates(g, g->block[s], at);
+                first = 4 * (at[axis] - 1);
+                if (wall & 1 ? first + 3 < n : first >= 0) continue;
+                for (i = 0; i < GS4I_BLOCK_NODES; i++) {
+                    int x[3], mirror;
+                    ptrdiff_t to;
+                    x[0] = 4 * (at[0] - 1) + (i & 3); x[1] = 4 * (at[1] - 1) + (i >> 2 & 3); x[2] = 4 * (at[2] - 1) + (i >> 4);
+                    if (wall & 1 ? x[axis] < n || x[axis] > n + 1 : x[axis] > -1 || x[axis] < -2) continue;
+                    mirror = gs4i_mirror(b->walls[wall], x[axis], n);
+                    x[axis] = mirror;
+                    to = gs4i_node_at(g, x[0], x[1], x[2]);
+                    if (to < 0) continue;
+                    if (pass) { gs4i_image *p = &b->images[wall][count]; p->image = (uint32_t)(64 * s + i); p->mirror = (uint32_t)(to / 4); }
+                    count++;
+                }
+            }
+        }
+        b->image_count[wall] = count;
+    }
+    return GS4_OK;
+}
+
+/* Give a place for jumps to the blocks that touch a wall or a body. */
+static int gs4i_place_jumps(gs4i_memory *m, const gs4i_boundary *b, gs4i_grid *g)
+{
+    int wall, i, s, n = 0;
+    gs4_real reach = GS4I_C(2.7) * g->h;                    /* half the diagonal of a block's nodes */
+    memset(g->jump_of, 0, (size_t)g->active * sizeof *g->jump_of);
+    for (wall = 0; wall < 6; wall++)
+        for (i = 0; i < b->image_count[wall] && b->walls[wall] < GS4_WALL_OPEN; i++) {
+            g->jump_of[b->images[wall][i].image / 64] = 1;
+            g->jump_of[b->images[wall][i].mirror / 64] = 1;
+        }
+    for (i = 0; i < b->body_count; i++)
+        for (s = 0; s < g->active; s++) {
+            int at[3];
+            gs4_vec3 centre;
+            if (g->jump_of[s]) continue;
+            gs4i_block_coordinates(g, g->block[s], at);
+            centre = gs4i_add(g->origin, gs4i_scale(gs4i_vec3(GS4I_C(4 * at[0] - 2), GS4I_C(4 * at[1] - 2), GS4I_C(4 * at[2] - 2)), g->h));
+            g->jump_of[s] = gs4i_body_distance(&b->bodies[i], centre) < reach;
+        }
+    for (s = 0; s < g->active; s++) if (g->jump_of[s]) g->jump_of[s] = ++n;
+    g->jump_count = n;
+    if (n > g->jump_capacity) {
+        int wanted = n + n / 4;
+        gs4_real *jump = (gs4_real *)gs4i_alloc(m, (size_t)wanted, GS4I_NODE_REALS * sizeof *jump);
+        if (!jump) return GS4_ERROR_MEMORY;
+        gs4i_free(m, g->jump, (size_t)g->jump_capacity, GS4I_NODE_REALS * sizeof *jump);
+        g->jump = jump; g->jump_capacity = wanted;
+    }
+    return GS4_OK;
+}
+
+GS4I_INLINE gs4_real *gs4i_jump_at(const gs4i_grid *g, uint32_t node)
+{
+    return g->jump + GS4I_NODE_REALS * (size_t)(g->jump_of[node / 64] - 1) + 4 * (size_t)(node % 64);
+}
+
+#define GS4I_PRESSED GS4I_C(8)          /* in the fourth number of a jump: material pressed on the wall there */
+
+GS4I_INLINE void gs4i_reflection(gs4_wall wall, int axis, gs4_real sign[3])
+{
+    int a;
+    for (a = 0; a < 3; a++) sign[a] = GS4I_C(wall == GS4_WALL_PERIODIC || (wall != GS4_WALL_STICK && a != axis) ? 1 : -1);
+}
+
+/* Is this image of a separating wall in contact? While material moves into the wall, or pressed on it in the last step. */
+static int gs4i_wall_touches(const gs4i_grid *g, const gs4i_image *pair, int wall)
+{
+    int axis = wall / 2;
+    gs4_real outward = wall & 1 ? GS4I_C(1) : GS4I_C(-1);
+    gs4_real into = (g->momentum[4 * (size_t)pair->image + (size_t)axis] + g->momentum[4 * (size_t)pair->mirror + (size_t)axis]) * outward;
+    return into > 0 || (g->memory && g->memory[4 * (size_t)pair->image + 3] >= 2);
+}
+
+/* Fold mass and momentum back from images; which axes did so is kept in the fourth number of the jump, bit by bit. */
+static void gs4i_fold_momentum(const gs4i_boundary *b, const gs4i_grid *g)
+{
+    int wall, i, a;
+    for (wall = 0; wall < 6; wall++) {
+        gs4_real sign[3];
+        gs4i_reflection(b->walls[wall], wall / 2, sign);
+        for (i = 0; i < b->image_count[wall]; i++) {
+            const gs4i_image *pair = &b->images[wall][i];
+            const gs4_real *from = g->momentum + 4 * (size_t)pair->image;
+            gs4_real *to = g->momentum + 4 * (size_t)pair->mirror;
+            if (b->walls[wall] == GS4_WALL_SEPARATE && !gs4i_wall_touches(g, pair, wall)) continue;
+            if (b->walls[wall] != GS4_WALL_PERIODIC) gs4i_jump_at(g, pair->image)[3] += GS4I_C(1 << wall / 2);
+            for (a = 0; a < 3; a++) to[a] += sign[a] * from[a];
+            to[3] += from[3];
+        }
+    }
+}
+
+GS4I_INLINE int gs4i_is_folded(const gs4i_boundary *b, const gs4i_grid *g, const gs4i_image *pair, int wall)
+{
+    return b->walls[wall] == GS4_WALL_PERIODIC || ((int)gs4i_jump_at(g, pair->image)[3] >> (wall / 2) & 1);
+}
+
+static void gs4i_fold_force(const gs4i_boundary *b, const gs4i_grid *g)
+{
+    int wall, i, a;
+    for (wall = 0; wall < 6; wall++) {
+        gs4_real sign[3], outward = wall & 1 ? GS4I_C(1) : GS4I_C(-1);
+        gs4i_reflection(b->walls[wall], wall / 2, sign);
+        for (i = 0; i < b->image_count[wall]; i++) {
+            const gs4i_image *pair = &b->images[wall][i];
+            const gs4_real *from = g->force + 4 * (size_t)pair->image;
+            gs4_real *to = g->force + 4 * (size_t)pair->mirror;
+            int folded = gs4i_is_folded(b, g, pair, wall);
+            if (b->walls[wall] == GS4_WALL_SEPARATE && from[wall / 2] * outward > 0) gs4i_jump_at(g, pair->image)[3] += GS4I_PRESSED;
+            if (folded) for (a = 0; a < 3; a++) to[a] += sign[a] * from[a];
+        }
+    }
+}
+
+/* Images take S times the field of their mirror nodes; axes in the reverse order of folding. */
+static void gs4i_fill_images(const gs4i_boundary *b, const gs4i_grid *g, gs4_real *field)
+{
+    int wall, i, a;
+    for (wall = 5; wall >= 0; wall--) {
+        gs4_real sign[3];
+        gs4i_reflection(b->walls[wall], wall / 2, sign);
+        for (i = 0; i < b->image_count[wall]; i++) {
+            const gs4i_image *pair = &b->images[wall][i];
+            if (!gs4i_is_folded(b, g, pair, wall)) continue;
+            for (a = 0; a < 3; a++) field[4 * (size_t)pair->image + (size_t)a] = sign[a] * field[4 * (size_t)pair->mirror + (size_t)a];
+        }
+    }
+}
+
+/* What body `b` does to a node at p that would go with velocity v and acceleration acc over the time dt: both become
+ * those of the body in the components that contact holds. Returns whether it holds any. */
+static int gs4i_body_hold(const gs4i_body *b, gs4_vec3 p, gs4_real h, gs4_real dt, gs4_real v[3], gs4_real acc[3])
+{
+    gs4_vec3 own, n, rel, side;
+    gs4_real into, push, slip, bite, a_side;
+    if (gs4i_body_distance(b, p) >= 0) return 0;
+    own = gs4i_body_velocity(b, p);
+    if (b->is.contact == GS4_WALL_STICK) {
+        v[0] = own.x; v[1] = own.y; v[2] = own.z; acc[0] = acc[1] = acc[2] = 0;
+        return 1;
+    }
+    n = gs4i_body_normal(b, p, GS4I_C(0.5) * h);
+    rel = gs4i_sub(gs4i_vec3(v[0], v[1], v[2]), own);
+    into = -gs4i_dot(rel, n);                               /* > 0: velocity into the body */
+    push = -(acc[0] * n.x + acc[1] * n.y + acc[2] * n.z);   /* > 0: acceleration into it */
+    if (into + dt * push <= 0) return 0;
+    side = gs4i_add(rel, gs4i_scale(n, into));              /* tangential velocity */
+    slip = gs4i_length(side);
+    if (b->is.contact == GS4_WALL_SEPARATE && b->is.friction > 0) {
+        gs4_vec3 ta = gs4i_add(gs4i_vec3(acc[0], acc[1], acc[2]), gs4i_scale(n, push));
+        gs4_vec3 along = slip > 0 ? gs4i_scale(side, 1 / slip) : gs4i_vec3(0, 0, 0);
+        bite = gs4i_min(b->is.friction * gs4i_max(into, 0), slip);          /* Coulomb, on the impact */
+        side = gs4i_sub(side, gs4i_scale(along, bite));
+        if (slip - bite <= 0) { a_side = gs4i_length(ta); along = a_side > 0 ? gs4i_scale(ta, 1 / a_side) : along; }
+        else a_side = GS4I_HUGE;
+        bite = gs4i_min(b->is.friction * gs4i_max(push, 0), a_side);        /* and on the steady load */
+        acc[0] -= along.x * bite; acc[1] -= along.y * bite; acc[2] -= along.z * bite;
+    }
+    v[0] = own.x + side.x; v[1] = own.y + side.y; v[2] = own.z + side.z;
+    acc[0] += n.x * push; acc[1] += n.y * push; acc[2] += n.z * push;
+    return 1;
+}
+
+/* Put a particle that ended inside a body, or behind a closed wall, back on its surface; the part of its velocity
+ * that leads further in is lost. */
+static void gs4i_put_back(const gs4i_boundary *b, const gs4i_grid *g, gs4_real x[3], gs4_real v[3])
+{
+    int i, a, pass;
+    for (pass = 0; pass < 2; pass++)                        /* two bodies may meet */
+        for (i = 0; i < b->body_count; i++) {
+            const gs4i_body *body = &b->bodies[i];
+            gs4_vec3 p = gs4i_vec3(x[0], x[1], x[2]), n, rel;
+            gs4_real d = gs4i_body_distance(body, p), into;
+            if (!(d < 0) || body->is_mouth) continue;
+            n = gs4i_body_normal(body, p, GS4I_C(0.1) * g->h);
+            rel = gs4i_sub(gs4i_vec3(v[0], v[1], v[2]), gs4i_body_velocity(body, p));
+            into = gs4i_min(gs4i_dot(rel, n), 0);
+            x[0] -= d * n.x; x[1] -= d * n.y; x[2] -= d * n.z;
+            v[0] -= into * n.x; v[1] -= into * n.y; v[2] -= into * n.z;
+        }
+    for (a = 0; a < 3; a++) {
+        gs4_real low = a == 0 ? g->origin.x : a == 1 ? g->origin.y : g->origin.z, size = GS4I_C(g->cells[a]) * g->h;
+        gs4_real high = low + size - 4 * GS4I_EPSILON * (gs4i_abs(low) + size);
+        if (b->walls[2 * a] == GS4_WALL_PERIODIC) {
+            if (x[a] < low) x[a] += size;
+            if (x[a] >= low + size) x[a] -= size;
+            if (x[a] < low || x[a] > high) x[a] = x[a] < low ? low : high;      /* rounding of the shift */
+            continue;
+        }
+        if (x[a] < low && b->walls[2 * a] != GS4_WALL_OPEN) { x[a] = low; if (v[a] < 0) v[a] = 0; }
+        if (x[a] > high && b->walls[2 * a + 1] != GS4_WALL_OPEN) { x[a] = high; if (v[a] > 0) v[a] = 0; }
+    }
+}
+
+/* In the mouth of an emitter a particle goes with the flow: at its velocity, uncompressed, without rates. */
+static void gs4i_hold_in_mouth(const gs4i_boundary *b, const gs4_real x[3], gs4_real v[4], gs4_real rate[4], gs4_real C[9], gs4_real lag[3])
+{
+    int i;
+    for (i = 0; i < b->body_count; i++) {
+        const gs4i_body *body = &b->bodies[i];
+        if (!body->is_mouth || body->asleep || gs4i_body_distance(body, gs4i_vec3(x[0], x[1], x[2])) >= 0) continue;
+        v[0] = body->flow.x; v[1] = body->flow.y; v[2] = body->flow.z; v[3] = 1;
+        memset(rate, 0, 4 * sizeof *rate);
+        memset(C, 0, 9 * sizeof *C);
+        memset(lag, 0, 3 * sizeof *lag);
+    }
+}
+
+/* ==== [[state]] what a simulation is =============================================================== */
+
+/* Rule 1 of the manual for one step of size dt. */
+typedef struct gs4i_rule {
+    gs4_real dt, alpha_m, alpha_f, gamma;
+    gs4_real reach;                     /* alpha_f dt: from t_n to the stage */
+    gs4_real s;                         /* alpha_f gamma dt / alpha_m: weight of the new rate at the stage */
+    gs4_real decay;                     /* 1 / flip_decay_time, 1/s */
+    int afresh;                         /* no rates yet: first step, or after an edit */
+} gs4i_rule;
+
+/* What a block of particles reports of a pass; extremes only, so that the order of blocks cannot matter. */
+typedef struct gs4i_report {
+    gs4_real max_speed, max_gradient, min_J, max_J, max_viscosity /* kinematic */, max_sound;
+    int strayed;                        /* particles outside of the tile: sort and try again */
+    int left;                           /* particles that went out through an open wall */
+    int bad; uint32_t bad_id;           /* a particle that cannot be trusted, 1 + reason */
+} gs4i_report;
+
+typedef struct gs4i_emitter {
+    gs4_emitter is;
+    int body;                           /* its mouth among the bodies */
+    double drift[3], looked[3];         /* how far the lattice has moved through the mouth; and when last looked at */
+    int begun;
+} gs4i_emitter;
+
+typedef enum gs4i_clock { GS4I_CLOCK_TRANSFER, GS4I_CLOCK_SORT, GS4I_CLOCK_TOTAL, GS4I_CLOCKS } gs4i_clock;
+
+struct gs4_sim {
+    gs4_sim_desc desc;
+    gs4i_memory memory;
+    gs4i_tasks tasks;
+    gs4i_grid grid;
+    gs4i_particles particles;
+    gs4i_boundary boundary;
+    gs4i_law *laws; int material_count, material_capacity;
+    gs4i_emitter *emitters; int emitter_count, emitter_capacity;
+    gs4i_report *reports; int report_capacity;      /* per occupied block */
+    struct gs4i_node_report *node_reports; int node_report_capacity;   /* per group of blocks with nodes */
+    gs4i_report worst;                  /* extremes of the present state, as far as steps have seen them */
+    gs4i_rule rule;
+    double time, last_dt, seconds[GS4I_CLOCKS];
+    uint64_t steps;
+    uint32_t next_id;
+    gs4_real min_mass;                  /* of any particle so far */
+    gs4_real fastest;                   /* any speed that was ever set: chooses a sound speed where none is given */
+    int afresh, unsorted, unseen;       /* start rates anew; sort before the next step; `worst` is out of date */
+    int edited;                         /* by hand, not checked yet */
+    char error[320];
+};
+
+static double gs4i_now(const gs4_sim *sim) { return sim->desc.now ? sim->desc.now(sim->desc.now_user) : 0; }
+
+static void gs4i_report_clear(gs4i_report *r)
+{
+    memset(r, 0, sizeof *r);
+    r->min_J = GS4I_HUGE;
+}
+
+static void gs4i_report_merge(gs4i_report *into, const gs4i_report *r)
+{
+    into->max_speed = gs4i_max(into->max_speed, r->max_speed);
+    into->max_gradient = gs4i_max(into->max_gradient, r->max_gradient);
+    into->min_J = gs4i_min(into->min_J, r->min_J);
+    into->max_J = gs4i_max(into->max_J, r->max_J);
+    into->max_viscosity = gs4i_max(into->max_viscosity, r->max_viscosity);
+    into->max_sound = gs4i_max(into->max_sound, r->max_sound);
+    into->strayed += r->strayed; into->left += r->left;
+    if (r->bad && !into->bad) { into->bad = r->bad; into->bad_id = r->bad_id; }
+}
+
+/* ==== [[transfer]] particles to nodes and back ===================================================== *
+ *
+ * Each kernel does one occupied block: predicted positions, weights, 27 nodes a particle. Kernels that scatter run
+ * colour by colour, so that no two tiles in work share a node; sums within a block run in the order of its particles.
+ * They are long because everything that one particle needs happens while its weights are in registers. */
+
+#define GS4I_J_LOW GS4I_C(0.0625)       /* a volume ratio outside of this range is refused */
+#define GS4I_J_HIGH GS4I_C(16)
+enum { GS4I_BAD_VOLUME = 1, GS4I_BAD_MOTION, GS4I_BAD_VISCOSITY };
+
+typedef struct gs4i_pass { gs4_sim *sim; const int32_t *blocks; } gs4i_pass;
+
+/* Where tile coordinates begin: (x - origin) / h - first. */
+GS4I_INLINE void gs4i_tile_first(const gs4i_grid *g, int o, gs4_real first[3])
+{
+    int at[3], a;
+    gs4i_block_coordinates(g, g->occupied_block[o], at);
+    for (a = 0; a < 3; a++) first[a] = GS4I_C(4 * (at[a] - 1) - 2);
+}
+
+/* S2: weights at the predicted position x~ = x + alpha_f dt (v - lag). */
+GS4I_INLINE void gs4i_predicted_stencil(const gs4_sim *sim, size_t i, gs4_real reach, const gs4_real first[3], gs4i_stencil *s)
+{
+    const gs4i_grid *g = &sim->grid;
+    gs4_real x[3];
+    gs4i_predicted_position(&sim->particles, i, reach, x);
+    x[0] = (x[0] - g->origin.x) * g->inv_h - first[0];
+    x[1] = (x[1] - g->origin.y) * g->inv_h - first[1];
+    x[2] = (x[2] - g->origin.z) * g->inv_h - first[2];
+    gs4i_stencil_at(s, x, g->inv_h);
+}
+
+/* |C| dt is bounded by 1/4: the factor that makes it so. */
+GS4I_INLINE gs4_real gs4i_affine_bound(const gs4_real *C, gs4_real dt)
+{
+    gs4_real n = 0;
+    int i;
+    for (i = 0; i < 9; i++) n += C[i] * C[i];
+    n *= dt * dt;
+    return n > GS4I_C(0.0625) ? GS4I_C(0.25) / GS4I_SQRT(n) : GS4I_C(1);
+}
+
+/* tile += w_ip (m v + Q (x_i - x), m), Q_ij = Q[3 j + i] in kg/s: a velocity field that is affine around the particle */
+GS4I_INLINE void gs4i_scatter_affine(gs4_real *tile, const gs4i_stencil *s, gs4_real h, const gs4_real mv[3], gs4_real m, const gs4_real Q[9])
+{
+    gs4i_row w, wx, v, q, p0, p1, p2;
+    gs4_real ey[3], ez[3];
+    int i;
+    for (i = 0; i < 3; i++) {
+        ey[i] = s->w[1][i] * ((GS4I_C(i - 1) - s->xi[1]) * h);
+        ez[i] = s->w[2][i] * ((GS4I_C(i - 1) - s->xi[2]) * h);
+    }
+    gs4i_row_of_nodes(&w, s->w[0][0], s->w[0][1], s->w[0][2]);
+    gs4i_row_of_nodes(&wx, s->w[0][0] * ((GS4I_C(-1) - s->xi[0]) * h), s->w[0][1] * (-s->xi[0] * h),
+                      s->w[0][2] * ((GS4I_C(1) - s->xi[0]) * h));
+    gs4i_row_of_quad(&v, mv[0], mv[1], mv[2], m);
+    gs4i_row_of_quad(&q, Q[0], Q[1], Q[2], 0);
+    GS4I_MUL(p0, w, v); GS4I_MAD(p0, wx, q);
+    gs4i_row_of_quad(&q, Q[3], Q[4], Q[5], 0);
+    GS4I_MUL(p1, w, q);
+    gs4i_row_of_quad(&q, Q[6], Q[7], Q[8], 0);
+    GS4I_MUL(p2, w, q);
+    gs4i_scatter_rows(tile + 4 * s->base, &p0, &p1, &p2, s->w[1], ey, s->w[2], ez);
+}
+
+/* S3: m_i = sum w m, m_i v_i = sum w m (v~ + C (x_i - x~)) with v~ = v + alpha_f dt a. */
+static void gs4i_scatter_momentum(int index, void *context)
+{
+    const gs4i_pass *pass = (const gs4i_pass *)context;
+    gs4_sim *sim = pass->sim;
+    const gs4i_rule *rule = &sim->rule;
+    const gs4i_particles *p = &sim->particles;
+    const int o = pass->blocks[index];
+    gs4_real tile[GS4I_TILE_REALS], first[3];
+    size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
+    gs4i_report_clear(&sim->reports[o]);
+    memset(tile, 0, sizeof tile);
+    gs4i_tile_first(&sim->grid, o, first);
+    for (; i < end; i++) {
+        const gs4_real *v = p->velocity + 4 * i, *a = p->rate + 4 * i, *C = p->affine + 9 * i, m = p->position[4 * i + 3];
+        const gs4_real bound = m * gs4i_affine_bound(C, rule->dt);
+        gs4_real mv[3], Q[9];
+        gs4i_stencil s;
+        int c;
+        gs4i_predicted_stencil(sim, i, rule->reach, first, &s);
+        if (s.base < 0) { sim->reports[o].strayed++; continue; }
+        for (c = 0; c < 3; c++) mv[c] = m * (v[c] + rule->reach * a[c]);
+        for (c = 0; c < 9; c++) Q[c] = bound * C[c];
+        gs4i_scatter_affine(tile, &s, sim->grid.h, mv, m, Q);
+    }
+    gs4i_tile_add(&sim->grid, o, tile, sim->grid.momentum);
+}
+
+/* Cauchy stress (Pa, tension positive) of a Newtonian liquid: -p I + 2 mu D. Returns the viscosity used. */
+GS4I_INLINE gs4_real gs4i_liquid_stress(const gs4i_law *law, gs4_real J, const gs4_real L[9], gs4_real sigma[6])
+{
+    const gs4_real p = gs4i_pressure(law, J);
+    gs4_real D[6], mu;
+    int c;
+    gs4i_strain_rate(L, D);
+    mu = gs4i_viscosity(law, D);
+    for (c = 0; c < 6; c++) sigma[c] = 2 * mu * D[c] - (c < 3 ? p : GS4I_C(0));
+    return mu;
+}
+
+GS4I_INLINE void gs4i_see_liquid(gs4i_report *r, const gs4i_law *law, gs4_real J, gs4_real mu)
+{
+    r->min_J = gs4i_min(r->min_J, J); r->max_J = gs4i_max(r->max_J, J);
+    r->max_viscosity = gs4i_max(r->max_viscosity, mu * law->inv_density);
+    r->max_sound = gs4i_max(r->max_sound, law->sound_speed * gs4i_stiffening(J));
+}
+
+GS4I_INLINE void gs4i_see_bad(gs4i_report *r, int reason, uint32_t id)
+{
+    if (!r->bad) { r->bad = reason; r->bad_id = id; }
+}
+
+/* S4 and S5: L~ = sum v_i (x) grad w, J~ by rule 1 and implicit in itself for known L~, stress there, and
+ * f_i = - sum V sigma grad w + sum w m g. */
+static void gs4i_scatter_forces(int index, void *context)
+{
+    const gs4i_pass *pass = (const gs4i_pass *)context;
+    gs4_sim *sim = pass->sim;
+    const gs4i_rule *rule = &sim->rule;
+    const gs4i_particles *p = &sim->particles;
+    const int o = pass->blocks[index];
+    const gs4_vec3 g = sim->desc.gravity;
+    gs4i_report report = sim->reports[o];
+    gs4_real nodes[GS4I_TILE_REALS], tile[GS4I_TILE_REALS], first[3];
+    size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
+    gs4i_tile_load(&sim->grid, o, sim->grid.momentum, nodes);
+    memset(tile, 0, sizeof tile);
+    gs4i_tile_first(&sim->grid, o, first);
+    for (; i < end; i++) {
+        const gs4i_law *law = &sim->laws[p->material[i]];
+        const gs4_real m = p->position[4 * i + 3], J = p->velocity[4 * i + 3], Jr = p->rate[4 * i + 3];
+        gs4_real L[9], sigma[6], stage_J, V, mu;
+        gs4i_row w, d, s0, s1, s2, p0, p1, p2, f;
+        gs4i_quad gx, gy, gz;
+        gs4i_stencil s;
+        int c;
+        gs4i_predicted_stencil(sim, i, rule->reach, first, &s);
+        gs4i_x_weights(&s, &w, &d);
+        gs4i_gather_rows(nodes + 4 * s.base, &s, &s0, &s1, &s2);
+        gs4i_row_dot(&gx, &d, &s0); gs4i_row_dot(&gy, &w, &s1); gs4i_row_dot(&gz, &w, &s2);
+        for (c = 0; c < 3; c++) { L[c] = GS4I_LANE(gx, c); L[3 + c] = GS4I_LANE(gy, c); L[6 + c] = GS4I_LANE(gz, c); }
+        stage_J = (J + (rule->reach - rule->s) * Jr) / (1 - rule->s * (L[0] + L[4] + L[8]));   /* (J~ - J**)/s = J~ div v */
+        if (!(stage_J > GS4I_J_LOW && stage_J < GS4I_J_HIGH)) { gs4i_see_bad(&report, GS4I_BAD_VOLUME, p->id[i]); continue; }
+        mu = gs4i_liquid_stress(law, stage_J, L, sigma);
+        if (!(mu >= 0 && mu < GS4I_HUGE)) { gs4i_see_bad(&report, GS4I_BAD_VISCOSITY, p->id[i]); continue; }
+        gs4i_see_liquid(&report, law, stage_J, mu);
+        V = -m * law->inv_density * stage_J;
+        gs4i_row_of_quad(&f, V * sigma[0], V * sigma[3], V * sigma[4], 0);
+        GS4I_MUL(p0, d, f);
+        gs4i_row_of_quad(&f, m * g.x, m * g.y, m * g.z, 0);
+        GS4I_MAD(p0, w, f);
+        gs4i_row_of_quad(&f, V * sigma[3], V * sigma[1], V * sigma[5], 0);
+        GS4I_MUL(p1, w, f);
+        gs4i_row_of_quad(&f, V * sigma[4], V * sigma[5], V * sigma[2], 0);
+        GS4I_MUL(p2, w, f);
+        gs4i_scatter_rows(tile + 4 * s.base, &p0, &p1, &p2, s.w[1], s.d[1], s.w[2], s.d[2]);
+    }
+    sim->reports[o] = report;
+    gs4i_tile_add(&sim->grid, o, tile, sim->grid.force);
+}
+
+/* Whether any block around occupied block o has jumps; then their tile. */
+static int gs4i_load_jumps(const gs4i_grid *g, int o, gs4_real *tile)
+{
+    int any = 0, i, x, y, z;
+    const int32_t *nb = g->neighbour + 27 * (size_t)o;
+    for (i = 0; i < 27; i++) any |= g->jump_of[nb[i]];
+    if (!any) return 0;
+    memset(tile, 0, GS4I_TILE_REALS * sizeof *tile);
+    for (z = 0; z < GS4I_TILE; z++) for (y = 0; y < GS4I_TILE; y++) for (x = 0; x < GS4I_TILE; x++) {
+        int32_t slot = nb[((z + 2) / 4 * 3 + (y + 2) / 4) * 3 + (x + 2) / 4];
+        if (!g->jump_of[slot]) continue;
+        memcpy(tile + 4 * ((z * GS4I_TILE + y) * GS4I_TILE + x),
+               gs4i_jump_at(g, (uint32_t)slot * 64 + (uint32_t)((((z + 2) & 3) << 4) | (((y + 2) & 3) << 2) | ((x + 2) & 3))), 4 * sizeof *tile);
+    }
+    return 1;
+}
+
+/* Does the tile of occupied block o reach over the edge of the domain? */
+static int gs4i_at_edge(const gs4i_grid *g, int o)
+{
+    int at[3], a, edge = 0;
+    gs4i_block_coordinates(g, g->occupied_block[o], at);
+    for (a = 0; a < 3; a++) edge |= at[a] == 1 || 4 * at[a] + 2 > g->cells[a];
+    return edge;
+}
+
+GS4I_INLINE int gs4i_has_left(const gs4i_grid *g, const gs4_real x[3])
+{
+    return !(x[0] >= g->origin.x && x[0] < g->origin.x + GS4I_C(g->cells[0]) * g->h
+          && x[1] >= g->origin.y && x[1] < g->origin.y + GS4I_C(g->cells[1]) * g->h
+          && x[2] >= g->origin.z && x[2] < g->origin.z + GS4I_C(g->cells[2]) * g->h);
+}
+
+/* What the nodes tell a particle at S7. */
+typedef struct gs4i_gathered { gs4_real U[3], A[3], jump[3], L[9], slope[9]; } gs4i_gathered;
+
+/* S7, motion: v by rule 1 with the FLIP motion decaying at its rate, implicit in itself; x with the grid's velocity,
+ * brought from the stage to the middle of the step; the gradient carried to the next stage, D(grad v)/Dt = grad a - L L. */
+GS4I_INLINE void gs4i_correct_motion(const gs4i_rule *r, const gs4i_gathered *n, gs4_real x[3], gs4_real v[3], gs4_real a[3],
+                                     gs4_real C[9], gs4_real lag[3])
+{
+    int i, j;
+    for (i = 0; i < 3; i++) {
+        const gs4_real from = v[i] + (r->reach - r->s) * a[i];          /* v** */
+        const gs4_real rate = (n->A[i] - r->decay * (from - n->U[i])) / (1 + r->s * r->decay);
+        const gs4_real change = (rate - a[i]) / r->alpha_m;
+        lag[i] = (v[i] + r->reach * a[i] + n->jump[i]) - n->U[i];
+        v[i] += r->dt * a[i] + r->gamma * r->dt * change + n->jump[i];
+        a[i] += change;
+        x[i] += r->dt * (n->U[i] - (r->alpha_f - GS4I_C(0.5)) * r->dt * n->A[i]);
+        for (j = 0; j < 3; j++)
+            C[3 * j + i] = n->L[3 * j + i] + r->dt * (n->slope[3 * j + i]
+                - (n->L[i] * n->L[3 * j] + n->L[3 + i] * n->L[3 * j + 1] + n->L[6 + i] * n->L[3 * j + 2]));
+    }
+}
+
+/* S7: gather and correct. With `commit` 0 nothing is written: a rehearsal that only reports. */
+GS4I_INLINE void gs4i_correct(gs4_sim *sim, int o, int commit)
+{
+    const gs4i_rule *rule = &sim->rule;
+    gs4i_particles *p = &sim->particles;
+    gs4i_grid *grid = &sim->grid;
+    gs4i_report report = sim->reports[o];
+    gs4_real u_nodes[GS4I_TILE_REALS], a_nodes[GS4I_TILE_REALS], j_nodes[GS4I_TILE_REALS], first[3];
+    const int jumps = gs4i_load_jumps(grid, o, j_nodes), edge = jumps || gs4i_at_edge(grid, o);
+    size_t i = (size_t)grid->first[o], end = (size_t)grid->first[o + 1];
+    gs4i_tile_load(grid, o, grid->momentum, u_nodes);
+    gs4i_tile_load(grid, o, grid->force, a_nodes);
+    gs4i_tile_first(grid, o, first);
+    for (; i < end; i++) {
+        gs4_real *X = p->position + 4 * i, *V = p->velocity + 4 * i, *R = p->rate + 4 * i;
+        gs4_real x[3], v[4], a[4], C[9], lag[3], div, speed2 = 0, grad2 = 0, moved = 0;
+        gs4i_row w, d, s0, s1, s2;
+        gs4i_quad q0, q1, q2, q3;
+        gs4i_stencil s;
+        gs4i_gathered n;
+        int c;
+        gs4i_predicted_stencil(sim, i, rule->reach, first, &s);
+        gs4i_x_weights(&s, &w, &d);
+        gs4i_gather_rows(u_nodes + 4 * s.base, &s, &s0, &s1, &s2);
+        gs4i_row_dot(&q0, &w, &s0); gs4i_row_dot(&q1, &d, &s0); gs4i_row_dot(&q2, &w, &s1); gs4i_row_dot(&q3, &w, &s2);
+        for (c = 0; c < 3; c++) { n.U[c] = GS4I_LANE(q0, c); n.L[c] = GS4I_LANE(q1, c); n.L[3 + c] = GS4I_LANE(q2, c); n.L[6 + c] = GS4I_LANE(q3, c); }
+        gs4i_gather_rows(a_nodes + 4 * s.base, &s, &s0, &s1, &s2);
+        gs4i_row_dot(&q0, &w, &s0); gs4i_row_dot(&q1, &d, &s0); gs4i_row_dot(&q2, &w, &s1); gs4i_row_dot(&q3, &w, &s2);
+        for (c = 0; c < 3; c++) { n.A[c] = GS4I_LANE(q0, c); n.slope[c] = GS4I_LANE(q1, c); n.slope[3 + c] = GS4I_LANE(q2, c); n.slope[6 + c] = GS4I_LANE(q3, c); }
+        n.jump[0] = n.jump[1] = n.jump[2] = 0;
+        if (jumps) {
+            gs4i_gather_rows(j_nodes + 4 * s.base, &s, &s0, &s1, &s2);
+            gs4i_row_dot(&q0, &w, &s0);
+            for (c = 0; c < 3; c++) n.jump[c] = GS4I_LANE(q0, c);
+        }
+        for (c = 0; c < 3; c++) x[c] = X[c];
+        for (c = 0; c < 4; c++) { v[c] = V[c]; a[c] = R[c]; }
+        gs4i_correct_motion(rule, &n, x, v, a, C, lag);
+        div = n.L[0] + n.L[4] + n.L[8];
+        {                                                   /* J: 2021 (57), implicit in J for known div u */
+            const gs4_real change = ((v[3] + rule->reach * a[3]) * div - a[3]) / (rule->alpha_m - rule->alpha_f * rule->gamma * rule->dt * div);
+            v[3] += rule->dt * a[3] + rule->gamma * rule->dt * change;
+            a[3] += change;
+        }
+        for (c = 0; c < 3; c++) { speed2 += v[c] * v[c]; moved += (x[c] - X[c]) * (x[c] - X[c]); }
+        for (c = 0; c < 9; c++) grad2 += C[c] * C[c];
+        if (!commit) {
+            if (!(v[3] > GS4I_J_LOW && v[3] < GS4I_J_HIGH && gs4i_finite(a[3]))) gs4i_see_bad(&report, GS4I_BAD_VOLUME, p->id[i]);
+            if (!(gs4i_finite(speed2) && gs4i_finite(grad2) && gs4i_finite(a[0] + a[1] + a[2]) && moved <= 4 * grid->h * grid->h))
+                gs4i_see_bad(&report, GS4I_BAD_MOTION, p->id[i]);
+            continue;
+        }
+        report.max_speed = gs4i_max(report.max_speed, speed2);
+        report.max_gradient = gs4i_max(report.max_gradient, grad2);
+        if (edge) {
+            gs4i_put_back(&sim->boundary, grid, x, v);
+            gs4i_hold_in_mouth(&sim->boundary, x, v, a, C, lag);
+            report.left += gs4i_has_left(grid, x);
+        }
+        for (c = 0; c < 3; c++) { X[c] = x[c]; p->lag[3 * i + (size_t)c] = gs4i_to_half(lag[c]); }
+        for (c = 0; c < 4; c++) { V[c] = v[c]; R[c] = a[c]; }
+        for (c = 0; c < 9; c++) p->affine[9 * i + (size_t)c] = C[c];
+    }
+    sim->reports[o] = report;
+}
+
+static void gs4i_correct_task(int index, void *context)
+{
+    const gs4i_pass *pass = (const gs4i_pass *)context;
+    gs4i_correct(pass->sim, pass->blocks[index], 1);
+}
+
+static void gs4i_rehearse_task(int index, void *context)
+{
+    const gs4i_pass *pass = (const gs4i_pass *)context;
+    gs4i_correct(pass->sim, pass->blocks[index], 0);
+}
+
+/* Symplectic Euler, there: momentum with the impulse of stress and weight, as one affine field (MLS-MPM):
+ * m_i v_i = sum w [ m (v + dt g) + (m C - dt V sigma 4/h^2) (x_i - x) ]. */
+static void gs4i_scatter_euler(int index, void *context)
+{
+    const gs4i_pass *pass = (const gs4i_pass *)context;
+    gs4_sim *sim = pass->sim;
+    const gs4i_particles *p = &sim->particles;
+    const int o = pass->blocks[index];
+    const gs4_real dt = sim->rule.dt, h = sim->grid.h;
+    const gs4_vec3 g = sim->desc.gravity;
+    gs4i_report report;
+    gs4_real tile[GS4I_TILE_REALS], first[3];
+    size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
+    gs4i_report_clear(&report);
+    memset(tile, 0, sizeof tile);
+    gs4i_tile_first(&sim->grid, o, first);
+    for (; i < end; i++) {
+        const gs4i_law *law = &sim->laws[p->material[i]];
+        const gs4_real *v = p->velocity + 4 * i, *C = p->affine + 9 * i, m = p->position[4 * i + 3], J = v[3];
+        const gs4_real bound = m * gs4i_affine_bound(C, dt), k = -dt * m * law->inv_density * J * (4 / (h * h));
+        gs4_real mv[3], Q[9], sigma[6], mu;
+        gs4i_stencil s;
+        gs4i_predicted_stencil(sim, i, 0, first, &s);
+        if (s.base < 0) { report.strayed++; continue; }
+        mu = gs4i_liquid_stress(law, J, C, sigma);
+        if (!(mu >= 0 && mu < GS4I_HUGE)) { gs4i_see_bad(&report, GS4I_BAD_VISCOSITY, p->id[i]); continue; }
+        gs4i_see_liquid(&report, law, J, mu);
+        mv[0] = m * (v[0] + dt * g.x); mv[1] = m * (v[1] + dt * g.y); mv[2] = m * (v[2] + dt * g.z);
+        Q[0] = bound * C[0] + k * sigma[0]; Q[1] = bound * C[1] + k * sigma[3]; Q[2] = bound * C[2] + k * sigma[4];
+        Q[3] = bound * C[3] + k * sigma[3]; Q[4] = bound * C[4] + k * sigma[1]; Q[5] = bound * C[5] + k * sigma[5];
+        Q[6] = bound * C[6] + k * sigma[4]; Q[7] = bound * C[7] + k * sigma[5]; Q[8] = bound * C[8] + k * sigma[2];
+        gs4i_scatter_affine(tile, &s, h, mv, m, Q);
+    }
+    sim->reports[o] = report;
+    gs4i_tile_add(&sim->grid, o, tile, sim->grid.momentum);
+}
+
+/* Symplectic Euler, and back: v = sum w v_i, C = sum v_i (x) grad w, J += dt J tr C, x += dt v. */
+GS4I_INLINE void gs4i_gather_euler(gs4_sim *sim, int o, int commit)
+{
+    const gs4_real dt = sim->rule.dt;
+    gs4i_particles *p = &sim->particles;
+    gs4i_grid *grid = &sim->grid;
+    gs4i_report report = sim->reports[o];
+    gs4_real nodes[GS4I_TILE_REALS], first[3];
+    int edge = gs4i_at_edge(grid, o), c;
+    size_t i = (size_t)grid->first[o], end = (size_t)grid->first[o + 1];
+    for (c = 0; c < 27; c++) edge |= grid->jump_of[grid->neighbour[27 * (size_t)o + (size_t)c]];
+    gs4i_tile_load(grid, o, grid->momentum, nodes);
+    gs4i_tile_first(grid, o, first);
+    for (; i < end; i++) {
+        gs4_real *X = p->position + 4 * i, *V = p->velocity + 4 * i, *C = p->affine + 9 * i;
+        gs4_real x[3], v[4], none[4], L[9], J, speed2 = 0, grad2 = 0;
+        gs4i_row w, d, s0, s1, s2;
+        gs4i_quad q0, q1, q2, q3;
+        gs4i_stencil s;
+        gs4i_predicted_stencil(sim, i, 0, first, &s);
+        gs4i_x_weights(&s, &w, &d);
+        gs4i_gather_rows(nodes + 4 * s.base, &s, &s0, &s1, &s2);
+        gs4i_row_dot(&q0, &w, &s0); gs4i_row_dot(&q1, &d, &s0); gs4i_row_dot(&q2, &w, &s1); gs4i_row_dot(&q3, &w, &s2);
+        for (c = 0; c < 3; c++) {
+            v[c] = GS4I_LANE(q0, c); L[c] = GS4I_LANE(q1, c); L[3 + c] = GS4I_LANE(q2, c); L[6 + c] = GS4I_LANE(q3, c);
+            x[c] = X[c] + dt * v[c];
+            speed2 += v[c] * v[c];
+        }
+        for (c = 0; c < 9; c++) grad2 += L[c] * L[c];
+        J = V[3] + dt * V[3] * (L[0] + L[4] + L[8]);
+        if (!commit) {
+            if (!(J > GS4I_J_LOW && J < GS4I_J_HIGH)) gs4i_see_bad(&report, GS4I_BAD_VOLUME, p->id[i]);
+            if (!(gs4i_finite(grad2) && speed2 * dt * dt <= 4 * grid->h * grid->h)) gs4i_see_bad(&report, GS4I_BAD_MOTION, p->id[i]);
+            continue;
+        }
+        report.max_speed = gs4i_max(report.max_speed, speed2);
+        report.max_gradient = gs4i_max(report.max_gradient, grad2);
+        v[3] = J;
+        if (edge) {
+            gs4i_put_back(&sim->boundary, grid, x, v);
+            gs4i_hold_in_mouth(&sim->boundary, x, v, none, L, none);
+            report.left += gs4i_has_left(grid, x);
+        }
+        for (c = 0; c < 3; c++) X[c] = x[c];
+        for (c = 0; c < 4; c++) V[c] = v[c];
+        for (c = 0; c < 9; c++) C[c] = L[c];
+    }
+    sim->reports[o] = report;
+}
+
+static void gs4i_gather_euler_task(int index, void *context)
+{
+    const gs4i_pass *pass = (const gs4i_pass *)context;
+    gs4i_gather_euler(pass->sim, pass->blocks[index], 1);
+}
+
+static void gs4i_rehearse_euler_task(int index, void *context)
+{
+    const gs4i_pass *pass = (const gs4i_pass *)context;
+    gs4i_gather_euler(pass->sim, pass->blocks[index], 0);
+}
+
+/* Run a scattering kernel over all occupied blocks, colour after colour. */
+static void gs4i_scatter(gs4_sim *sim, gs4_task_fn kernel)
+{
+    gs4i_pass pass;
+    int colour;
+    pass.sim = sim;
+    for (colour = 0; colour < 8; colour++) {
+        pass.blocks = sim->grid.by_colour + sim->grid.colour_first[colour];
+        gs4i_parallel_for(&sim->tasks, sim->grid.colour_first[colour + 1] - sim->grid.colour_first[colour], kernel, &pass);
+    }
+}
+
+static void gs4i_gather(gs4_sim *sim, gs4_task_fn kernel)
+{
+    gs4i_pass pass;
+    pass.sim = sim;
+    pass.blocks = sim->grid.by_colour;
+    gs4i_parallel_for(&sim->tasks, sim->grid.occupied, kernel, &pass);
+}
+
+/* Extremes over all blocks of the last pass. */
+static gs4i_report gs4i_all_reports(const gs4_sim *sim)
+{
+    gs4i_report all;
+    int o;
+    gs4i_report_clear(&all);
+    for (o = 0; o < sim->grid.occupied; o++) gs4i_report_merge(&all, &sim->reports[o]);
+    return all;
+}
+
+/* ==== [[step]] one step; the function to read first is gs4i_step, at the end of this section ======= */
+
+/* --- what can go wrong, in words -------------------------------------------------------------------- */
+
+static int gs4i_fail(gs4_sim *sim, int code, const char *what)
+{
+    gs4i_text t;
+    t.at = sim->error; t.left = sizeof sim->error;
+    gs4i_put(&t, what);
+    if (sim->desc.log) sim->desc.log(2, sim->error, sim->desc.log_user);
+    return code;
+}
+
+/* "<before><value><after>" */
+static int gs4i_fail_value(gs4_sim *sim, int code, const char *before, double value, const char *after)
+{
+    char line[320];
+    gs4i_text t;
+    t.at = line; t.left = sizeof line;
+    gs4i_put(&t, before); gs4i_put_real(&t, value); gs4i_put(&t, after);
+    return gs4i_fail(sim, code, line);
+}
+
+static int gs4i_fail_memory(gs4_sim *sim) { return gs4i_fail(sim, GS4_ERROR_MEMORY, "out of memory; nothing has changed"); }
+
+static int gs4i_fail_bad(gs4_sim *sim, const gs4i_report *r)
+{
+    char line[320];
+    gs4i_text t;
+    t.at = line; t.left = sizeof line;
+    gs4i_put(&t, "particle "); gs4i_put_integer(&t, (int64_t)r->bad_id);
+    gs4i_put(&t, r->bad == GS4I_BAD_VOLUME ? " would leave the range of volume ratios 1/16 to 16"
+               : r->bad == GS4I_BAD_MOTION ? " would move more than two cells, or its state would not be finite"
+               : " has a viscosity from viscosity_fn that is negative, not finite or absurdly large");
+    gs4i_put(&t, "; the step was not taken; a smaller dt, a higher sound_speed or a slower start would do");
+    return gs4i_fail(sim, GS4_ERROR_UNSTABLE, line);
+}
+
+/* --- stability --------------------------------------------------------------------------------------- */
+
+/* Largest eigenvalues of the discrete operators on particles, times h^2: of div grad as sound meets it, and of
+ * 2 div D as viscosity does. Measured in tests/test_stability.c. */
+#define GS4I_SOUND_EIGENVALUE GS4I_C(2.6)
+#define GS4I_VISCOUS_EIGENVALUE GS4I_C(4.0)
+#define GS4I_EULER_SOUND_EIGENVALUE GS4I_C(12.0)     /* lone particles with their affine field: sum |grad w|^2 / w */
+#define GS4I_EULER_VISCOUS_EIGENVALUE GS4I_C(16.0)
+
+/* Largest stable dt: the closed form (w dt)^2 + (d dt) (3 + r + s - r s)/2 <= 2 (1 - r s) with the sound frequency w and
+ * the viscous rate d of the grid (symplectic Euler: (w dt)^2 + 2 d dt <= 4), one cell a step, and a velocity
+ * gradient that turns or stretches by less than 1 in a step. */
+static gs4_real gs4i_stable_dt(const gs4_sim *sim, const gs4i_report *r)
+{
+    const int euler = sim->desc.integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER;
+    const double rho = (double)sim->desc.rho_inf, spurious = (double)sim->desc.rho_inf_spurious, h = (double)sim->grid.h;
+    const double a = euler ? 4 : 2 * (1 - rho * spurious);
+    const double b = euler ? 2 : (3 + rho + spurious - rho * spurious) / 2;
+    const double w = sqrt((double)(euler ? GS4I_EULER_SOUND_EIGENVALUE : GS4I_SOUND_EIGENVALUE)) * (double)r->max_sound / h;
+    const double d = b * (double)(euler ? GS4I_EULER_VISCOUS_EIGENVALUE : GS4I_VISCOUS_EIGENVALUE) * (double)r->max_viscosity / (h * h);
+    double dt = d + w > 0 ? 2 * a / (d + sqrt(d * d + 4 * w * w * a)) : (double)GS4I_HUGE;
+    if ((double)r->max_speed * dt > h) dt = h / (double)r->max_speed;
+    if ((double)r->max_gradient * dt > 1) dt = 1 / (double)r->max_gradient;
+    if (dt > (double)GS4I_HUGE) dt = (double)GS4I_HUGE;
+    return GS4I_C(dt);
+}
+
+/* The extremes that set the limit, from the particles as they are: after the scene was changed by hand. */
+static void gs4i_look_at_particles(const gs4_sim *sim, gs4i_report *r)
+{
+    const gs4i_particles *p = &sim->particles;
+    size_t i;
+    int c;
+    gs4i_report_clear(r);
+    for (i = 0; i < (size_t)p->count; i++) {
+        const gs4_real *v = p->velocity + 4 * i, *C = p->affine + 9 * i;
+        const gs4i_law *law = &sim->laws[p->material[i]];
+        gs4_real D[6], grad2 = 0;
+        gs4i_strain_rate(C, D);
+        gs4i_see_liquid(r, law, v[3], gs4i_viscosity(law, D));
+        for (c = 0; c < 9; c++) grad2 += C[c] * C[c];
+        r->max_speed = gs4i_max(r->max_speed, v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+        r->max_gradient = gs4i_max(r->max_gradient, grad2);
+    }
+    r->max_speed = GS4I_SQRT(r->max_speed);
+    r->max_gradient = GS4I_SQRT(r->max_gradient);
+    for (c = 0; c < sim->boundary.body_count; c++) {        /* what bodies and mouths will do to their nodes */
+        const gs4i_body *b = &sim->boundary.bodies[c];
+        r->max_speed = gs4i_max(r->max_speed, gs4i_max(gs4i_length(b->is.velocity), gs4i_length(b->flow)));
+    }
+}
+
+static gs4i_rule gs4i_make_rule(const gs4_sim *sim, gs4_real dt)
+{
+    const gs4_real r = sim->desc.rho_inf, s = sim->desc.rho_inf_spurious;
+    gs4i_rule k;
+    k.dt = dt;
+    k.afresh = sim->afresh;
+    k.alpha_m = k.afresh ? GS4I_C(1) : (3 + r + s - r * s) / (2 * (1 + r) * (1 + s));
+    k.alpha_f = k.afresh ? GS4I_C(0.5) : 1 / (1 + r);
+    k.gamma = k.afresh ? GS4I_C(1) : 1 / (1 + s);
+    k.reach = k.alpha_f * dt;
+    k.s = k.alpha_f * k.gamma * dt / k.alpha_m;
+    k.decay = sim->desc.flip_decay_time > 0 && gs4i_finite(sim->desc.flip_decay_time) ? 1 / sim->desc.flip_decay_time : GS4I_C(0);
+    return k;
+}
+
+/* --- nodes -------------------------------------------------------------------------------------------- */
+
+enum { GS4I_GROUP = 16 };               /* blocks a task */
+
+/* Sums and extremes of one group of blocks. */
+typedef struct gs4i_node_report {
+    double momentum[3], mass; gs4_real bound; int bad; } gs4i_node_report;
+
+typedef struct gs4i_node_pass {
+    gs4_sim *sim;
+    gs4_real lightest;                  /* nodes with less mass are empty: what they hold is below rounding */
+    gs4_real reference[3];              /* velocity that all share: what matters is what differs from it */
+    gs4i_node_report *reports;
+} gs4i_node_pass;
+
+GS4I_INLINE int gs4i_group_end(const gs4i_grid *g, int index)
+{
+    return (index + 1) * GS4I_GROUP < g->active ? (index + 1) * GS4I_GROUP : g->active;
+}
+
+static void gs4i_clear_nodes(int index, void *context)
+{
+    const gs4i_grid *g = &((const gs4i_node_pass *)context)->sim->grid;
+    int begin = index * GS4I_GROUP, end = gs4i_group_end(g, index);
+    size_t bytes = (size_t)(end - begin) * GS4I_NODE_REALS * sizeof(gs4_real);
+    memset(g->momentum + (size_t)begin * GS4I_NODE_REALS, 0, bytes);
+    memset(g->force + (size_t)begin * GS4I_NODE_REALS, 0, bytes);
+}
+
+/* Keep what the velocities would be without contact: -v, in the place of the jumps. */
+static void gs4i_begin_jumps(int index, void *context)
+{
+    const gs4i_node_pass *pass = (const gs4i_node_pass *)context;
+    const gs4i_grid *g = &pass->sim->grid;
+    int s, i, c;
+    for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
+        if (!g->jump_of[s]) continue;
+        for (i = 0; i < GS4I_BLOCK_NODES; i++) {
+            const gs4_real *q = g->momentum + (size_t)s * GS4I_NODE_REALS + 4 * i;
+            gs4_real *jump = gs4i_jump_at(g, (uint32_t)(64 * s + i));
+            for (c = 0; c < 3; c++) jump[c] = q[3] > pass->lightest ? -q[c] / q[3] : GS4I_C(0);
+            jump[3] = 0;
+        }
+    }
+}
+
+static void gs4i_end_jumps(int index, void *context)
+{
+    const gs4i_node_pass *pass = (const gs4i_node_pass *)context;
+    const gs4i_grid *g = &pass->sim->grid;
+    int s, i, c;
+    for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
+        if (!g->jump_of[s]) continue;
+        for (i = 0; i < GS4I_BLOCK_NODES; i++) {
+            const gs4_real *q = g->momentum + (size_t)s * GS4I_NODE_REALS + 4 * i;
+            gs4_real *jump = gs4i_jump_at(g, (uint32_t)(64 * s + i));
+            for (c = 0; c < 3; c++) jump[c] += q[c];
+        }
+    }
+}
+
+GS4I_INLINE gs4_vec3 gs4i_node_position(const gs4i_grid *g, int slot, int i)
+{
+    int at[3];
+    gs4i_block_coordinates(g, g->block[slot], at);
+    return gs4i_add(g->origin, gs4i_scale(gs4i_vec3(GS4I_C(4 * at[0] - 4 + (i & 3)) + GS4I_C(0.5),
+        GS4I_C(4 * at[1] - 4 + (i >> 2 & 3)) + GS4I_C(0.5), GS4I_C(4 * at[2] - 4 + (i >> 4)) + GS4I_C(0.5)), g->h));
+}
+
+/* All bodies on the nodes of one block. */
+static void gs4i_hold_nodes(const gs4_sim *sim, int slot, gs4_real *velocity, gs4_real *acceleration)
+{
+    gs4_real none[3];
+    int b, i;
+    if (!sim->grid.jump_of[slot]) return;
+    for (b = 0; b < sim->boundary.body_count; b++)
+        for (i = 0; i < GS4I_BLOCK_NODES && !sim->boundary.bodies[b].asleep; i++) {
+            none[0] = none[1] = none[2] = 0;
+            gs4i_body_hold(&sim->boundary.bodies[b], gs4i_node_position(&sim->grid, slot, i), sim->grid.h, sim->rule.dt,
+                           velocity + 4 * i, acceleration ? acceleration + 4 * i : none);
+        }
+}
+
+/* v_i = (m v)_i / m_i, as bodies let it be. */
+static void gs4i_node_velocities(int index, void *context)
+{
+    const gs4i_node_pass *pass = (const gs4i_node_pass *)context;
+    const gs4i_grid *g = &pass->sim->grid;
+    gs4i_node_report *r = &pass->reports[index];
+    int s, i, c;
+    memset(r, 0, sizeof *r);
+    for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
+        gs4_real *q = g->momentum + (size_t)s * GS4I_NODE_REALS;
+        for (i = 0; i < GS4I_BLOCK_NODES; i++) {
+            const gs4_real m = q[4 * i + 3], inverse = m > pass->lightest ? 1 / m : GS4I_C(0);
+            for (c = 0; c < 3; c++) { r->momentum[c] += (double)q[4 * i + c]; q[4 * i + c] *= inverse; }
+            r->mass += (double)m;
+        }
+        gs4i_hold_nodes(pass->sim, s, q, NULL);
+    }
+}
+
+/* What a node remembered of component c before this step. A node that was empty takes ag_i = acc_i; where rates start
+ * afresh ag_i = 0, as the particles' are. */
+GS4I_INLINE gs4_real gs4i_remembered(const gs4i_rule *rule, const gs4_real *ag, int c, gs4_real acc)
+{
+    return rule->afresh ? GS4I_C(0) : (int)ag[3] & 1 ? ag[c] : acc;
+}
+
+/* S6: acc_i = f_i / m_i; u_i = v_i + s (acc_i - ag_i). Then bodies. */
+static void gs4i_node_accelerations(int index, void *context)
+{
+    const gs4i_node_pass *pass = (const gs4i_node_pass *)context;
+    const gs4i_grid *g = &pass->sim->grid;
+    const gs4i_rule *rule = &pass->sim->rule;
+    int s, i, c;
+    for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
+        gs4_real *q = g->momentum + (size_t)s * GS4I_NODE_REALS, *f = g->force + (size_t)s * GS4I_NODE_REALS;
+        const gs4_real *ag = g->memory + (size_t)s * GS4I_NODE_REALS;
+        for (i = 0; i < 4 * GS4I_BLOCK_NODES; i += 4) {
+            const gs4_real inverse = q[i + 3] > pass->lightest ? 1 / q[i + 3] : GS4I_C(0);
+            for (c = 0; c < 3; c++) {
+                const gs4_real acc = f[i + c] * inverse;
+                f[i + c] = acc;
+                q[i + c] += rule->s * (acc - gs4i_remembered(rule, ag + i, c, acc));
+            }
+        }
+        gs4i_hold_nodes(pass->sim, s, q, f);
+    }
+}
+
+/* ag_i += (acc_i - ag_i) / alpha_m, once the step is certain: it belongs to the state. Images in contact have none. */
+static void gs4i_node_memories(int index, void *context)
+{
+    const gs4i_node_pass *pass = (const gs4i_node_pass *)context;
+    const gs4i_grid *g = &pass->sim->grid;
+    const gs4i_rule *rule = &pass->sim->rule;
+    int s, i, c;
+    for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
+        const gs4_real *q = g->momentum + (size_t)s * GS4I_NODE_REALS, *f = g->force + (size_t)s * GS4I_NODE_REALS;
+        gs4_real *ag = g->memory + (size_t)s * GS4I_NODE_REALS;
+        for (i = 0; i < 4 * GS4I_BLOCK_NODES; i += 4) {
+            const int flags = g->jump_of[s] ? (int)gs4i_jump_at(g, (uint32_t)(64 * s + i / 4))[3] : 0;
+            const int there = q[i + 3] > pass->lightest && !(flags & 7);
+            for (c = 0; c < 3; c++) {
+                const gs4_real before = gs4i_remembered(rule, ag + i, c, f[i + c]);
+                ag[i + c] = there ? before + (f[i + c] - before) / rule->alpha_m : GS4I_C(0);
+            }
+            ag[i + 3] = GS4I_C(there + (flags & 8 ? 2 : 0));
+        }
+    }
+}
+
+/* How far the particles can be driven, bounded from the nodes alone. A node of mass m_i has weight at most m_i/m_p and
+ * gradient at most sqrt(2 m_i/m_p)/h in any particle p, so with q_i = min(1, 14 sqrt(m_i/m_min)) no particle sees
+ * |div u| > 4.7/h max_i q_i |u_i - u_ref|_1. Where that is small no rehearsal is needed. */
+static void gs4i_node_bounds(int index, void *context)
+{
+    const gs4i_node_pass *pass = (const gs4i_node_pass *)context;
+    const gs4_sim *sim = pass->sim;
+    const gs4i_grid *g = &sim->grid;
+    gs4i_node_report *r = &pass->reports[index];
+    int s, i, c;
+    r->bound = 0; r->bad = 0;
+    for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
+        const gs4_real *q = g->momentum + (size_t)s * GS4I_NODE_REALS, *f = g->force + (size_t)s * GS4I_NODE_REALS;
+        for (i = 0; i < 4 * GS4I_BLOCK_NODES; i += 4) {
+            gs4_real sum = 0, all = 0, ratio;
+            if (!(q[i + 3] > pass->lightest)) continue;
+            for (c = 0; c < 3; c++) { sum += gs4i_abs(q[i + c] - pass->reference[c]); all += q[i + c] + f[i + c]; }
+            ratio = q[i + 3] / sim->min_mass;
+            if (ratio < GS4I_C(1.0 / 196)) sum *= 14 * GS4I_SQRT(ratio);
+            r->bound = gs4i_max(r->bound, sum);
+            if (!gs4i_finite(all) || !gs4i_finite(sum)) r->bad = 1;
+        }
+    }
+}
+
+/* --- stages ------------------------------------------------------------------------------------------- */
+
+#define GS4I_TRY(call) do { int gs4i_r = (call); if (gs4i_r != GS4_OK) return gs4i_r; } while (0)
+
+static int gs4i_groups(const gs4_sim *sim) { return (sim->grid.active + GS4I_GROUP - 1) / GS4I_GROUP; }
+
+/* Everything whose size follows the blocks. */
+static int gs4i_after_occupy(gs4_sim *sim)
+{
+    gs4i_memory *m = &sim->memory;
+    if (gs4i_list_images(m, &sim->boundary, &sim->grid) != GS4_OK) return gs4i_fail_memory(sim);
+    if (sim->grid.occupied_capacity > sim->report_capacity) {
+        gs4i_report *r = (gs4i_report *)gs4i_alloc(m, (size_t)sim->grid.occupied_capacity, sizeof *r);
+        if (!r) return gs4i_fail_memory(sim);
+        gs4i_free(m, sim->reports, (size_t)sim->report_capacity, sizeof *r);
+        sim->reports = r; sim->report_capacity = sim->grid.occupied_capacity;
+    }
+    if (gs4i_groups(sim) > sim->node_report_capacity) {
+        const int wanted = gs4i_groups(sim) + gs4i_groups(sim) / 8;
+        gs4i_node_report *r = (gs4i_node_report *)gs4i_alloc(m, (size_t)wanted, sizeof *r);
+        if (!r) return gs4i_fail_memory(sim);
+        gs4i_free(m, sim->node_reports, (size_t)sim->node_report_capacity, sizeof *r);
+        sim->node_reports = r; sim->node_report_capacity = wanted;
+    }
+    return GS4_OK;
+}
+
+/* S1: sort. */
+static int gs4i_bin(gs4_sim *sim)
+{
+    const double start = gs4i_now(sim);
+    const gs4_real reach = sim->particles.with_rates ? sim->rule.reach : GS4I_C(0);
+    if (gs4i_particles_sort(&sim->memory, &sim->tasks, &sim->particles, &sim->grid, reach) != GS4_OK) return gs4i_fail_memory(sim);
+    sim->unsorted = 1;
+    GS4I_TRY(gs4i_after_occupy(sim));
+    sim->unsorted = 0;
+    sim->seconds[GS4I_CLOCK_SORT] += gs4i_now(sim) - start;
+    return GS4_OK;
+}
+
+/* S1 to S3: scatter; when particles have strayed too far from their block, sort and scatter again. */
+static int gs4i_rasterise(gs4_sim *sim, gs4i_node_pass *nodes)
+{
+    const int euler = sim->desc.integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER;
+    int tries;
+    for (tries = 0; tries < 2; tries++) {
+        if (sim->unsorted || tries) GS4I_TRY(gs4i_bin(sim));
+        gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_clear_nodes, nodes);
+        gs4i_scatter(sim, euler ? gs4i_scatter_euler : gs4i_scatter_momentum);
+        if (!gs4i_all_reports(sim).strayed) return GS4_OK;
+    }
+    return gs4i_fail(sim, GS4_ERROR_UNSTABLE, "particles would move more than a cell beyond the domain in one step; the step was not taken");
+}
+
+/* Velocities of the nodes, with walls and bodies; what contact took is left in the jumps. */
+static void gs4i_set_velocities(gs4_sim *sim, gs4i_node_pass *nodes)
+{
+    const int groups = gs4i_groups(sim);
+    double sum[4] = { 0, 0, 0, 0 };
+    int i, c;
+    gs4i_parallel_for(&sim->tasks, groups, gs4i_begin_jumps, nodes);
+    gs4i_fold_momentum(&sim->boundary, &sim->grid);
+    gs4i_parallel_for(&sim->tasks, groups, gs4i_node_velocities, nodes);
+    gs4i_fill_images(&sim->boundary, &sim->grid, sim->grid.momentum);
+    gs4i_parallel_for(&sim->tasks, groups, gs4i_end_jumps, nodes);
+    for (i = 0; i < groups; i++) {
+        for (c = 0; c < 3; c++) sum[c] += nodes->reports[i].momentum[c];
+        sum[3] += nodes->reports[i].mass;
+    }
+    for (c = 0; c < 3; c++) nodes->reference[c] = GS4I_C(sum[3] > 0 ? sum[c] / sum[3] : 0);
+}
+
+/* Is what the particles have seen so far acceptable, and is dt still within the limit that follows from it? */
+static int gs4i_check_stage(gs4_sim *sim)
+{
+    gs4i_report r = gs4i_all_reports(sim);
+    if (r.bad) return gs4i_fail_bad(sim, &r);
+    if (sim->rule.dt > GS4I_C(1.25) * gs4i_stable_dt(sim, &r))
+        return gs4i_fail_value(sim, GS4_ERROR_UNSTABLE, "viscosity or compression rose during the step: dt ", (double)sim->rule.dt,
+                               " s is beyond the stability limit there; the step was not taken");
+    return GS4_OK;
+}
+
+/* Before anything is written to the particles: can the step be trusted? */
+static int gs4i_rehearse(gs4_sim *sim, gs4i_node_pass *nodes)
+{
+    const int groups = gs4i_groups(sim);
+    gs4i_report r = gs4i_all_reports(sim);
+    gs4_real bound = 0;
+    int i, bad = 0;
+    gs4i_parallel_for(&sim->tasks, groups, gs4i_node_bounds, nodes);
+    for (i = 0; i < groups; i++) { bound = gs4i_max(bound, nodes->reports[i].bound); bad |= nodes->reports[i].bad; }
+    if (bad) return gs4i_fail(sim, GS4_ERROR_UNSTABLE, "the velocity of a node would not be finite; the step was not taken");
+    if (GS4I_C(4.7) * bound * sim->rule.dt < GS4I_C(0.2) * sim->grid.h && r.min_J > GS4I_C(0.25) && r.max_J < 4) return GS4_OK;
+    gs4i_gather(sim, sim->desc.integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER ? gs4i_rehearse_euler_task : gs4i_rehearse_task);
+    r = gs4i_all_reports(sim);
+    return r.bad ? gs4i_fail_bad(sim, &r) : GS4_OK;
+}
+
+/* --- mouths, leavers, time ---------------------------------------------------------------------------- */
+
+static int gs4i_add_one(gs4_sim *sim, gs4_vec3 x, gs4_vec3 v, gs4_real mass, int material)
+{
+    gs4i_particles *p = &sim->particles;
+    size_t i = (size_t)p->count;
+    if (p->count >= p->capacity || sim->next_id == UINT32_MAX) return 0;
+    p->position[4 * i] = x.x; p->position[4 * i + 1] = x.y; p->position[4 * i + 2] = x.z; p->position[4 * i + 3] = mass;
+    p->velocity[4 * i] = v.x; p->velocity[4 * i + 1] = v.y; p->velocity[4 * i + 2] = v.z; p->velocity[4 * i + 3] = 1;
+    if (p->with_rates) { memset(p->rate + 4 * i, 0, 4 * sizeof(gs4_real)); memset(p->lag + 3 * i, 0, 3 * sizeof(gs4i_half)); }
+    memset(p->affine + 9 * i, 0, 9 * sizeof(gs4_real));
+    p->id[i] = sim->next_id++;
+    p->material[i] = (uint8_t)material;
+    p->count++;
+    sim->min_mass = sim->min_mass > 0 ? gs4i_min(sim->min_mass, mass) : mass;
+    sim->unsorted = 1;
+    return 1;
+}
+
+static int gs4i_inside_domain(const gs4i_grid *g, gs4_vec3 p)
+{
+    return p.x >= g->origin.x && p.x < g->origin.x + GS4I_C(g->cells[0]) * g->h
+        && p.y >= g->origin.y && p.y < g->origin.y + GS4I_C(g->cells[1]) * g->h
+        && p.z >= g->origin.z && p.z < g->origin.z + GS4I_C(g->cells[2]) * g->h;
+}
+
+/* Uniform in [-1/2, 1/2), from the seed and a number. */
+static gs4_real gs4i_jitter(uint32_t seed, uint64_t number, int axis)
+{
+    uint64_t u = gs4i_mix(gs4i_mix((uint64_t)seed << 32 ^ number) + (uint64_t)axis);
+    return GS4I_C((double)(u >> 40) / 16777216.0 - 0.5);
+}
+
+/* The lattice that flows through a mouth: points that are in it now and were not when last looked at. With `sim` const
+ * in spirit when `emit` is 0: then only counts. Lattice point n of axis a is at low + (n + 1/2) spacing + drift. */
+static int gs4i_mouth_points(gs4_sim *sim, gs4i_emitter *e, const double drift[3], int emit)
+{
+    const gs4i_body *mouth = &sim->boundary.bodies[e->body];
+    const double spacing = (double)e->is.fill.spacing;
+    const gs4_real mass = sim->laws[e->is.fill.material].density * e->is.fill.spacing * e->is.fill.spacing * e->is.fill.spacing;
+    double low[3], high[3];
+    gs4_vec3 lo, hi;
+    int64_t from[3], to[3], i, j, k;
+    int a, n = 0;
+    gs4i_shape_bounds(&e->is.shape, &lo, &hi);
+    gs4i_to_double(lo, low); gs4i_to_double(hi, high);
+    for (a = 0; a < 3; a++) {
+        from[a] = (int64_t)floor(-drift[a] / spacing) - 1;
+        to[a] = (int64_t)ceil((high[a] - low[a] - drift[a]) / spacing) + 1;
+    }
+    for (k = from[2]; k <= to[2]; k++) for (j = from[1]; j <= to[1]; j++) for (i = from[0]; i <= to[0]; i++) {
+        const double at[3] = { (double)i + 0.5, (double)j + 0.5, (double)k + 0.5 };
+        const uint64_t number = (uint64_t)i * 0x9e3779b1u + ((uint64_t)j << 21) * 31 + ((uint64_t)k << 42) * 17;
+        double p[3], before[3], travelled[3];
+        gs4_vec3 now, then, world;
+        travelled[0] = mouth->at[0] - (double)mouth->is.pivot.x; travelled[1] = mouth->at[1] - (double)mouth->is.pivot.y;
+        travelled[2] = mouth->at[2] - (double)mouth->is.pivot.z;
+        for (a = 0; a < 3; a++) {
+            const double shift = low[a] + (at[a] + (double)(e->is.fill.jitter * gs4i_jitter(e->is.fill.random_seed, number, a))) * spacing;
+            p[a] = shift + drift[a]; before[a] = shift + e->looked[a];
+        }
+        now = gs4i_vec3(GS4I_C(p[0]), GS4I_C(p[1]), GS4I_C(p[2]));
+        then = gs4i_vec3(GS4I_C(before[0]), GS4I_C(before[1]), GS4I_C(before[2]));
+        if (gs4i_shape_or_field(mouth, now) >= 0 || (e->begun && gs4i_shape_or_field(mouth, then) < 0)) continue;
+        world = gs4i_vec3(GS4I_C(p[0] + travelled[0]), GS4I_C(p[1] + travelled[1]), GS4I_C(p[2] + travelled[2]));
+        if (!gs4i_inside_domain(&sim->grid, world)) continue;
+        n++;
+        if (emit && !gs4i_add_one(sim, world, e->is.fill.velocity, mass, e->is.fill.material)) return n - 1;
+    }
+    return n;
+}
+
+static int gs4i_emitter_is_on(const gs4i_emitter *e, double time)
+{
+    return time >= (double)e->is.start && (e->is.stop <= 0 || time < (double)e->is.stop);
+}
+
+static void gs4i_drift_after(const gs4i_emitter *e, double dt, double drift[3])
+{
+    drift[0] = e->drift[0] + ((double)e->is.fill.velocity.x - (double)e->is.travel.x) * dt;
+    drift[1] = e->drift[1] + ((double)e->is.fill.velocity.y - (double)e->is.travel.y) * dt;
+    drift[2] = e->drift[2] + ((double)e->is.fill.velocity.z - (double)e->is.travel.z) * dt;
+}
+
+/* Look at a mouth when its lattice has moved a fifth of a spacing, or for the first time. */
+static int gs4i_is_due(const gs4i_emitter *e, const double drift[3])
+{
+    double d2 = 0;
+    int a;
+    for (a = 0; a < 3; a++) d2 += (drift[a] - e->looked[a]) * (drift[a] - e->looked[a]);
+    return !e->begun || d2 > 0.04 * (double)e->is.fill.spacing * (double)e->is.fill.spacing;
+}
+
+/* Room for what the mouths will give in this step, so that emitting cannot fail afterwards. */
+static int gs4i_prepare_emitters(gs4_sim *sim, double dt)
+{
+    int e, n = 0, wanted;
+    for (e = 0; e < sim->emitter_count; e++) {
+        double drift[3];
+        sim->boundary.bodies[sim->emitters[e].body].asleep = !gs4i_emitter_is_on(&sim->emitters[e], sim->time);
+        if (!gs4i_emitter_is_on(&sim->emitters[e], sim->time + dt)) continue;
+        if (sim->emitters[e].begun) gs4i_drift_after(&sim->emitters[e], dt, drift);
+        else memset(drift, 0, sizeof drift);
+        if (gs4i_is_due(&sim->emitters[e], drift)) n += gs4i_mouth_points(sim, &sim->emitters[e], drift, 0);
+    }
+    if (n == 0) return GS4_OK;
+    wanted = sim->particles.count + n;
+    if (sim->desc.max_particles) return GS4_OK;             /* all room there will be; mouths pause when it is full */
+    if (wanted <= sim->particles.capacity) return GS4_OK;
+    if (wanted > GS4I_MAX_PARTICLES) return gs4i_fail(sim, GS4_ERROR_MEMORY, "more than 2^30 particles");
+    wanted += wanted / 8;
+    if (gs4i_particles_reserve(&sim->memory, &sim->particles, wanted) != GS4_OK) return gs4i_fail_memory(sim);
+    return GS4_OK;
+}
+
+static void gs4i_emit(gs4_sim *sim, double dt)
+{
+    int e;
+    for (e = 0; e < sim->emitter_count; e++) {
+        gs4i_emitter *m = &sim->emitters[e];
+        double drift[3];
+        int before = sim->particles.count, n;
+        if (!gs4i_emitter_is_on(m, sim->time)) continue;
+        if (m->begun) gs4i_drift_after(m, dt, drift);
+        else memset(drift, 0, sizeof drift);
+        memcpy(m->drift, drift, sizeof drift);
+        if (!gs4i_is_due(m, drift)) continue;
+        n = gs4i_mouth_points(sim, m, drift, 1);
+        if (n > sim->particles.count - before && sim->desc.log)
+            sim->desc.log(1, "an emitter pauses: max_particles is reached", sim->desc.log_user);
+        memcpy(m->looked, drift, sizeof drift);
+        m->begun = 1;
+    }
+}
+
+/* Particles that went out through an open wall are dropped; the others close up in order. */
+static void gs4i_drop_leavers(gs4_sim *sim)
+{
+    gs4i_particles *p = &sim->particles;
+    gs4i_array a[GS4I_ARRAYS];
+    size_t i, kept = 0;
+    int k;
+    gs4i_particle_arrays(p, a);
+    for (i = 0; i < (size_t)p->count; i++) {
+        const gs4_real *x = p->position + 4 * i;
+        if (!gs4i_inside_domain(&sim->grid, gs4i_vec3(x[0], x[1], x[2]))) continue;
+        for (k = 0; k < GS4I_ARRAYS && kept != i; k++)
+            if (*a[k].data) memcpy((char *)*a[k].data + kept * a[k].size, (char *)*a[k].data + i * a[k].size, a[k].size);
+        kept++;
+    }
+    p->count = (int)kept;
+    sim->unsorted = 1;
+}
+
+/* S8: bodies move, mouths give, leavers go. */
+static void gs4i_finish(gs4_sim *sim)
+{
+    const double dt = (double)sim->rule.dt;
+    int b;
+    if (sim->particles.count) {
+        gs4i_report r = gs4i_all_reports(sim);
+        r.max_speed = GS4I_SQRT(r.max_speed); r.max_gradient = GS4I_SQRT(r.max_gradient);
+        sim->worst = r;
+        if (r.left) gs4i_drop_leavers(sim);
+    }
+    for (b = 0; b < sim->boundary.body_count; b++) {
+        gs4i_body_move(&sim->boundary.bodies[b], dt);
+        sim->worst.max_speed = gs4i_max(sim->worst.max_speed, gs4i_max(gs4i_length(sim->boundary.bodies[b].is.velocity),
+                                                                       gs4i_length(sim->boundary.bodies[b].flow)));
+    }
+    sim->time += dt; sim->last_dt = dt; sim->steps++;
+    sim->afresh = 0;
+    gs4i_emit(sim, dt);
+}
+
+/* One step of size dt. Particles are written by stage S7 alone, which is reached only when nothing can fail any more. */
+static int gs4i_step(gs4_sim *sim, gs4_real dt)
+{
+    const int euler = sim->desc.integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER;
+    const double start = gs4i_now(sim);
+    gs4i_node_pass nodes;
+    memset(&nodes, 0, sizeof nodes);
+    nodes.sim = sim;
+    nodes.lightest = gs4i_max(sim->min_mass * GS4I_EPSILON * GS4I_EPSILON, GS4I_TINY);
+    sim->rule = gs4i_make_rule(sim, dt);
+    GS4I_TRY(gs4i_prepare_emitters(sim, (double)dt));
+    if (sim->particles.count) {
+        if (sim->unsorted) GS4I_TRY(gs4i_bin(sim));                                             /* S1 */
+        GS4I_TRY(gs4i_rasterise(sim, &nodes));                                                  /* S2, S3 */
+        if (gs4i_place_jumps(&sim->memory, &sim->boundary, &sim->grid) != GS4_OK) return gs4i_fail_memory(sim);
+        nodes.reports = sim->node_reports;
+        gs4i_set_velocities(sim, &nodes);
+        if (!euler) {
+            gs4i_scatter(sim, gs4i_scatter_forces);                                             /* S4, S5 */
+            gs4i_fold_force(&sim->boundary, &sim->grid);
+            gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_node_accelerations, &nodes);  /* S6 */
+            gs4i_fill_images(&sim->boundary, &sim->grid, sim->grid.momentum);
+            gs4i_fill_images(&sim->boundary, &sim->grid, sim->grid.force);
+        }
+        GS4I_TRY(gs4i_check_stage(sim));
+        GS4I_TRY(gs4i_rehearse(sim, &nodes));
+        if (!euler) gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_node_memories, &nodes);
+        gs4i_gather(sim, euler ? gs4i_gather_euler_task : gs4i_correct_task);                   /* S7 */
+    }
+    gs4i_finish(sim);                                                                           /* S8 */
+    sim->seconds[GS4I_CLOCK_TOTAL] += gs4i_now(sim) - start;
+    return GS4_OK;
+}
+
+/* ==== [[files]] frames and checkpoints ============================================================= */
+
+/* A file that appears under its name only when it is whole: written beside it, then renamed. What is not a regular file
+ * (a device, a pipe) is written directly. */
+typedef struct gs4i_file { FILE *stream; char *temporary; size_t temporary_size; const char *path; int failed; uint64_t hash; } gs4i_file;
+
+static int gs4i_is_special(const char *path)
+{
+#if defined(__unix__) || defined(__APPLE__)
+    struct stat s;
+    return stat(path, &s) == 0 && !S_ISREG(s.st_mode) && !S_ISDIR(s.st_mode);
+#else
+    (void)path;
+    return 0;
+#endif
+}
+
+static int gs4i_file_open(gs4_sim *sim, gs4i_file *f, const char *path)
+{
+    size_t n;
+    memset(f, 0, sizeof *f);
+    if (!path || !*path) return gs4i_fail(sim, GS4_ERROR_ARGUMENT, "path is empty");
+    f->path = path;
+    n = strlen(path);
+    if (!gs4i_is_special(path)) {
+        f->temporary_size = n + 5;
+        f->temporary = (char *)gs4i_alloc(&sim->memory, f->temporary_size, 1);
+        if (!f->temporary) return gs4i_fail_memory(sim);
+        memcpy(f->temporary, path, n);
+        memcpy(f->temporary + n, ".tmp", 5);
+    }
+    f->stream = fopen(f->temporary ? f->temporary : path, "wb");
+    if (f->stream) return GS4_OK;
+    gs4i_free(&sim->memory, f->temporary, f->temporary_size, 1);
+    return gs4i_fail(sim, GS4_ERROR_IO, "the file could not be created: does its folder exist, and may it be written to?");
+}
+
+static void gs4i_file_put(gs4i_file *f, const void *data, size_t bytes)
+{
+    if (!f->failed && fwrite(data, 1, bytes, f->stream) != bytes) f->failed = 1;
+    f->hash = gs4i_hash_bytes(f->hash, data, bytes);
+}
+
+static int gs4i_file_close(gs4_sim *sim, gs4i_file *f)
+{
+    int failed = f->failed;
+    if (fflush(f->stream) != 0 || ferror(f->stream)) failed = 1;
+    if (fclose(f->stream) != 0) failed = 1;
+    if (f->temporary) {
+        if (!failed && rename(f->temporary, f->path) != 0) {
+            remove(f->path);                                /* where rename does not replace */
+            failed = rename(f->temporary, f->path) != 0;
+        }
+        if (failed) remove(f->temporary);
+        gs4i_free(&sim->memory, f->temporary, f->temporary_size, 1);
+    }
+    if (failed) return gs4i_fail(sim, GS4_ERROR_IO, "the file could not be written whole: is the disk full? What was there before is untouched");
+    return GS4_OK;
+}
+
+/* Columns of a frame, in order. Frames are little-endian; on a big-endian machine numbers are turned round. */
+typedef struct gs4i_column { const char *name; const char *ply; const char *npy; const void *data; size_t size; int numbers; size_t stride; } gs4i_column;
+
+static int gs4i_columns(gs4_sim *sim, gs4i_column c[8])
+{
+    gs4i_particles *p = &sim->particles;
+    const char *real_ply = sizeof(gs4_real) == 4 ? "float" : "double", *real_npy = sizeof(gs4_real) == 4 ? "<f4" : "<f8";
+    const size_t r = sizeof(gs4_real);
+    int n = 0;
+    const gs4i_column columns[] = {
+        { "position", real_ply, real_npy, p->position, r, 3, 4 * r },
+        { "velocity", real_ply, real_npy, p->velocity, r, 3, 4 * r },
+        { "volume_ratio", real_ply, real_npy, p->velocity + 3, r, 1, 4 * r },
+        { "mass", real_ply, real_npy, p->position + 3, r, 1, 4 * r },
+        { "id", "uint", "<u4", p->id, 4, 1, 4 },
+        { "material", "uchar", "|u1", p->material, 1, 1, 1 } };
+    for (; n < (int)(sizeof columns / sizeof columns[0]); n++) c[n] = columns[n];
+    if (p->count == 0) { int i; for (i = 0; i < n; i++) c[i].data = &sim->particles; }
+    return n;
+}
+
+/* Record after record, through a buffer. */
+static void gs4i_put_records(gs4i_file *f, const gs4i_column *c, int columns, int count)
+{
+    const uint16_t one = 1;
+    const int big = *(const unsigned char *)&one == 0;
+    unsigned char buffer[8192];
+    size_t used = 0, b;
+    int i, k, e;
+    for (i = 0; i < count; i++) {
+        if (used + 128 > sizeof buffer) { gs4i_file_put(f, buffer, used); used = 0; }
+        for (k = 0; k < columns; k++)
+            for (e = 0; e < c[k].numbers; e++) {
+                const unsigned char *from = (const unsigned char *)c[k].data + (size_t)i * c[k].stride + (size_t)e * c[k].size;
+                for (b = 0; b < c[k].size; b++) buffer[used++] = from[big ? c[k].size - 1 - b : b];
+            }
+    }
+    gs4i_file_put(f, buffer, used);
+}
+
+static int gs4i_write_ply(gs4_sim *sim, const char *path)
+{
+    static const char *const axis[3] = { "x", "y", "z" };
+    gs4i_column c[8];
+    gs4i_file f;
+    gs4i_text t;
+    char head[1024];
+    int columns = gs4i_columns(sim, c), k, e;
+    GS4I_TRY(gs4i_file_open(sim, &f, path));
+    t.at = head; t.left = sizeof head;
+    gs4i_put(&t, "ply\nformat binary_little_endian 1.0\ncomment gs4mpm " GS4_VERSION_STRING "\ncomment time ");
+    gs4i_put_real(&t, sim->time);
+    gs4i_put(&t, "\nelement vertex "); gs4i_put_integer(&t, sim->particles.count);
+    for (k = 0; k < columns; k++)
+        for (e = 0; e < c[k].numbers; e++) {
+            gs4i_put(&t, "\nproperty "); gs4i_put(&t, c[k].ply); gs4i_put(&t, " ");
+            if (c[k].numbers == 1) gs4i_put(&t, c[k].name);
+            else { gs4i_put(&t, k == 1 ? "v" : ""); gs4i_put(&t, axis[e]); }
+        }
+    gs4i_put(&t, "\nend_header\n");
+    gs4i_file_put(&f, head, strlen(head));
+    gs4i_put_records(&f, c, columns, sim->particles.count);
+    return gs4i_file_close(sim, &f);
+}
+
+/* NumPy's .npy, version 1.0: magic, length of the header, a header that is Python text padded to 64 bytes, records. */
+static int gs4i_write_raw(gs4_sim *sim, const char *path)
+{
+    gs4i_column c[8];
+    gs4i_file f;
+    gs4i_text t;
+    char head[1024];
+    int columns = gs4i_columns(sim, c), k;
+    size_t n;
+    GS4I_TRY(gs4i_file_open(sim, &f, path));
+    memset(head, ' ', sizeof head);
+    memcpy(head, "\x93NUMPY\x01\x00", 8);
+    t.at = head + 10; t.left = sizeof head - 128;
+    gs4i_put(&t, "{'descr': [");
+    for (k = 0; k < columns; k++) {
+        gs4i_put(&t, "('"); gs4i_put(&t, c[k].name); gs4i_put(&t, "', '"); gs4i_put(&t, c[k].npy);
+        gs4i_put(&t, c[k].numbers == 3 ? "', (3,)), " : "'), ");
+    }
+    gs4i_put(&t, "], 'fortran_order': False, 'shape': ("); gs4i_put_integer(&t, sim->particles.count); gs4i_put(&t, ",), }");
+    n = (size_t)(t.at - head);
+    head[n] = ' ';
+    while ((n + 1) % 64) n++;
+    head[n++] = '\n';
+    head[8] = (char)((n - 10) & 255); head[9] = (char)((n - 10) >> 8);
+    gs4i_file_put(&f, head, n);
+    gs4i_put_records(&f, c, columns, sim->particles.count);
+    return gs4i_file_close(sim, &f);
+}
+
+/* --- checkpoints: native byte order, made for the same build; a hash of everything stands at the end -------- */
+
+typedef struct gs4i_head {
+    char magic[8];
+    uint32_t version, real_size, byte_order, head_size, material_size, body_size, emitter_size;
+    int32_t cells[3], integrator, walls[6];
+    double cell_size, origin[3], gravity[3], rho[2], decay;
+    double time, last_dt; uint64_t steps;
+    uint32_t next_id; int32_t afresh, unsorted, unseen;
+    double min_mass, fastest;
+    int32_t particles, materials, bodies, emitters, active, occupied;
+    gs4i_report worst;
+} gs4i_head;
+
+static void gs4i_head_of(const gs4_sim *sim, gs4i_head *h)
+{
+    const gs4_sim_desc *d = &sim->desc;
+    int i;
+    memset(h, 0, sizeof *h);
+    memcpy(h->magic, "GS4SAVE", 8);
+    h->version = GS4_VERSION; h->real_size = sizeof(gs4_real); h->byte_order = 0x01020304u; h->head_size = sizeof *h;
+    h->material_size = sizeof(gs4i_law); h->body_size = sizeof(gs4i_body); h->emitter_size = sizeof(gs4i_emitter);
+    for (i = 0; i < 3; i++) h->cells[i] = d->cells[i];
+    for (i = 0; i < 6; i++) h->walls[i] = (int32_t)d->walls[i];
+    h->integrator = (int32_t)d->integrator;
+    h->cell_size = (double)d->cell_size;
+    h->origin[0] = (double)d->origin.x; h->origin[1] = (double)d->origin.y; h->origin[2] = (double)d->origin.z;
+    h->gravity[0] = (double)d->gravity.x; h->gravity[1] = (double)d->gravity.y; h->gravity[2] = (double)d->gravity.z;
+    h->rho[0] = (double)d->rho_inf; h->rho[1] = (double)d->rho_inf_spurious; h->decay = (double)d->flip_decay_time;
+    h->time = sim->time; h->last_dt = sim->last_dt; h->steps = sim->steps;
+    h->next_id = sim->next_id; h->afresh = sim->afresh; h->unsorted = sim->unsorted; h->unseen = sim->unseen;
+    h->min_mass = (double)sim->min_mass; h->fastest = (double)sim->fastest;
+    h->particles = sim->particles.count; h->materials = sim->material_count;
+    h->bodies = sim->boundary.body_count; h->emitters = sim->emitter_count;
+    h->active = sim->grid.active; h->occupied = sim->grid.occupied;
+    h->worst = sim->worst;
+}
+
+static int gs4i_save(gs4_sim *sim, const char *path)
+{
+    gs4i_array a[GS4I_ARRAYS];
+    gs4i_file f;
+    gs4i_head head;
+    uint64_t hash;
+    int k;
+    GS4I_TRY(gs4i_file_open(sim, &f, path));
+    gs4i_head_of(sim, &head);
+    gs4i_particle_arrays(&sim->particles, a);
+    gs4i_file_put(&f, &head, sizeof head);
+    gs4i_file_put(&f, sim->laws, (size_t)sim->material_count * sizeof *sim->laws);
+    gs4i_file_put(&f, sim->boundary.bodies, (size_t)sim->boundary.body_count * sizeof *sim->boundary.bodies);
+    gs4i_file_put(&f, sim->emitters, (size_t)sim->emitter_count * sizeof *sim->emitters);
+    for (k = 0; k < GS4I_ARRAYS - 1; k++)
+        if (a[k].wanted) gs4i_file_put(&f, *a[k].data, (size_t)sim->particles.count * a[k].size);
+    gs4i_file_put(&f, sim->grid.occupied_block, (size_t)sim->grid.occupied * sizeof *sim->grid.occupied_block);
+    gs4i_file_put(&f, sim->grid.first, ((size_t)sim->grid.occupied + 1) * sizeof *sim->grid.first);
+    if (sim->grid.memory) gs4i_file_put(&f, sim->grid.memory, (size_t)sim->grid.active * GS4I_NODE_REALS * sizeof(gs4_real));
+    hash = f.hash;
+    gs4i_file_put(&f, &hash, sizeof hash);
+    return gs4i_file_close(sim, &f);
+}
+
+/* The whole file in memory. */
+static int gs4i_read_all(gs4_sim *sim, const char *path, unsigned char **data, size_t *size, size_t *capacity)
+{
+    FILE *f;
+    int result = GS4_OK;
+    if (!path || !*path) return gs4i_fail(sim, GS4_ERROR_ARGUMENT, "path is empty");
+    f = fopen(path, "rb");
+    if (!f) return gs4i_fail(sim, GS4_ERROR_IO, "the checkpoint could not be opened: does it exist, and may it be read?");
+    for (;;) {
+        if (*size == *capacity) {
+            size_t wanted = *capacity ? 2 * *capacity : 65536;
+            unsigned char *grown = (unsigned char *)gs4i_alloc(&sim->memory, wanted, 1);
+            if (!grown) { result = gs4i_fail_memory(sim); break; }
+            if (*data) memcpy(grown, *data, *size);
+            gs4i_free(&sim->memory, *data, *capacity, 1);
+            *data = grown; *capacity = wanted;
+        }
+        {
+            size_t n = fread(*data + *size, 1, *capacity - *size, f);
+            *size += n;
+            if (n == 0) break;
+        }
+    }
+    if (result == GS4_OK && ferror(f)) result = gs4i_fail(sim, GS4_ERROR_IO, "the checkpoint could not be read whole");
+    fclose(f);
+    return result;
+}
+
+/* Does the head belong to this build, this description and this scene? */
+static int gs4i_check_head(gs4_sim *sim, const gs4i_head *h)
+{
+    gs4i_head own;
+    gs4i_head_of(sim, &own);
+    if (memcmp(h->magic, own.magic, 8) != 0) return gs4i_fail(sim, GS4_ERROR_FORMAT, "the file is not a gs4mpm checkpoint");
+    if (h->version != own.version || h->real_size != own.real_size || h->byte_order != own.byte_order || h->head_size != own.head_size
+        || h->material_size != own.material_size || h->body_size != own.body_size || h->emitter_size != own.emitter_size)
+        return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint was made by another build (version, precision, byte order or platform)");
+    if (memcmp(h->cells, own.cells, sizeof h->cells) || memcmp(h->walls, own.walls, sizeof h->walls) || h->integrator != own.integrator
+        || memcmp(&h->cell_size, &own.cell_size, sizeof h->cell_size) || memcmp(h->origin, own.origin, sizeof h->origin)
+        || memcmp(h->gravity, own.gravity, sizeof h->gravity) || memcmp(h->rho, own.rho, sizeof h->rho)
+        || memcmp(&h->decay, &own.decay, sizeof h->decay))
+        return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint belongs to a simulation with another description");
+    if (h->materials != own.materials || h->bodies != own.bodies || h->emitters != own.emitters)
+        return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint belongs to a scene with other materials, colliders or emitters: add the same ones, in the same order, before gs4_load");
+    if (h->particles < 0 || h->active < 0 || h->occupied < 0) return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint is damaged");
+    return GS4_OK;
+}
+
+/* Copy of a saved material, collider or emitter that keeps the pointers of the one here: callbacks and meshes cannot be saved. */
+static void gs4i_restore_scene(gs4_sim *sim, const unsigned char *at)
+{
+    int i;
+    for (i = 0; i < sim->material_count; i++, at += sizeof(gs4i_law)) {
+        gs4i_law here = sim->laws[i], *l = &sim->laws[i];
+        memcpy(l, at, sizeof *l);
+        l->viscosity_fn = here.viscosity_fn; l->viscosity_user = here.viscosity_user;
+        l->is.viscosity_fn = here.is.viscosity_fn; l->is.viscosity_user = here.is.viscosity_user;
+    }
+    for (i = 0; i < sim->boundary.body_count; i++, at += sizeof(gs4i_body)) {
+        gs4i_body b = sim->boundary.bodies[i];
+        gs4i_body *to = &sim->boundary.bodies[i];
+        memcpy(to, at, sizeof b);
+        to->is.shape = b.is.shape; to->field = b.field;
+    }
+    for (i = 0; i < sim->emitter_count; i++, at += sizeof(gs4i_emitter)) {
+        gs4_shape shape = sim->emitters[i].is.shape;
+        memcpy(&sim->emitters[i], at, sizeof(gs4i_emitter));
+        sim->emitters[i].is.shape = shape;
+    }
+}
+
+/* Occupied blocks must be ascending, inside the domain and cover the particles in order. */
+static int gs4i_blocks_are_sound(const gs4_sim *sim, const gs4i_head *h, const uint32_t *block, const int32_t *first)
+{
+    int i, a, at[3];
+    if (h->occupied == 0) return h->unsorted || h->particles == 0;
+    if (first[0] != 0 || (h->unsorted ? first[h->occupied] < 0 : first[h->occupied] != h->particles)) return 0;
+    for (i = 0; i < h->occupied; i++) {
+        if (first[i] > first[i + 1] || block[i] >= sim->grid.table_count || (i && block[i] <= block[i - 1])) return 0;
+        gs4i_block_coordinates(&sim->grid, block[i], at);
+        for (a = 0; a < 3; a++) if (at[a] < 1 || at[a] > sim->grid.blocks[a] - 2) return 0;
+    }
+    return 1;
+}
+
+static int gs4i_restore(gs4_sim *sim, const unsigned char *data, size_t size)
+{
+    gs4i_head h;
+    gs4i_array a[GS4I_ARRAYS];
+    uint64_t hash = 0, stored;
+    size_t scene, particle = 0, need;
+    const unsigned char *at = data + sizeof h;
+    int k;
+    if (size < sizeof h + sizeof hash) return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint is cut off, or no checkpoint at all");
+    memcpy(&h, data, sizeof h);
+    GS4I_TRY(gs4i_check_head(sim, &h));
+    gs4i_particle_arrays(&sim->particles, a);
+    for (k = 0; k < GS4I_ARRAYS - 1; k++) if (a[k].wanted) particle += a[k].size;
+    scene = (size_t)h.materials * sizeof(gs4i_law) + (size_t)h.bodies * sizeof(gs4i_body) + (size_t)h.emitters * sizeof(gs4i_emitter);
+    need = sizeof h + scene + (size_t)h.particles * particle + (size_t)h.occupied * 8 + 4
+         + (sim->particles.with_rates ? (size_t)h.active * GS4I_NODE_REALS * sizeof(gs4_real) : 0) + sizeof hash;
+    if (need != size) return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint is cut off or has something behind its end");
+    memcpy(&stored, data + size - sizeof stored, sizeof stored);
+    /* the hash runs over the same pieces as when it was saved */
+    {
+        const unsigned char *p = data;
+        size_t piece[16];
+        int n = 0;
+        piece[n++] = sizeof h;
+        piece[n++] = (size_t)h.materials * sizeof(gs4i_law);
+        piece[n++] = (size_t)h.bodies * sizeof(gs4i_body); piece[n++] = (size_t)h.emitters * sizeof(gs4i_emitter);
+        for (k = 0; k < GS4I_ARRAYS - 1; k++) if (a[k].wanted) piece[n++] = (size_t)h.particles * a[k].size;
+        piece[n++] = (size_t)h.occupied * 4; piece[n++] = (size_t)h.occupied * 4 + 4;
+        if (sim->particles.with_rates) piece[n++] = (size_t)h.active * GS4I_NODE_REALS * sizeof(gs4_real);
+        for (k = 0; k < n; p += piece[k++]) hash = gs4i_hash_bytes(hash, p, piece[k]);
+    }
+    if (hash != stored) return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint is damaged: its contents do not match their checksum");
+    if (sim->desc.max_particles && h.particles > sim->desc.max_particles)
+        return gs4i_fail(sim, GS4_ERROR_ARGUMENT, "the checkpoint holds more particles than max_particles");
+    /* all memory first, then nothing can fail */
+    if (gs4i_particles_reserve(&sim->memory, &sim->particles, h.particles) != GS4_OK) return gs4i_fail_memory(sim);
+    gs4i_particle_arrays(&sim->particles, a);
+    {
+        int result;
+        uint32_t *blocks = (uint32_t *)gs4i_alloc(&sim->memory, (size_t)h.occupied + 1, sizeof *blocks);
+        int32_t *firsts = (int32_t *)gs4i_alloc(&sim->memory, (size_t)h.occupied + 1, sizeof *firsts);
+        if (!blocks || !firsts) result = gs4i_fail_memory(sim);
+        else {
+            const unsigned char *from = at + scene + (size_t)h.particles * particle;
+            memcpy(blocks, from, (size_t)h.occupied * 4); memcpy(firsts, from + (size_t)h.occupied * 4, (size_t)h.occupied * 4 + 4);
+            if (!gs4i_blocks_are_sound(sim, &h, blocks, firsts)) result = gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint is damaged: its blocks are out of order");
+            else if (gs4i_grid_occupy(&sim->memory, &sim->grid, blocks, h.occupied, sim->particles.with_rates) != GS4_OK) result = gs4i_fail_memory(sim);
+            else {
+                memcpy(sim->grid.first, firsts, (size_t)h.occupied * 4 + 4);
+                result = gs4i_after_occupy(sim);
+            }
+        }
+        gs4i_free(&sim->memory, blocks, (size_t)h.occupied + 1, sizeof *blocks);
+        gs4i_free(&sim->memory, firsts, (size_t)h.occupied + 1, sizeof *firsts);
+        if (result != GS4_OK) { sim->unsorted = 1; return result; }
+    }
+    gs4i_restore_scene(sim, at);
+    at += scene;
+    for (k = 0; k < GS4I_ARRAYS - 1; k++)
+        if (a[k].wanted) { memcpy(*a[k].data, at, (size_t)h.particles * a[k].size); at += (size_t)h.particles * a[k].size; }
+    at += (size_t)h.occupied * 8 + 4;
+    if (sim->grid.memory && h.active == sim->grid.active) memcpy(sim->grid.memory, at, (size_t)h.active * GS4I_NODE_REALS * sizeof(gs4_real));
+    sim->particles.count = h.particles;
+    sim->time = h.time; sim->last_dt = h.last_dt; sim->steps = h.steps;
+    sim->next_id = h.next_id; sim->afresh = h.afresh; sim->unsorted = h.unsorted; sim->unseen = h.unseen;
+    sim->min_mass = GS4I_C(h.min_mass); sim->fastest = GS4I_C(h.fastest);
+    sim->worst = h.worst;
+    return GS4_OK;
+}
+
+static int gs4i_load(gs4_sim *sim, const char *path)
+{
+    unsigned char *data = NULL;
+    size_t size = 0, capacity = 0;
+    int result = gs4i_read_all(sim, path, &data, &size, &capacity);
+    if (result == GS4_OK) result = gs4i_restore(sim, data, size);
+    gs4i_free(&sim->memory, data, capacity, 1);
+    return result;
+}
+
+/* ==== [[public]] every value checked, then the work ================================================= */
+
+/* --- rules ------------------------------------------------------------------------------------------- */
+
+typedef enum gs4i_must { GS4I_FINITE, GS4I_POSITIVE, GS4I_NOT_NEGATIVE, GS4I_FRACTION, GS4I_ZERO } gs4i_must;
+
+/* One value against one rule; the sentence names the field, its value and what would do. */
+static int gs4i_check(gs4_sim *sim, const char *field, gs4_real value, gs4i_must must)
+{
+    static const char *const accepted[] = { "a finite number", "a finite number above 0", "0 or a finite number above",
+                                            "a number from 0 to 1", "0: it belongs to a part of the model that this version does not have" };
+    const int sane = gs4i_finite(value) && value < GS4I_HUGE && value > -GS4I_HUGE;
+    int good = 0;
+    char line[320];
+    gs4i_text t;
+    switch (must) {
+    case GS4I_FINITE:       good = sane; break;
+    case GS4I_POSITIVE:     good = sane && value > 0 && value > 1 / GS4I_HUGE; break;
+    case GS4I_NOT_NEGATIVE: good = sane && value >= 0; break;
+    case GS4I_FRACTION:     good = sane && value >= 0 && value <= 1; break;
+    case GS4I_ZERO:         good = value == 0; break;
+    }
+    if (good) return GS4_OK;
+    t.at = line; t.left = sizeof line;
+    gs4i_put(&t, field); gs4i_put(&t, " is "); gs4i_put_real(&t, (double)value);
+    gs4i_put(&t, "; it must be "); gs4i_put(&t, accepted[must]);
+    if (gs4i_finite(value) && !sane) gs4i_put(&t, " that is not absurdly large");
+    return gs4i_fail(sim, GS4_ERROR_ARGUMENT, line);
+}
+
+static int gs4i_check3(gs4_sim *sim, const char *field, gs4_vec3 v)
+{
+    GS4I_TRY(gs4i_check(sim, field, v.x, GS4I_FINITE));
+    GS4I_TRY(gs4i_check(sim, field, v.y, GS4I_FINITE));
+    return gs4i_check(sim, field, v.z, GS4I_FINITE);
+}
+
+/* A field that this version has no use for: rejected, never ignored. */
+static int gs4i_check_absent(gs4_sim *sim, const char *field, gs4_real value, const char *why)
+{
+    char line[320];
+    gs4i_text t;
+    if (value == 0) return GS4_OK;
+    t.at = line; t.left = sizeof line;
+    gs4i_put(&t, field); gs4i_put(&t, " is "); gs4i_put_real(&t, (double)value); gs4i_put(&t, "; "); gs4i_put(&t, why);
+    return gs4i_fail(sim, GS4_ERROR_ARGUMENT, line);
+}
+
+#define GS4I_NO_HEAT "this version has no heat, leave it 0"
+
+static int gs4i_bad_argument(gs4_sim *sim, const char *what) { return gs4i_fail(sim, GS4_ERROR_ARGUMENT, what); }
+
+static int gs4i_check_id(gs4_sim *sim, const char *what, int id, int count)
+{
+    char line[160];
+    gs4i_text t;
+    if (id >= 0 && id < count) return GS4_OK;
+    t.at = line; t.left = sizeof line;
+    gs4i_put(&t, what); gs4i_put(&t, " "); gs4i_put_integer(&t, id);
+    gs4i_put(&t, " does not exist; there are "); gs4i_put_integer(&t, count); gs4i_put(&t, ", numbered from 0");
+    return gs4i_bad_argument(sim, line);
+}
+
+/* Fields, degeneracy, direction, closedness; normalises the normal of a plane. `open` allows a plane. */
+static int gs4i_check_shape(gs4_sim *sim, gs4_shape *s)
+{
+    int fault;
+    switch (s->kind) {
+    case GS4_SHAPE_BOX: case GS4_SHAPE_SDF:
+        GS4I_TRY(gs4i_check3(sim, "shape low corner", s->a)); GS4I_TRY(gs4i_check3(sim, "shape high corner", s->b));
+        if (!(s->a.x < s->b.x && s->a.y < s->b.y && s->a.z < s->b.z))
+            return gs4i_bad_argument(sim, "shape: each coordinate of the low corner must be below that of the high corner");
+        if (s->kind == GS4_SHAPE_SDF && !s->distance) return gs4i_bad_argument(sim, "shape: the distance function is missing");
+        return GS4_OK;
+    case GS4_SHAPE_SPHERE:
+        GS4I_TRY(gs4i_check3(sim, "shape centre", s->a));
+        return gs4i_check(sim, "shape radius", s->radius, GS4I_POSITIVE);
+    case GS4_SHAPE_CYLINDER:
+        GS4I_TRY(gs4i_check3(sim, "shape end a", s->a)); GS4I_TRY(gs4i_check3(sim, "shape end b", s->b));
+        if (!(gs4i_length(gs4i_sub(s->b, s->a)) > 0)) return gs4i_bad_argument(sim, "shape: the ends of the cylinder coincide");
+        return gs4i_check(sim, "shape radius", s->radius, GS4I_POSITIVE);
+    case GS4_SHAPE_PLANE: {
+        gs4_real n;
+        GS4I_TRY(gs4i_check3(sim, "shape point", s->a)); GS4I_TRY(gs4i_check3(sim, "shape normal", s->b));
+        n = gs4i_length(s->b);
+        if (!(n > 0 && gs4i_finite(n))) return gs4i_bad_argument(sim, "shape: the normal of the plane has no length");
+        s->b = gs4i_scale(s->b, 1 / n);
+        return GS4_OK;
+    }
+    case GS4_SHAPE_MESH:
+        if (!s->vertices || !s->triangles || s->vertex_count < 4 || s->triangle_count < 4)
+            return gs4i_bad_argument(sim, "shape: a mesh needs vertices and triangles, at least four of each");
+        fault = gs4i_mesh_check(&sim->memory, s);
+        if (fault == GS4_ERROR_MEMORY) return gs4i_fail_memory(sim);
+        if (fault) {
+            char line[200];
+            gs4i_text t;
+            t.at = line; t.left = sizeof line;
+            gs4i_put(&t, "shape: the mesh "); gs4i_put(&t, gs4i_mesh_faults[fault]);
+            return gs4i_bad_argument(sim, line);
+        }
+        return GS4_OK;
+    case GS4_SHAPE_NONE: break;
+    }
+    return gs4i_bad_argument(sim, "shape is empty: make it with gs4_box, gs4_sphere, gs4_cylinder, gs4_plane, gs4_sdf or gs4_mesh");
+}
+
+static int gs4i_check_numerics(gs4_sim *sim, gs4_sim_desc *d)
+{
+    if (d->scheme != GS4_EXPLICIT) return gs4i_bad_argument(sim, "scheme: this version has the explicit scheme only; use GS4_EXPLICIT");
+    if (d->integrator == GS4_INTEGRATOR_BACKWARD_EULER)
+        return gs4i_bad_argument(sim, "integrator: backward Euler belongs to the implicit schemes; use GS4_INTEGRATOR_GS4 or GS4_INTEGRATOR_SYMPLECTIC_EULER");
+    if (d->integrator != GS4_INTEGRATOR_GS4 && d->integrator != GS4_INTEGRATOR_SYMPLECTIC_EULER)
+        return gs4i_check_absent(sim, "integrator", GS4I_C((int)d->integrator), "it is none of gs4_integrator");
+    GS4I_TRY(gs4i_check(sim, "rho_inf", d->rho_inf, GS4I_FRACTION));
+    GS4I_TRY(gs4i_check(sim, "rho_inf_spurious", d->rho_inf_spurious, GS4I_FRACTION));
+    if (d->rho_inf_spurious > d->rho_inf)
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "rho_inf_spurious is ", (double)d->rho_inf_spurious, "; it must not be above rho_inf");
+    if (d->rho_inf * d->rho_inf_spurious > GS4I_C(0.98))
+        return gs4i_bad_argument(sim, "rho_inf_spurious: with both rho near 1 (Crank-Nicolson) the explicit scheme has no stable step; rho_inf * rho_inf_spurious must not be above 0.98");
+    if (d->integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER) {
+        GS4I_TRY(gs4i_check_absent(sim, "rho_inf", d->rho_inf, "symplectic Euler has no such parameter, leave it 0"));
+        GS4I_TRY(gs4i_check_absent(sim, "flip_decay_time", d->flip_decay_time, "symplectic Euler carries an affine velocity that the grid sees whole (APIC), leave it 0"));
+    } else {
+        if (!(d->flip_decay_time >= 0))                     /* infinity is welcome */
+            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "flip_decay_time is ", (double)d->flip_decay_time, "; it must be 0 or above, INFINITY for pure FLIP");
+        if (d->flip_decay_time == 0) d->flip_decay_time = GS4I_C(0.1);
+    }
+    GS4I_TRY(gs4i_check(sim, "cfl", d->cfl, GS4I_FRACTION));
+    GS4I_TRY(gs4i_check(sim, "max_dt", d->max_dt, GS4I_NOT_NEGATIVE));
+    GS4I_TRY(gs4i_check(sim, "solver_tolerance", d->solver_tolerance, GS4I_FRACTION));
+    if (d->solver_max_iterations < 0) return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "solver_max_iterations is ", d->solver_max_iterations, "; it must be 0 or above");
+    if (d->cfl == 0) d->cfl = GS4I_C(0.5);
+    if (d->solver_tolerance == 0) d->solver_tolerance = sizeof(gs4_real) == 8 ? GS4I_C(1e-6) : GS4I_C(1e-4);
+    if (d->solver_max_iterations == 0) d->solver_max_iterations = 200;
+    return GS4_OK;
+}
+
+static int gs4i_check_walls(gs4_sim *sim, const gs4_sim_desc *d)
+{
+    int w;
+    for (w = 0; w < 6; w++) {
+        if ((int)d->walls[w] < 0 || d->walls[w] > GS4_WALL_PERIODIC) return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "walls[] holds ", (int)d->walls[w], ", which is none of gs4_wall");
+        if ((d->walls[w] == GS4_WALL_PERIODIC) != (d->walls[w ^ 1] == GS4_WALL_PERIODIC))
+            return gs4i_bad_argument(sim, "walls: both walls of an axis must be GS4_WALL_PERIODIC, or neither");
+        GS4I_TRY(gs4i_check_absent(sim, "wall_temperature", d->wall_temperature[w], GS4I_NO_HEAT));
+        GS4I_TRY(gs4i_check_absent(sim, "wall_is_isothermal", GS4I_C(d->wall_is_isothermal[w]), GS4I_NO_HEAT));
+    }
+    GS4I_TRY(gs4i_check_absent(sim, "ambient_temperature", d->ambient_temperature, GS4I_NO_HEAT));
+    return gs4i_check_absent(sim, "air_is_isothermal", GS4I_C(d->air_is_isothermal), GS4I_NO_HEAT);
+}
+
+/* All of a description; fills in the defaults. */
+static int gs4i_check_desc(gs4_sim *sim, gs4_sim_desc *d)
+{
+    static const char *const cells[3] = { "cells[0] is ", "cells[1] is ", "cells[2] is " };
+    double blocks = 1, origin[3];
+    int a;
+    for (a = 0; a < 3; a++) {
+        if (d->cells[a] < 4 || d->cells[a] > 1 << 22)
+            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, cells[a], d->cells[a], "; it must be from 4 to 4194304");
+        blocks *= (d->cells[a] + 3) / 4 + 2;
+    }
+    if (blocks > 1e9) return gs4i_bad_argument(sim, "cells: more than 2^36 cells in all");
+    GS4I_TRY(gs4i_check(sim, "cell_size", d->cell_size, GS4I_POSITIVE));
+    if (d->cell_size < GS4I_C(1e-9) || d->cell_size > GS4I_C(1e9))
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "cell_size is ", (double)d->cell_size, "; it must be from 1e-9 to 1e9");
+    GS4I_TRY(gs4i_check3(sim, "origin", d->origin));
+    gs4i_to_double(d->origin, origin);
+    for (a = 0; a < 3; a++)
+        if (fabs(origin[a]) > 1e-2 * (double)d->cell_size / (double)GS4I_EPSILON)
+            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "origin has the coordinate ", origin[a], ": so far out that positions could not tell a hundredth of a cell; move the scene to the origin, or define GS4_DOUBLE");
+    GS4I_TRY(gs4i_check3(sim, "gravity", d->gravity));
+    GS4I_TRY(gs4i_check_numerics(sim, d));
+    GS4I_TRY(gs4i_check_walls(sim, d));
+    if (d->max_particles < 0 || d->max_particles > GS4I_MAX_PARTICLES)
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "max_particles is ", d->max_particles, "; it must be 0 (grows as needed) or up to 1073741808");
+    if (d->threads < 0 || d->threads > 1024) return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "threads is ", d->threads, "; it must be from 0 to 1024");
+#ifndef GS4_PTHREADS
+    if (d->threads > 1 && !d->parallel_for)
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "threads is ", d->threads, "; more than 1 needs GS4_PTHREADS defined with the implementation, or parallel_for");
+#endif
+    if (!d->allocator.alloc_fn != !d->allocator.free_fn) return gs4i_bad_argument(sim, "allocator: both functions or neither");
+    if (d->threads == 0) d->threads = 1;
+    return GS4_OK;
+}
+
+static int gs4i_check_material(gs4_sim *sim, const gs4_material *m)
+{
+    GS4I_TRY(gs4i_check(sim, "density", m->density, GS4I_POSITIVE));
+    if (m->liquid != GS4_NEWTONIAN) return gs4i_bad_argument(sim, "liquid: this version has GS4_NEWTONIAN only; viscoelastic liquids are to come");
+    if (m->solid != GS4_NO_SOLID) return gs4i_bad_argument(sim, "solid: this version has liquids only; use GS4_NO_SOLID");
+    GS4I_TRY(gs4i_check(sim, "viscosity", m->viscosity, GS4I_NOT_NEGATIVE));
+    GS4I_TRY(gs4i_check(sim, "local_fraction", m->local_fraction, GS4I_FRACTION));
+    GS4I_TRY(gs4i_check_absent(sim, "relaxation_time", m->relaxation_time, "a Newtonian liquid has none, leave it 0"));
+    GS4I_TRY(gs4i_check_absent(sim, "stretch_time", m->stretch_time, "a Newtonian liquid has none, leave it 0"));
+    GS4I_TRY(gs4i_check_absent(sim, "anisotropy", m->anisotropy, "a Newtonian liquid has none, leave it 0"));
+    GS4I_TRY(gs4i_check_absent(sim, "arms", m->arms, "a Newtonian liquid has none, leave it 0"));
+    if (m->viscosity_law == GS4_VISCOSITY_CROSS_WLF)
+        return gs4i_bad_argument(sim, "viscosity_law: Cross-WLF is to come with heat; use GS4_VISCOSITY_CONSTANT or GS4_VISCOSITY_CALLBACK");
+    if (m->viscosity_law == GS4_VISCOSITY_CALLBACK && !m->viscosity_fn) return gs4i_bad_argument(sim, "viscosity_fn is missing; GS4_VISCOSITY_CALLBACK needs it");
+    if (m->viscosity_law != GS4_VISCOSITY_CONSTANT && m->viscosity_law != GS4_VISCOSITY_CALLBACK)
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "viscosity_law is ", (int)m->viscosity_law, ", which is none of gs4_viscosity_law");
+    GS4I_TRY(gs4i_check(sim, "bulk_modulus", m->bulk_modulus, GS4I_NOT_NEGATIVE));
+    GS4I_TRY(gs4i_check(sim, "sound_speed", m->sound_speed, GS4I_NOT_NEGATIVE));
+    if (m->bulk_modulus > 0 && m->sound_speed > 0) {
+        const double k = (double)m->density * (double)m->sound_speed * (double)m->sound_speed;
+        if (fabs(k - (double)m->bulk_modulus) > 1e-3 * k)
+            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "bulk_modulus is ", (double)m->bulk_modulus, ", which is not density * sound_speed^2; give one of the two");
+    }
+    GS4I_TRY(gs4i_check_absent(sim, "incompressible", GS4I_C(m->incompressible), "the explicit scheme is weakly compressible, leave it 0"));
+    GS4I_TRY(gs4i_check_absent(sim, "shear_modulus", m->shear_modulus, "this version has no solids, leave it 0"));
+    GS4I_TRY(gs4i_check_absent(sim, "yield_compression", m->yield_compression, "this version has no solids, leave it 0"));
+    GS4I_TRY(gs4i_check_absent(sim, "yield_stretch", m->yield_stretch, "this version has no solids, leave it 0"));
+    GS4I_TRY(gs4i_check_absent(sim, "heat_capacity", m->heat_capacity, GS4I_NO_HEAT));
+    GS4I_TRY(gs4i_check_absent(sim, "conductivity", m->conductivity, GS4I_NO_HEAT));
+    GS4I_TRY(gs4i_check_absent(sim, "flux_relaxation_time", m->flux_relaxation_time, GS4I_NO_HEAT));
+    GS4I_TRY(gs4i_check_absent(sim, "fourier_fraction", m->fourier_fraction, GS4I_NO_HEAT));
+    GS4I_TRY(gs4i_check_absent(sim, "melting_temperature", m->melting_temperature, GS4I_NO_HEAT));
+    GS4I_TRY(gs4i_check_absent(sim, "latent_heat", m->latent_heat, GS4I_NO_HEAT));
+    GS4I_TRY(gs4i_check_absent(sim, "can_melt", GS4I_C(m->can_melt), GS4I_NO_HEAT));
+    return gs4i_check_absent(sim, "viscous_heating", GS4I_C(m->viscous_heating), GS4I_NO_HEAT);
+}
+
+static int gs4i_check_fill(gs4_sim *sim, gs4_fill *f)
+{
+    GS4I_TRY(gs4i_check_id(sim, "fill.material", f->material, sim->material_count));
+    GS4I_TRY(gs4i_check(sim, "fill.spacing", f->spacing, GS4I_NOT_NEGATIVE));
+    if (f->spacing == 0) f->spacing = GS4I_C(0.5) * sim->grid.h;
+    if (f->spacing > sim->grid.h) return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "fill.spacing is ", (double)f->spacing, "; above one cell there would be holes in the material");
+    if (f->spacing < GS4I_C(0.02) * sim->grid.h) return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "fill.spacing is ", (double)f->spacing, "; below a fiftieth of a cell it is absurdly small");
+    GS4I_TRY(gs4i_check3(sim, "fill.velocity", f->velocity));
+    GS4I_TRY(gs4i_check3(sim, "fill.angular_velocity", f->angular_velocity));
+    GS4I_TRY(gs4i_check_absent(sim, "fill.temperature", f->temperature, GS4I_NO_HEAT));
+    return gs4i_check(sim, "fill.jitter", f->jitter, GS4I_FRACTION);
+}
+
+/* --- sound speed where none is given ------------------------------------------------------------------ */
+
+/* Ten times the fastest that anything here moves, falls or flows down: compression goes as the Mach number squared. */
+static void gs4i_set_laws(gs4_sim *sim)
+{
+    const gs4_sim_desc *d = &sim->desc;
+    const double size = (double)d->cell_size;
+    double fall = fabs((double)d->gravity.x) * d->cells[0] * size + fabs((double)d->gravity.y) * d->cells[1] * size
+                + fabs((double)d->gravity.z) * d->cells[2] * size;
+    double speed = sqrt(2 * fall + (double)sim->fastest * (double)sim->fastest);
+    int i;
+    if (speed <= 0) speed = size;                           /* nothing moves so far: a cell a second is as good as any */
+    for (i = 0; i < sim->material_count; i++) {
+        gs4i_law *l = &sim->laws[i];
+        const gs4_material *m = &l->is;
+        double c0 = m->sound_speed > 0 ? (double)m->sound_speed : m->bulk_modulus > 0 ? sqrt((double)m->bulk_modulus / (double)m->density) : 10 * speed;
+        l->density = m->density; l->inv_density = 1 / m->density;
+        l->sound_speed = GS4I_C(c0);
+        l->tait = GS4I_C((double)m->density * c0 * c0 / 7);
+        l->viscosity = m->viscosity;
+        l->viscosity_fn = m->viscosity_law == GS4_VISCOSITY_CALLBACK ? m->viscosity_fn : NULL;
+        l->viscosity_user = m->viscosity_user;
+    }
+    sim->unseen = 1;
+}
+
+static void gs4i_note_speed(gs4_sim *sim, gs4_real speed)
+{
+    if (speed > sim->fastest) { sim->fastest = speed; gs4i_set_laws(sim); }
+}
+
+/* --- life ------------------------------------------------------------------------------------------------ */
+
+#if defined(__cplusplus)
+#define GS4I_THREAD_LOCAL thread_local
+#elif defined(__TINYC__)
+#define GS4I_THREAD_LOCAL
+#elif defined(__GNUC__)
+#define GS4I_THREAD_LOCAL __thread
+#elif defined(_MSC_VER)
+#define GS4I_THREAD_LOCAL __declspec(thread)
+#elif defined(__STDC_VERSION__) && __STDC_VERSION__ >= 201112L
+#define GS4I_THREAD_LOCAL _Thread_local
+#else
+#define GS4I_THREAD_LOCAL
+#endif
+/* The one thing outside of simulations: why the last gs4_create of this thread failed. */
+static GS4I_THREAD_LOCAL char gs4i_create_error[320];
+
+static int gs4i_init(gs4_sim *sim)
+{
+    gs4i_grid *g = &sim->grid;
+    const gs4_sim_desc *d = &sim->desc;
+    int a;
+    g->table_count = 1;
+    for (a = 0; a < 3; a++) {
+        g->cells[a] = d->cells[a];
+        g->blocks[a] = (d->cells[a] + 3) / 4 + 2;
+        g->periodic[a] = d->walls[2 * a] == GS4_WALL_PERIODIC;
+        g->table_count *= (size_t)g->blocks[a];
+    }
+    g->h = d->cell_size; g->inv_h = 1 / d->cell_size; g->origin = d->origin;
+    sim->boundary.h = g->h;
+    memcpy(sim->boundary.walls, d->walls, sizeof d->walls);
+    sim->particles.with_rates = d->integrator == GS4_INTEGRATOR_GS4;
+    sim->afresh = sim->unsorted = sim->unseen = 1;
+    sim->tasks.parallel_for = d->parallel_for; sim->tasks.user = d->parallel_user;
+    g->table = (int32_t *)gs4i_alloc(&sim->memory, g->table_count, sizeof *g->table);
+    if (!g->table) { g->table_count = 0; return gs4i_fail_memory(sim); }
+    if (gs4i_grid_reserve_occupied(&sim->memory, g, 1) != GS4_OK) return gs4i_fail_memory(sim);
+    if (d->max_particles && gs4i_particles_reserve(&sim->memory, &sim->particles, d->max_particles) != GS4_OK) return gs4i_fail_memory(sim);
+#ifdef GS4_PTHREADS
+    if (d->threads > 1 && !d->parallel_for) {
+        sim->tasks.pool = gs4i_pool_create(&sim->memory, d->threads - 1);
+        if (!sim->tasks.pool) return gs4i_fail(sim, GS4_ERROR_MEMORY, "the threads could not be started");
+    }
+#endif
+    return GS4_OK;
+}
+
+GS4_API int gs4_create(const gs4_sim_desc *desc, gs4_sim **out)
+{
+    gs4_sim fake, *sim;
+    int result;
+    memset(&fake, 0, sizeof fake);                          /* somewhere to put the sentence */
+    if (out) *out = NULL;
+    if (!desc || !out) result = gs4i_bad_argument(&fake, "gs4_create needs a description and a place for the simulation");
+    else {
+        fake.desc = *desc;
+        result = gs4i_check_desc(&fake, &fake.desc);
+    }
+    if (result == GS4_OK) {
+        fake.memory.hook = fake.desc.allocator;
+        if (!fake.memory.hook.alloc_fn) { fake.memory.hook.alloc_fn = gs4i_default_alloc; fake.memory.hook.free_fn = gs4i_default_free; }
+        sim = (gs4_sim *)gs4i_alloc(&fake.memory, 1, sizeof *sim);
+        if (!sim) result = gs4i_fail_memory(&fake);
+        else {
+            *sim = fake;
+            result = gs4i_init(sim);
+            if (result == GS4_OK) { *out = sim; return GS4_OK; }
+            memcpy(fake.error, sim->error, sizeof fake.error);
+            gs4_destroy(sim);
+        }
+    }
+    memcpy(gs4i_create_error, fake.error, sizeof gs4i_create_error);
+    return result;
+}
+
+GS4_API void gs4_destroy(gs4_sim *sim)
+{
+    gs4i_memory memory;
+    int i;
+    if (!sim) return;
+#ifdef GS4_PTHREADS
+    gs4i_pool_destroy(&sim->memory, sim->tasks.pool, sim->desc.threads - 1);
+#endif
+    gs4i_particles_free(&sim->memory, &sim->particles);
+    gs4i_grid_free(&sim->memory, &sim->grid);
+    for (i = 0; i < sim->boundary.body_count; i++) gs4i_field_free(&sim->memory, &sim->boundary.bodies[i].field);
+    for (i = 0; i < 6; i++) gs4i_free(&sim->memory, sim->boundary.images[i], (size_t)sim->boundary.image_capacity[i], sizeof(gs4i_image));
+    gs4i_free(&sim->memory, sim->boundary.bodies, (size_t)sim->boundary.body_capacity, sizeof(gs4i_body));
+    gs4i_free(&sim->memory, sim->laws, (size_t)sim->material_capacity, sizeof(gs4i_law));
+    gs4i_free(&sim->memory, sim->emitters, (size_t)sim->emitter_capacity, sizeof(gs4i_emitter));
+    gs4i_free(&sim->memory, sim->reports, (size_t)sim->report_capacity, sizeof(gs4i_report));
+    gs4i_free(&sim->memory, sim->node_reports, (size_t)sim->node_report_capacity, sizeof(gs4i_node_report));
+    memory = sim->memory;
+    gs4i_free(&memory, sim, 1, sizeof *sim);
+}
+
+GS4_API const char *gs4_last_error(const gs4_sim *sim) { return sim ? sim->error : gs4i_create_error; }
+
+GS4_API gs4_sim_desc gs4_get_desc(const gs4_sim *sim)
+{
+    gs4_sim_desc none;
+    memset(&none, 0, sizeof none);
+    return sim ? sim->desc : none;
+}
+
+GS4_API int gs4_version(void) { return GS4_VERSION; }
+GS4_API int gs4_real_size(void) { return (int)sizeof(gs4_real); }
+
+GS4_API const char *gs4_result_string(int result)
+{
+    switch (result) {
+    case GS4_OK:                  return "success";
+    case GS4_ERROR_ARGUMENT:      return "a value is out of its range";
+    case GS4_ERROR_MEMORY:        return "out of memory";
+    case GS4_ERROR_IO:            return "a file could not be opened, read or written whole";
+    case GS4_ERROR_FORMAT:        return "a file is damaged or not what it should be";
+    case GS4_ERROR_UNSTABLE:      return "the step would not be stable and was not taken";
+    case GS4_ERROR_NOT_CONVERGED: return "a linear solve did not converge; the step was not taken";
+    case GS4_ERROR_ABI:           return "header and implementation were compiled with different settings";
+    default:                      return result > 0 ? "success" : "unknown result";
+    }
+}
+
+/* --- shapes ----------------------------------------------------------------------------------------------- */
+
+static gs4_shape gs4i_shape(gs4_shape_kind kind, gs4_vec3 a, gs4_vec3 b, gs4_real radius)
+{
+    gs4_shape s;
+    memset(&s, 0, sizeof s);
+    s.kind = kind; s.a = a; s.b = b; s.radius = radius;
+    return s;
+}
+
+GS4_API gs4_shape gs4_box(gs4_vec3 low, gs4_vec3 high) { return gs4i_shape(GS4_SHAPE_BOX, low, high, 0); }
+GS4_API gs4_shape gs4_sphere(gs4_vec3 centre, gs4_real radius) { return gs4i_shape(GS4_SHAPE_SPHERE, centre, centre, radius); }
+GS4_API gs4_shape gs4_cylinder(gs4_vec3 a, gs4_vec3 b, gs4_real radius) { return gs4i_shape(GS4_SHAPE_CYLINDER, a, b, radius); }
+GS4_API gs4_shape gs4_plane(gs4_vec3 point, gs4_vec3 outward_normal) { return gs4i_shape(GS4_SHAPE_PLANE, point, outward_normal, 0); }
+
+GS4_API gs4_shape gs4_sdf(gs4_sdf_fn distance, void *user, gs4_vec3 low, gs4_vec3 high)
+{
+    gs4_shape s = gs4i_shape(GS4_SHAPE_SDF, low, high, 0);
+    s.distance = distance; s.user = user;
+    return s;
+}
+
+GS4_API gs4_shape gs4_mesh(const gs4_real *vertices_xyz, int vertex_count, const int *triangles, int triangle_count)
+{
+    gs4_shape s = gs4i_shape(GS4_SHAPE_MESH, gs4i_vec3(0, 0, 0), gs4i_vec3(0, 0, 0), 0);
+    s.vertices = vertices_xyz; s.vertex_count = vertex_count; s.triangles = triangles; s.triangle_count = triangle_count;
+    return s;
+}
+
+/* --- scene ------------------------------------------------------------------------------------------------- */
+
+/* Room for one more element of an array of the scene. */
+static int gs4i_grow(gs4_sim *sim, void **data, int count, int *capacity, size_t size)
+{
+    void *grown;
+    int wanted;
+    if (count < *capacity) return GS4_OK;
+    wanted = *capacity ? 2 * *capacity : 4;
+    grown = gs4i_alloc(&sim->memory, (size_t)wanted, size);
+    if (!grown) return gs4i_fail_memory(sim);
+    if (*data) memcpy(grown, *data, (size_t)count * size);
+    gs4i_free(&sim->memory, *data, (size_t)*capacity, size);
+    *data = grown; *capacity = wanted;
+    return GS4_OK;
+}
+
+GS4_API int gs4_add_material(gs4_sim *sim, const gs4_material *material)
+{
+    if (!sim) return GS4_ERROR_ARGUMENT;
+    if (!material) return gs4i_bad_argument(sim, "material is NULL");
+    GS4I_TRY(gs4i_check_material(sim, material));
+    if (sim->material_count == 256) return gs4i_bad_argument(sim, "there are 256 materials already, which is all there can be");
+    GS4I_TRY(gs4i_grow(sim, (void **)&sim->laws, sim->material_count, &sim->material_capacity, sizeof *sim->laws));
+    sim->laws[sim->material_count++].is = *material;
+    gs4i_set_laws(sim);
+    return sim->material_count - 1;
+}
+
+/* Room for n more particles. */
+static int gs4i_make_room(gs4_sim *sim, int64_t n)
+{
+    const int64_t wanted = sim->particles.count + n, limit = sim->desc.max_particles ? sim->desc.max_particles : GS4I_MAX_PARTICLES;
+    if (wanted > limit)
+        return gs4i_fail_value(sim, GS4_ERROR_MEMORY, "this needs room for ", (double)wanted, " particles, more than max_particles; nothing was added");
+    if ((uint64_t)sim->next_id + (uint64_t)n >= UINT32_MAX) return gs4i_fail(sim, GS4_ERROR_MEMORY, "all 2^32 particle ids are used up");
+    if (gs4i_particles_reserve(&sim->memory, &sim->particles, (int)wanted) != GS4_OK) return gs4i_fail_memory(sim);
+    return GS4_OK;
+}
+
+/* Give one particle to the scene: v = velocity + omega x (x - centre), C = omega x. */
+static void gs4i_fill_one(gs4_sim *sim, gs4_vec3 x, gs4_vec3 centre, const gs4_fill *f, gs4_real mass)
+{
+    const gs4_vec3 w = f->angular_velocity;
+    const gs4_real C[9] = { 0, w.z, -w.y, -w.z, 0, w.x, w.y, -w.x, 0 };
+    const size_t i = (size_t)sim->particles.count;
+    const gs4_vec3 v = gs4i_add(f->velocity, gs4i_cross(w, gs4i_sub(x, centre)));
+    if (!gs4i_add_one(sim, x, v, mass, f->material)) return;
+    memcpy(sim->particles.affine + 9 * i, C, sizeof C);
+    gs4i_note_speed(sim, gs4i_length(v));
+}
+
+/* Is there material already where new particles would go? A cell that the new ones fill by a good half must not be
+ * filled by as much before. `low` and `n` span the cells; -1: out of memory. */
+static int gs4i_overlaps(gs4_sim *sim, const int low[3], const int n[3], const gs4_real *points, int count, gs4_real volume)
+{
+    const gs4i_particles *p = &sim->particles;
+    const size_t cells = (size_t)n[0] * (size_t)n[1] * (size_t)n[2];
+    const gs4_real o[3] = { sim->grid.origin.x, sim->grid.origin.y, sim->grid.origin.z };
+    const gs4_real full = sim->grid.h * sim->grid.h * sim->grid.h;
+    gs4_real *filled;
+    size_t i;
+    int a, pass, overlap = 0;
+    if (p->count == 0) return 0;
+    filled = (gs4_real *)gs4i_alloc(&sim->memory, cells, 2 * sizeof *filled);
+    if (!filled) return -1;
+    for (pass = 0; pass < 2; pass++)
+        for (i = 0; i < (size_t)(pass ? count : p->count); i++) {
+            const gs4_real *x = pass ? points + 3 * i : p->position + 4 * i;
+            size_t at = 0;
+            for (a = 2; a >= 0; a--) {
+                const int c = (int)((x[a] - o[a]) * sim->grid.inv_h) - low[a];
+                if (c < 0 || c >= n[a]) break;
+                at = at * (size_t)n[a] + (size_t)c;
+            }
+            if (a >= 0) continue;
+            filled[2 * at + (size_t)pass] += pass ? volume : p->position[4 * i + 3] * sim->laws[p->material[i]].inv_density * p->velocity[4 * i + 3];
+        }
+    for (i = 0; i < cells; i++) overlap |= filled[2 * i] > GS4I_C(0.6) * full && filled[2 * i + 1] > GS4I_C(0.6) * full;
+    gs4i_free(&sim->memory, filled, cells, 2 * sizeof *filled);
+    return overlap;
+}
+
+/* Points of the lattice low + (i + 1/2) spacing that are inside the shape and the domain: counts them, and writes them
+ * where `out` is given. Lattices of all shapes are aligned with the cells. */
+static int64_t gs4i_lattice(const gs4_sim *sim, const gs4i_body *shape, const gs4_fill *f, const int64_t from[3], const int64_t to[3], gs4_real *out)
+{
+    const double s = (double)f->spacing;
+    double o[3];
+    int64_t i, j, k, n = 0;
+    gs4i_to_double(sim->grid.origin, o);
+    for (k = from[2]; k < to[2]; k++) for (j = from[1]; j < to[1]; j++) for (i = from[0]; i < to[0]; i++) {
+        const uint64_t number = ((uint64_t)k << 42) ^ ((uint64_t)j << 21) ^ (uint64_t)i;
+        gs4_vec3 x = gs4i_vec3(GS4I_C(o[0] + ((double)i + 0.5) * s), GS4I_C(o[1] + ((double)j + 0.5) * s), GS4I_C(o[2] + ((double)k + 0.5) * s));
+        if (!(gs4i_shape_or_field(shape, x) < 0)) continue;
+        if (f->jitter > 0) {
+            const gs4_real amount = f->jitter * f->spacing;
+            x = gs4i_add(x, gs4i_vec3(amount * gs4i_jitter(f->random_seed, number, 0), amount * gs4i_jitter(f->random_seed, number, 1),
+                                      amount * gs4i_jitter(f->random_seed, number, 2)));
+        }
+        if (!gs4i_inside_domain(&sim->grid, x)) continue;
+        if (out) { out[3 * n] = x.x; out[3 * n + 1] = x.y; out[3 * n + 2] = x.z; }
+        n++;
+    }
+    return n;
+}
+
+/* Box of a shape, cut to the domain: in lattice numbers of the given spacing, and in cells. 0 where nothing is left. */
+static int gs4i_clip_shape(const gs4_sim *sim, const gs4_shape *s, double spacing, int64_t from[3], int64_t to[3], int low[3], int n[3])
+{
+    gs4_vec3 lo = sim->grid.origin, hi = sim->grid.origin;
+    double l[3], h[3], o[3];
+    int a;
+    gs4i_shape_bounds(s, &lo, &hi);
+    gs4i_to_double(lo, l); gs4i_to_double(hi, h); gs4i_to_double(sim->grid.origin, o);
+    for (a = 0; a < 3; a++) {
+        const double size = sim->grid.cells[a] * (double)sim->grid.h;
+        if (s->kind == GS4_SHAPE_PLANE) { l[a] = o[a]; h[a] = o[a] + size; }
+        if (l[a] < o[a]) l[a] = o[a];
+        if (h[a] > o[a] + size) h[a] = o[a] + size;
+        if (l[a] >= h[a]) return 0;
+        from[a] = (int64_t)floor((l[a] - o[a]) / spacing); to[a] = (int64_t)ceil((h[a] - o[a]) / spacing);
+        low[a] = (int)((l[a] - o[a]) / (double)sim->grid.h) - 1;
+        n[a] = (int)((h[a] - o[a]) / (double)sim->grid.h) + 2 - low[a];
+    }
+    return 1;
+}
+
+/* A body for `shape` at rest, its distances sampled where it is a mesh. */
+static int gs4i_make_body(gs4_sim *sim, gs4i_body *b, const gs4_collider *is, double spacing)
+{
+    memset(b, 0, sizeof *b);
+    b->is = *is;
+    b->at[0] = (double)is->pivot.x; b->at[1] = (double)is->pivot.y; b->at[2] = (double)is->pivot.z;
+    b->turn[0] = 1;
+    gs4i_body_orient(b);
+    if (is->shape.kind == GS4_SHAPE_MESH && gs4i_field_create(&sim->memory, &b->field, &is->shape, spacing) != GS4_OK) return gs4i_fail_memory(sim);
+    return GS4_OK;
+}
+
+/* Points of the shape, checked for overlap, into a list that the caller frees. Returns how many, or an error. */
+static int64_t gs4i_collect_points(gs4_sim *sim, const gs4_shape *shape, const gs4_fill *f, gs4_real **points)
+{
+    gs4_collider as_body;
+    gs4i_body body;
+    int64_t from[3], to[3], n;
+    int low[3], cells[3], overlap;
+    if (!gs4i_clip_shape(sim, shape, (double)f->spacing, from, to, low, cells))
+        return gs4i_bad_argument(sim, "shape lies outside of the grid: nothing was added");
+    memset(&as_body, 0, sizeof as_body);
+    as_body.shape = *shape;
+    GS4I_TRY(gs4i_make_body(sim, &body, &as_body, (double)f->spacing));
+    n = gs4i_lattice(sim, &body, f, from, to, NULL);
+    if (n == 0) n = gs4i_bad_argument(sim, "shape holds no particle: it is thinner than fill.spacing, outside of the grid, or inside out");
+    else if (n > GS4I_MAX_PARTICLES) n = gs4i_fail(sim, GS4_ERROR_MEMORY, "shape holds more than 2^30 particles; a larger spacing would do");
+    else if (!(*points = (gs4_real *)gs4i_alloc(&sim->memory, (size_t)n, 3 * sizeof **points))) n = gs4i_fail_memory(sim);
+    else {
+        gs4i_lattice(sim, &body, f, from, to, *points);
+        overlap = gs4i_overlaps(sim, low, cells, *points, (int)n, f->spacing * f->spacing * f->spacing);
+        if (overlap) {
+            gs4i_free(&sim->memory, *points, (size_t)n, 3 * sizeof **points);
+            n = overlap < 0 ? gs4i_fail_memory(sim) : gs4i_bad_argument(sim, "shape overlaps material that is there already: nothing was added");
+        }
+    }
+    gs4i_field_free(&sim->memory, &body.field);
+    return n;
+}
+
+GS4_API int gs4_add_particles(gs4_sim *sim, gs4_shape shape, const gs4_fill *fill)
+{
+    gs4_fill f;
+    gs4_vec3 lo, hi, centre;
+    gs4_real *points = NULL, mass;
+    int64_t n, i;
+    int result;
+    if (!sim) return GS4_ERROR_ARGUMENT;
+    if (!fill) return gs4i_bad_argument(sim, "fill is NULL");
+    f = *fill;
+    GS4I_TRY(gs4i_check_fill(sim, &f));
+    GS4I_TRY(gs4i_check_shape(sim, &shape));
+    lo = hi = shape.a;
+    gs4i_shape_bounds(&shape, &lo, &hi);
+    centre = gs4i_scale(gs4i_add(lo, hi), GS4I_C(0.5));
+    n = gs4i_collect_points(sim, &shape, &f, &points);
+    if (n < 0) return (int)n;
+    mass = sim->laws[f.material].density * f.spacing * f.spacing * f.spacing;
+    result = mass > GS4I_TINY / GS4I_EPSILON ? gs4i_make_room(sim, n) : gs4i_bad_argument(sim, "a particle would be lighter than gs4_real can tell from nothing; use other units, or define GS4_DOUBLE");
+    for (i = 0; i < n && result == GS4_OK; i++) gs4i_fill_one(sim, gs4i_vec3(points[3 * i], points[3 * i + 1], points[3 * i + 2]), centre, &f, mass);
+    gs4i_free(&sim->memory, points, (size_t)n, 3 * sizeof *points);
+    if (result != GS4_OK) return result;
+    sim->afresh = sim->unsorted = sim->unseen = 1;
+    return (int)n;
+}
+
+GS4_API int gs4_add_points(gs4_sim *sim, const gs4_real *xyz, int count, gs4_real volume_each, const gs4_fill *fill)
+{
+    gs4_fill f;
+    gs4_vec3 centre = gs4i_vec3(0, 0, 0);
+    gs4_real mass;
+    int i, a;
+    if (!sim) return GS4_ERROR_ARGUMENT;
+    if (!fill || (!xyz && count > 0)) return gs4i_bad_argument(sim, "xyz or fill is NULL");
+    if (count < 0) return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "count is ", count, "; it must be 0 or above");
+    f = *fill;
+    GS4I_TRY(gs4i_check_fill(sim, &f));
+    GS4I_TRY(gs4i_check(sim, "volume_each", volume_each, GS4I_POSITIVE));
+    if (volume_each > 8 * sim->grid.h * sim->grid.h * sim->grid.h)
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "volume_each is ", (double)volume_each, "; above eight cells there would be holes in the material");
+    for (i = 0; i < count; i++) {
+        const gs4_real *x = xyz + 3 * (size_t)i;
+        for (a = 0; a < 3; a++) GS4I_TRY(gs4i_check(sim, "xyz", x[a], GS4I_FINITE));
+        if (!gs4i_inside_domain(&sim->grid, gs4i_vec3(x[0], x[1], x[2])))
+            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "point ", i, " lies outside of the grid: nothing was added");
+        centre = gs4i_add(centre, gs4i_scale(gs4i_vec3(x[0], x[1], x[2]), 1 / GS4I_C(count)));
+    }
+    mass = sim->laws[f.material].density * volume_each;
+    if (!(mass > GS4I_TINY / GS4I_EPSILON)) return gs4i_bad_argument(sim, "a particle would be lighter than gs4_real can tell from nothing; use other units, or define GS4_DOUBLE");
+    GS4I_TRY(gs4i_make_room(sim, count));
+    for (i = 0; i < count; i++) gs4i_fill_one(sim, gs4i_vec3(xyz[3 * (size_t)i], xyz[3 * (size_t)i + 1], xyz[3 * (size_t)i + 2]), centre, &f, mass);
+    if (count) sim->afresh = sim->unsorted = sim->unseen = 1;
+    return count;
+}
+
+static int gs4i_check_collider(gs4_sim *sim, gs4_collider *c)
+{
+    GS4I_TRY(gs4i_check_shape(sim, &c->shape));
+    if ((int)c->contact < 0 || c->contact > GS4_WALL_SEPARATE) return gs4i_bad_argument(sim, "contact of a collider must be stick, slip or separate");
+    GS4I_TRY(gs4i_check(sim, "friction", c->friction, GS4I_NOT_NEGATIVE));
+    if (c->friction > 0 && c->contact != GS4_WALL_SEPARATE) return gs4i_bad_argument(sim, "friction is for contact GS4_WALL_SEPARATE, leave it 0");
+    GS4I_TRY(gs4i_check3(sim, "velocity", c->velocity));
+    GS4I_TRY(gs4i_check3(sim, "angular_velocity", c->angular_velocity));
+    GS4I_TRY(gs4i_check3(sim, "pivot", c->pivot));
+    GS4I_TRY(gs4i_check_absent(sim, "temperature", c->temperature, GS4I_NO_HEAT));
+    return gs4i_check_absent(sim, "is_isothermal", GS4I_C(c->is_isothermal), GS4I_NO_HEAT);
+}
+
+GS4_API int gs4_add_collider(gs4_sim *sim, const gs4_collider *collider)
+{
+    gs4_collider c;
+    if (!sim) return GS4_ERROR_ARGUMENT;
+    if (!collider) return gs4i_bad_argument(sim, "collider is NULL");
+    c = *collider;
+    GS4I_TRY(gs4i_check_collider(sim, &c));
+    GS4I_TRY(gs4i_grow(sim, (void **)&sim->boundary.bodies, sim->boundary.body_count, &sim->boundary.body_capacity, sizeof *sim->boundary.bodies));
+    GS4I_TRY(gs4i_make_body(sim, &sim->boundary.bodies[sim->boundary.body_count], &c, 0.5 * (double)sim->grid.h));
+    gs4i_note_speed(sim, gs4i_length(c.velocity));
+    sim->unseen = 1;
+    return sim->boundary.body_count++;
+}
+
+GS4_API int gs4_move_collider(gs4_sim *sim, int collider, gs4_vec3 velocity, gs4_vec3 angular_velocity)
+{
+    if (!sim) return GS4_ERROR_ARGUMENT;
+    GS4I_TRY(gs4i_check_id(sim, "collider", collider, sim->boundary.body_count));
+    if (sim->boundary.bodies[collider].is_mouth) return gs4i_bad_argument(sim, "that id belongs to the mouth of an emitter, not to a collider");
+    GS4I_TRY(gs4i_check3(sim, "velocity", velocity));
+    GS4I_TRY(gs4i_check3(sim, "angular_velocity", angular_velocity));
+    sim->boundary.bodies[collider].is.velocity = velocity;
+    sim->boundary.bodies[collider].is.angular_velocity = angular_velocity;
+    gs4i_note_speed(sim, gs4i_length(velocity));
+    sim->unseen = 1;
+    return GS4_OK;
+}
+
+static int gs4i_check_emitter(gs4_sim *sim, gs4_emitter *e)
+{
+    GS4I_TRY(gs4i_check_shape(sim, &e->shape));
+    if (e->shape.kind == GS4_SHAPE_PLANE) return gs4i_bad_argument(sim, "shape: a plane has no volume to emit from");
+    GS4I_TRY(gs4i_check_fill(sim, &e->fill));
+    if (gs4i_length(e->fill.angular_velocity) > 0) return gs4i_bad_argument(sim, "fill.angular_velocity: a nozzle does not spin, leave it 0");
+    GS4I_TRY(gs4i_check3(sim, "travel", e->travel));
+    GS4I_TRY(gs4i_check(sim, "start", e->start, GS4I_NOT_NEGATIVE));
+    GS4I_TRY(gs4i_check(sim, "stop", e->stop, GS4I_NOT_NEGATIVE));
+    if (e->stop > 0 && e->stop <= e->start) return gs4i_bad_argument(sim, "stop must be later than start, or 0 for never");
+    return GS4_OK;
+}
+
+GS4_API int gs4_add_emitter(gs4_sim *sim, const gs4_emitter *emitter)
+{
+    gs4_emitter e;
+    gs4_collider mouth;
+    gs4i_body *body;
+    int64_t from[3], to[3];
+    int low[3], n[3];
+    if (!sim) return GS4_ERROR_ARGUMENT;
+    if (!emitter) return gs4i_bad_argument(sim, "emitter is NULL");
+    e = *emitter;
+    GS4I_TRY(gs4i_check_emitter(sim, &e));
+    if (!gs4i_clip_shape(sim, &e.shape, (double)e.fill.spacing, from, to, low, n)) return gs4i_bad_argument(sim, "shape lies outside of the grid");
+    memset(&mouth, 0, sizeof mouth);
+    mouth.shape = e.shape; mouth.velocity = e.travel;
+    GS4I_TRY(gs4i_grow(sim, (void **)&sim->emitters, sim->emitter_count, &sim->emitter_capacity, sizeof *sim->emitters));
+    GS4I_TRY(gs4i_grow(sim, (void **)&sim->boundary.bodies, sim->boundary.body_count, &sim->boundary.body_capacity, sizeof *sim->boundary.bodies));
+    body = &sim->boundary.bodies[sim->boundary.body_count];
+    GS4I_TRY(gs4i_make_body(sim, body, &mouth, (double)e.fill.spacing));
+    body->is_mouth = 1; body->asleep = 1; body->flow = e.fill.velocity;
+    memset(&sim->emitters[sim->emitter_count], 0, sizeof *sim->emitters);
+    sim->emitters[sim->emitter_count].is = e;
+    sim->emitters[sim->emitter_count].body = sim->boundary.body_count++;
+    gs4i_note_speed(sim, gs4i_max(gs4i_length(e.fill.velocity), gs4i_length(e.travel)));
+    sim->unseen = 1;
+    return sim->emitter_count++;
+}
+
+GS4_API int gs4_move_emitter(gs4_sim *sim, int emitter, gs4_vec3 travel)
+{
+    if (!sim) return GS4_ERROR_ARGUMENT;
+    GS4I_TRY(gs4i_check_id(sim, "emitter", emitter, sim->emitter_count));
+    GS4I_TRY(gs4i_check3(sim, "travel", travel));
+    sim->emitters[emitter].is.travel = travel;
+    sim->boundary.bodies[sim->emitters[emitter].body].is.velocity = travel;
+    gs4i_note_speed(sim, gs4i_length(travel));
+    sim->unseen = 1;
+    return GS4_OK;
+}
+
+/* --- stepping ----------------------------------------------------------------------------------------------- */
+
+static gs4_real gs4i_limit_now(const gs4_sim *sim)
+{
+    gs4i_report r = sim->worst;
+    if (sim->unseen) gs4i_look_at_particles(sim, &r);
+    return gs4i_stable_dt(sim, &r);
+}
+
+GS4_API gs4_real gs4_stable_dt(const gs4_sim *sim) { return sim ? gs4i_limit_now(sim) : GS4I_C(0); }
+
+/* After an edit by hand: all that a user may have written, before it can do harm. */
+static int gs4i_check_edit(gs4_sim *sim)
+{
+    const gs4i_particles *p = &sim->particles;
+    int i, c;
+    if (!sim->edited) return GS4_OK;
+    for (i = 0; i < p->count; i++) {
+        const gs4_real *x = p->position + 4 * (size_t)i, *v = p->velocity + 4 * (size_t)i;
+        int good = gs4i_inside_domain(&sim->grid, gs4i_vec3(x[0], x[1], x[2]));
+        for (c = 0; c < 3; c++) good = good && gs4i_finite(x[c]) && gs4i_finite(v[c]) && v[c] < GS4I_HUGE && v[c] > -GS4I_HUGE;
+        if (!good)
+            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "an edit has left particle ", (double)p->id[i], " outside of the grid or with a number that is not finite; edit it again");
+        gs4i_note_speed(sim, gs4i_length(gs4i_vec3(v[0], v[1], v[2])));
+    }
+    sim->edited = 0;
+    return GS4_OK;
+}
+
+static int gs4i_try_step(gs4_sim *sim, gs4_real dt)
+{
+    gs4_real limit;
+    GS4I_TRY(gs4i_check_edit(sim));
+    if (sim->unseen) { gs4i_look_at_particles(sim, &sim->worst); sim->unseen = 0; }
+    limit = gs4i_limit_now(sim);
+    if (dt > limit * (1 + 8 * GS4I_EPSILON)) {
+        char line[320];
+        gs4i_text t;
+        t.at = line; t.left = sizeof line;
+        gs4i_put(&t, "dt is "); gs4i_put_real(&t, (double)dt); gs4i_put(&t, " s; the largest stable step is now ");
+        gs4i_put_real(&t, (double)limit); gs4i_put(&t, " s (gs4_stable_dt); the step was not taken");
+        return gs4i_fail(sim, GS4_ERROR_UNSTABLE, line);
+    }
+    return gs4i_step(sim, dt);
+}
+
+GS4_API int gs4_step(gs4_sim *sim, gs4_real dt)
+{
+    if (!sim) return GS4_ERROR_ARGUMENT;
+    GS4I_TRY(gs4i_check(sim, "dt", dt, GS4I_POSITIVE));
+    return gs4i_try_step(sim, dt);
+}
+
+#define GS4I_MAX_STEPS 1e8              /* of one gs4_advance: beyond, it would seem to hang */
+
+GS4_API int gs4_advance(gs4_sim *sim, gs4_real duration)
+{
+    double left;
+    if (!sim) return GS4_ERROR_ARGUMENT;
+    GS4I_TRY(gs4i_check(sim, "duration", duration, GS4I_NOT_NEGATIVE));
+    for (left = (double)duration; left > 0;) {
+        double fraction = (double)sim->desc.cfl, dt, steps;
+        int tries, result = GS4_OK;
+        for (tries = 0; tries < 8; tries++, fraction /= 2) {    /* a refused step is tried again with half of it */
+            dt = fraction * (double)gs4i_limit_now(sim);
+            if (sim->desc.max_dt > 0 && dt > (double)sim->desc.max_dt) dt = (double)sim->desc.max_dt;
+            steps = ceil(left / dt * (1 - 1e-9));
+            if (!(steps < GS4I_MAX_STEPS))
+                return gs4i_fail_value(sim, GS4_ERROR_UNSTABLE, "the stable step is ", dt, " s, so short that the rest would take more than 1e8 steps; a larger cell_size, or less viscosity, sound_speed or speed, would do");
+            dt = left / steps;
+            result = gs4i_try_step(sim, GS4I_C(dt));
+            if (result != GS4_ERROR_UNSTABLE) break;
+        }
+        if (result != GS4_OK) return result;
+        left = steps <= 1 ? 0 : left - sim->last_dt;
+    }
+    return GS4_OK;
+}
+
+/* --- looking -------------------------------------------------------------------------------------------------- */
+
+static gs4_real *gs4i_field_data(const gs4_sim *sim, gs4_field field, int *components)
+{
+    *components = 1;
+    if (!sim || sim->particles.count == 0) return NULL;
+    switch (field) {
+    case GS4_FIELD_POSITION:     *components = 3; return sim->particles.position;
+    case GS4_FIELD_VELOCITY:     *components = 3; return sim->particles.velocity;
+    case GS4_FIELD_VOLUME_RATIO: return sim->particles.velocity + 3;
+    case GS4_FIELD_MASS:         return sim->particles.position + 3;
+    case GS4_FIELD_STRESS: case GS4_FIELD_DEFORMATION: case GS4_FIELD_TEMPERATURE:
+    case GS4_FIELD_LIQUID_FRACTION: case GS4_FIELD_FLUX: break;     /* no scene of this version has them */
+    }
+    return NULL;
+}
+
+GS4_API gs4_view gs4_particles(const gs4_sim *sim, gs4_field field)
+{
+    gs4_view v;
+    int components;
+    v.data = gs4i_field_data(sim, field, &components);
+    v.count = v.data ? sim->particles.count : 0;
+    v.components = v.data ? components : 0;
+    v.stride = v.data ? 4 : 0;
+    return v;
+}
+
+GS4_API gs4_edit gs4_edit_particles(gs4_sim *sim, gs4_field field)
+{
+    gs4_edit e;
+    int components;
+    e.data = field == GS4_FIELD_POSITION || field == GS4_FIELD_VELOCITY ? gs4i_field_data(sim, field, &components) : NULL;
+    e.count = e.data ? sim->particles.count : 0;
+    e.components = e.data ? 3 : 0;
+    e.stride = e.data ? 4 : 0;
+    if (e.data) sim->edited = sim->afresh = sim->unsorted = sim->unseen = 1;
+    return e;
+}
+
+GS4_API const uint32_t *gs4_particle_ids(const gs4_sim *sim) { return sim ? sim->particles.id : NULL; }
+GS4_API const uint8_t *gs4_particle_materials(const gs4_sim *sim) { return sim ? sim->particles.material : NULL; }
+
+GS4_API gs4_stats gs4_get_stats(gs4_sim *sim)
+{
+    gs4_stats s;
+    size_t i;
+    int c;
+    memset(&s, 0, sizeof s);
+    if (!sim) return s;
+    s.time = sim->time; s.steps = sim->steps; s.dt = sim->last_dt;
+    s.particles = sim->particles.count;
+    s.active_cells = sim->grid.active * GS4I_BLOCK_NODES;
+    s.memory_bytes = sim->memory.bytes;
+    s.min_volume_ratio = s.max_volume_ratio = 1;
+    for (i = 0; i < (size_t)sim->particles.count; i++) {
+        const gs4_real *x = sim->particles.position + 4 * i, *v = sim->particles.velocity + 4 * i;
+        const double m = (double)x[3], J = (double)v[3], v2 = (double)v[0] * (double)v[0] + (double)v[1] * (double)v[1] + (double)v[2] * (double)v[2];
+        s.mass += m;
+        for (c = 0; c < 3; c++) {
+            const int c1 = (c + 1) % 3, c2 = (c + 2) % 3;
+            s.momentum[c] += m * (double)v[c];
+            s.angular_momentum[c] += m * ((double)x[c1] * (double)v[c2] - (double)x[c2] * (double)v[c1]);
+        }
+        s.kinetic_energy += 0.5 * m * v2;
+        s.volume += m * J / (double)sim->laws[sim->particles.material[i]].density;
+        if (sqrt(v2) > s.max_speed) s.max_speed = sqrt(v2);
+        if (i == 0 || J < s.min_volume_ratio) s.min_volume_ratio = J;
+        if (i == 0 || J > s.max_volume_ratio) s.max_volume_ratio = J;
+    }
+    s.seconds_total = sim->seconds[GS4I_CLOCK_TOTAL];
+    s.seconds_sort = sim->seconds[GS4I_CLOCK_SORT];
+    s.seconds_transfer = s.seconds_total - s.seconds_sort;      /* stress is evaluated within the transfers */
+    return s;
+}
+
+/* Sum over particles and nodes, so that neither their order in memory nor that of the blocks matters. */
+GS4_API uint64_t gs4_state_hash(const gs4_sim *sim)
+{
+    const gs4i_particles *p;
+    uint64_t sum = 0, h;
+    size_t i, n;
+    int s;
+    if (!sim) return 0;
+    p = &sim->particles;
+    for (i = 0; i < (size_t)p->count; i++) {
+        h = gs4i_hash_bytes(gs4i_mix(p->id[i]), p->position + 4 * i, 4 * sizeof(gs4_real));
+        h = gs4i_hash_bytes(h ^ p->material[i], p->velocity + 4 * i, 4 * sizeof(gs4_real));
+        h = gs4i_hash_bytes(h, p->affine + 9 * i, 9 * sizeof(gs4_real));
+        if (p->with_rates) {
+            h = gs4i_hash_bytes(h, p->rate + 4 * i, 4 * sizeof(gs4_real));
+            h = gs4i_hash_bytes(h, p->lag + 3 * i, 3 * sizeof(gs4i_half));
+        }
+        sum += h;
+    }
+    for (s = 0; sim->grid.memory && s < sim->grid.active; s++)
+        for (n = 0; n < GS4I_BLOCK_NODES; n++) {
+            const gs4_real *ag = sim->grid.memory + (size_t)s * GS4I_NODE_REALS + 4 * n;
+            if (ag[3] > 0) sum += gs4i_hash_bytes(gs4i_mix(64 * (uint64_t)sim->grid.block[s] + n), ag, 4 * sizeof(gs4_real));
+        }
+    for (s = 0; s < sim->boundary.body_count; s++) {
+        sum += gs4i_hash_bytes((uint64_t)s + 1, sim->boundary.bodies[s].at, sizeof sim->boundary.bodies[s].at);
+        sum += gs4i_hash_bytes((uint64_t)s + 2, sim->boundary.bodies[s].turn, sizeof sim->boundary.bodies[s].turn);
+    }
+    return gs4i_hash_bytes(sum ^ (uint64_t)p->count, &sim->time, sizeof sim->time) ^ gs4i_mix(sim->steps);
+}
+
+/* --- files ------------------------------------------------------------------------------------------------------ */
+
+GS4_API int gs4_write_ply(gs4_sim *sim, const char *path) { return sim ? gs4i_write_ply(sim, path) : GS4_ERROR_ARGUMENT; }
+GS4_API int gs4_write_raw(gs4_sim *sim, const char *path) { return sim ? gs4i_write_raw(sim, path) : GS4_ERROR_ARGUMENT; }
+GS4_API int gs4_save(gs4_sim *sim, const char *path) { return sim ? gs4i_save(sim, path) : GS4_ERROR_ARGUMENT; }
+GS4_API int gs4_load(gs4_sim *sim, const char *path) { return sim ? gs4i_load(sim, path) : GS4_ERROR_ARGUMENT; }
+
+GS4_API int gs4_material_preset(const char *name, gs4_material *material)
+{
+    return name && material ? gs4i_preset(name, material) : GS4_ERROR_ARGUMENT;
+}
+
+#if defined(__clang__)
+#pragma STDC FP_CONTRACT DEFAULT
+#elif defined(__GNUC__) && !defined(__TINYC__)
+#pragma GCC pop_options
+#endif
+
+#endif /* GS4MPM_IMPLEMENTATION */

@@ -697,32 +697,49 @@ static void gs4i_shape_bounds(const gs4_shape *s, gs4_vec3 *low, gs4_vec3 *high)
 #define GS4I_TILE 8                     /* nodes along the edge of a tile */
 #define GS4I_TILE_REALS (4 * GS4I_TILE * GS4I_TILE * GS4I_TILE + 16)   /* a row read may run 4 numbers over the end */
 
-#if defined(__GNUC__) && !defined(__TINYC__) && !defined(GS4_NO_VECTORS)
+/* Four and sixteen numbers at a time: compiler vectors where there are any, arrays elsewhere; the same arithmetic in the
+ * same order, so the same bits. Lane 3 of a quad is often without meaning. */
+#if defined(__has_builtin) && !defined(GS4_NO_VECTORS)
+#if __has_builtin(__builtin_shufflevector) && __has_builtin(__builtin_convertvector)
+#define GS4I_VECTORS 1
+#endif
+#endif
+#ifdef GS4I_VECTORS
 typedef gs4_real gs4i_row  __attribute__((vector_size(16 * sizeof(gs4_real))));
+typedef gs4_real gs4i_pair __attribute__((vector_size(8 * sizeof(gs4_real))));
 typedef gs4_real gs4i_quad __attribute__((vector_size(4 * sizeof(gs4_real))));
+typedef int32_t  gs4i_int4 __attribute__((vector_size(16)));
+#ifdef GS4_DOUBLE
+typedef int64_t  gs4i_mask __attribute__((vector_size(32)));
+#else
+typedef int32_t  gs4i_mask __attribute__((vector_size(16)));
+#endif
 #define GS4I_LANE(v, i) ((v)[i])
+#define GS4I_LANES(...) __VA_ARGS__
 #define GS4I_MUL(r, a, b) ((r) = (a) * (b))                  /* r = a b   lane by lane */
 #define GS4I_MAD(r, a, b) ((r) += (a) * (b))                 /* r += a b  lane by lane */
 #define GS4I_SPLAT_MUL(r, s, a) ((r) = (a) * (s))            /* r = s a   for a number s */
 #define GS4I_SPLAT_MAD(r, s, a) ((r) += (a) * (s))           /* r += s a */
 #define GS4I_SUM(r, a, b) ((r) = (a) + (b))
-#if defined(__has_builtin)
-#if __has_builtin(__builtin_shufflevector)
-#define GS4I_SHUFFLE 1
-#endif
-#endif
+#define GS4I_DIFFERENCE(r, a, b) ((r) = (a) - (b))
+#define GS4I_SHIFT(r, a, s) ((r) = (a) + (s))                /* r = a + s  for a number s */
+#define GS4I_GREATER(r, a, b) do { const gs4i_mask gs4i_m = (a) > (b); \
+    (r) = (gs4i_quad)(((gs4i_mask)(a) & gs4i_m) | ((gs4i_mask)(b) & ~gs4i_m)); } while (0)
 #else
 typedef struct gs4i_row  { gs4_real lane[16]; } gs4i_row;
 typedef struct gs4i_quad { gs4_real lane[4]; } gs4i_quad;
 #define GS4I_LANE(v, i) ((v).lane[i])
-#define GS4I_LANES(type) ((int)(sizeof(type) / sizeof(gs4_real)))
+#define GS4I_LANES(...) { __VA_ARGS__ }
 #define GS4I_EACH(r, expression) do { int gs4i_l; \
-    for (gs4i_l = 0; gs4i_l < GS4I_LANES(r); gs4i_l++) { expression; } } while (0)
+    for (gs4i_l = 0; gs4i_l < (int)(sizeof(r) / sizeof(gs4_real)); gs4i_l++) { expression; } } while (0)
 #define GS4I_MUL(r, a, b) GS4I_EACH(r, (r).lane[gs4i_l] = (a).lane[gs4i_l] * (b).lane[gs4i_l])
 #define GS4I_MAD(r, a, b) GS4I_EACH(r, (r).lane[gs4i_l] += (a).lane[gs4i_l] * (b).lane[gs4i_l])
 #define GS4I_SPLAT_MUL(r, s, a) GS4I_EACH(r, (r).lane[gs4i_l] = (a).lane[gs4i_l] * (s))
 #define GS4I_SPLAT_MAD(r, s, a) GS4I_EACH(r, (r).lane[gs4i_l] += (a).lane[gs4i_l] * (s))
 #define GS4I_SUM(r, a, b) GS4I_EACH(r, (r).lane[gs4i_l] = (a).lane[gs4i_l] + (b).lane[gs4i_l])
+#define GS4I_DIFFERENCE(r, a, b) GS4I_EACH(r, (r).lane[gs4i_l] = (a).lane[gs4i_l] - (b).lane[gs4i_l])
+#define GS4I_SHIFT(r, a, s) GS4I_EACH(r, (r).lane[gs4i_l] = (a).lane[gs4i_l] + (s))
+#define GS4I_GREATER(r, a, b) GS4I_EACH(r, (r).lane[gs4i_l] = (a).lane[gs4i_l] > (b).lane[gs4i_l] ? (a).lane[gs4i_l] : (b).lane[gs4i_l])
 #endif
 
 #define GS4I_LOAD(v, p) memcpy(&(v), (p), sizeof(v))
@@ -731,87 +748,112 @@ typedef struct gs4i_quad { gs4_real lane[4]; } gs4i_quad;
 /* (a a a a  b b b b  c c c c  0 0 0 0): one number a node, spread over its four lanes */
 GS4I_INLINE void gs4i_row_of_nodes(gs4i_row *r, gs4_real a, gs4_real b, gs4_real c)
 {
-#ifdef GS4I_SHUFFLE
-    gs4i_quad q = { a, b, c, 0 };
-    *r = __builtin_shufflevector(q, q, 0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3);
-#else
-    int i;
-    for (i = 0; i < 4; i++) {
-        GS4I_LANE(*r, i) = a; GS4I_LANE(*r, 4 + i) = b; GS4I_LANE(*r, 8 + i) = c; GS4I_LANE(*r, 12 + i) = 0;
-    }
-#endif
+    const gs4i_row all = { GS4I_LANES(a, a, a, a, b, b, b, b, c, c, c, c, 0, 0, 0, 0) };
+    *r = all;
 }
 
 /* (x y z w  x y z w  x y z w  x y z w): the same four numbers for each node */
-GS4I_INLINE void gs4i_row_of_quad(gs4i_row *r, gs4_real x, gs4_real y, gs4_real z, gs4_real w)
+GS4I_INLINE void gs4i_row_of_quad(gs4i_row *r, const gs4i_quad *q)
 {
-#ifdef GS4I_SHUFFLE
-    gs4i_quad q = { x, y, z, w };
-    *r = __builtin_shufflevector(q, q, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3);
+#ifdef GS4I_VECTORS
+    const gs4i_pair p = __builtin_shufflevector(*q, *q, 0, 1, 2, 3, 0, 1, 2, 3);    /* doubled twice: in one go gcc goes through memory */
+    *r = __builtin_shufflevector(p, p, 0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7);
 #else
     int i;
-    for (i = 0; i < 16; i += 4) {
-        GS4I_LANE(*r, i) = x; GS4I_LANE(*r, i + 1) = y; GS4I_LANE(*r, i + 2) = z; GS4I_LANE(*r, i + 3) = w;
+    for (i = 0; i < 16; i++) r->lane[i] = q->lane[i & 3];
+#endif
+}
+
+/* Transpose: r[i] = (a_i b_i c_i 0) */
+GS4I_INLINE void gs4i_transpose(const gs4i_quad *a, const gs4i_quad *b, const gs4i_quad *c, gs4i_quad r[3])
+{
+#ifdef GS4I_VECTORS
+    const gs4i_quad zero = { 0, 0, 0, 0 };
+    const gs4i_quad low = __builtin_shufflevector(*a, *b, 0, 4, 1, 5), high = __builtin_shufflevector(*a, *b, 2, 6, 3, 7);
+    const gs4i_quad cz = __builtin_shufflevector(*c, zero, 0, 4, 1, 4), cw = __builtin_shufflevector(*c, zero, 2, 4, 2, 4);
+    r[0] = __builtin_shufflevector(low, cz, 0, 1, 4, 5);
+    r[1] = __builtin_shufflevector(low, cz, 2, 3, 6, 7);
+    r[2] = __builtin_shufflevector(high, cw, 0, 1, 4, 5);
+#else
+    int i;
+    for (i = 0; i < 3; i++) { r[i].lane[0] = a->lane[i]; r[i].lane[1] = b->lane[i]; r[i].lane[2] = c->lane[i]; r[i].lane[3] = 0; }
+#endif
+}
+
+/* The cell of each coordinate, and x - cell - 1/2; coordinates outside of 1 <= x < 7, and NaN, give cell 0. */
+GS4I_INLINE void gs4i_split(const gs4i_quad *x, int cell[4], gs4i_quad *xi)
+{
+#ifdef GS4I_VECTORS
+    const gs4i_mask inside = (*x >= 1) & (*x < GS4I_TILE - 1);
+    const gs4i_quad safe = (gs4i_quad)((gs4i_mask)*x & inside);
+    const gs4i_int4 c = __builtin_convertvector(safe, gs4i_int4);
+    *xi = safe - __builtin_convertvector(c, gs4i_quad) - GS4I_C(0.5);
+    memcpy(cell, &c, sizeof c);
+#else
+    int i;
+    for (i = 0; i < 4; i++) {
+        const int inside = x->lane[i] >= 1 && x->lane[i] < GS4I_TILE - 1;
+        cell[i] = inside ? (int)x->lane[i] : 0;
+        xi->lane[i] = (inside ? x->lane[i] : GS4I_C(0)) - GS4I_C(cell[i]) - GS4I_C(0.5);
     }
 #endif
 }
 
-/* q = sum over the nodes of a row of a_i b_i: ((node 0 + node 2) + (node 1 + nothing)) */
+/* q = sum over the nodes of a row of a_i b_i: (node 0 + node 2) + (node 1 + nothing) */
 GS4I_INLINE void gs4i_row_dot(gs4i_quad *q, const gs4i_row *a, const gs4i_row *b)
 {
-#ifdef GS4I_SHUFFLE
-    gs4i_row t = *a * *b;
-    gs4i_quad q0 = __builtin_shufflevector(t, t, 0, 1, 2, 3), q1 = __builtin_shufflevector(t, t, 4, 5, 6, 7);
-    gs4i_quad q2 = __builtin_shufflevector(t, t, 8, 9, 10, 11);
-    *q = (q0 + q2) + q1;
+#ifdef GS4I_VECTORS
+    const gs4i_row t = *a * *b;
+    const gs4i_pair p = __builtin_shufflevector(t, t, 0, 1, 2, 3, 4, 5, 6, 7) + __builtin_shufflevector(t, t, 8, 9, 10, 11, 12, 13, 14, 15);
+    *q = __builtin_shufflevector(p, p, 0, 1, 2, 3) + __builtin_shufflevector(p, p, 4, 5, 6, 7);
 #else
     int i;
     for (i = 0; i < 4; i++)
         GS4I_LANE(*q, i) = (GS4I_LANE(*a, i) * GS4I_LANE(*b, i) + GS4I_LANE(*a, 8 + i) * GS4I_LANE(*b, 8 + i))
-                         + GS4I_LANE(*a, 4 + i) * GS4I_LANE(*b, 4 + i);
+                         + (GS4I_LANE(*a, 4 + i) * GS4I_LANE(*b, 4 + i) + GS4I_LANE(*a, 12 + i) * GS4I_LANE(*b, 12 + i));
 #endif
 }
 
-/* Weights and derivatives (1/m) of one particle along the three axes, and where its first node is in the tile. */
+/* Weights and derivatives (1/m) of one particle, [node][axis], and where its first node is in the tile. */
 typedef struct gs4i_stencil {
-    gs4_real w[3][3], d[3][3];          /* [axis][node] */
-    gs4_real xi[3];                     /* offset from the centre of its cell, in cells */
+    gs4_real w[3][4], d[3][4];
+    gs4i_quad xi;                       /* offset from the centre of its cell, in cells */
     int base;                           /* number of its first node in the tile, or -1: outside of it */
 } gs4i_stencil;
 
 /* `x` in cells from the first node of the tile, plus 1/2: the particle is in the cell of node floor(x). */
-GS4I_INLINE void gs4i_stencil_at(gs4i_stencil *s, const gs4_real x[3], gs4_real inv_h)
+GS4I_INLINE void gs4i_stencil_at(gs4i_stencil *s, const gs4i_quad *x, gs4_real inv_h)
 {
-    int cell[3], a;
-    for (a = 0; a < 3; a++) {
-        gs4_real f, lo, hi;
-        int inside = x[a] >= 1 && x[a] < GS4I_TILE - 1;         /* false for NaN, too */
-        cell[a] = inside ? (int)x[a] : 0;
-        f = inside ? x[a] - GS4I_C(cell[a]) - GS4I_C(0.5) : GS4I_C(0);
-        lo = GS4I_C(0.5) - f; hi = GS4I_C(0.5) + f;
-        s->w[a][0] = GS4I_C(0.5) * lo * lo; s->w[a][1] = GS4I_C(0.75) - f * f; s->w[a][2] = GS4I_C(0.5) * hi * hi;
-        s->d[a][0] = -lo * inv_h; s->d[a][1] = GS4I_C(-2) * f * inv_h; s->d[a][2] = hi * inv_h;
-        s->xi[a] = f;
-    }
+    gs4i_quad lo, hi, t;
+    int cell[4];
+    gs4i_split(x, cell, &s->xi);
+    GS4I_SPLAT_MUL(lo, GS4I_C(-1), s->xi); GS4I_SHIFT(lo, lo, GS4I_C(0.5));
+    GS4I_SHIFT(hi, s->xi, GS4I_C(0.5));
+    GS4I_MUL(t, lo, lo); GS4I_SPLAT_MUL(t, GS4I_C(0.5), t); GS4I_STORE(s->w[0], t);
+    GS4I_MUL(t, s->xi, s->xi); GS4I_SPLAT_MUL(t, GS4I_C(-1), t); GS4I_SHIFT(t, t, GS4I_C(0.75)); GS4I_STORE(s->w[1], t);
+    GS4I_MUL(t, hi, hi); GS4I_SPLAT_MUL(t, GS4I_C(0.5), t); GS4I_STORE(s->w[2], t);
+    GS4I_SPLAT_MUL(t, -inv_h, lo); GS4I_STORE(s->d[0], t);
+    GS4I_SPLAT_MUL(t, -2 * inv_h, s->xi); GS4I_STORE(s->d[1], t);
+    GS4I_SPLAT_MUL(t, inv_h, hi); GS4I_STORE(s->d[2], t);
     s->base = cell[0] > 0 && cell[1] > 0 && cell[2] > 0
             ? ((cell[2] - 1) * GS4I_TILE + (cell[1] - 1)) * GS4I_TILE + (cell[0] - 1) : -1;
 }
 
-/* tile += sum of  w P0 + (dy w) P1 + (dz w) P2  row by row, where the x-weights are in P0, P1, P2 already and
- * y, z, ey, ez are the plain and the other weights of the two axes:  row_jk = y_j z_k P0 + ey_j z_k P1 + y_j ez_k P2 */
+/* tile += row by row  y_j z_k P0 + ey_j z_k P1 + y_j ez_k P2,  where the x-weights are in P0, P1, P2 already, y and z are the
+ * plain weights and ey, ez the others (derivatives, or weights times distance) of those axes: lanes 1 and 2 of w and e. */
 GS4I_INLINE void gs4i_scatter_rows(gs4_real *GS4I_RESTRICT at, const gs4i_row *p0, const gs4i_row *p1, const gs4i_row *p2,
-                                   const gs4_real y[3], const gs4_real ey[3], const gs4_real z[3], const gs4_real ez[3])
+                                   gs4_real w[3][4], gs4_real e[3][4])
 {
     int j, k;
     for (j = 0; j < 3; j++) {
         gs4i_row a, b;
-        GS4I_SPLAT_MUL(a, y[j], *p0); GS4I_SPLAT_MAD(a, ey[j], *p1);
-        GS4I_SPLAT_MUL(b, y[j], *p2);
+        GS4I_SPLAT_MUL(a, w[j][1], *p0); GS4I_SPLAT_MAD(a, e[j][1], *p1);
+        GS4I_SPLAT_MUL(b, w[j][1], *p2);
         for (k = 0; k < 3; k++) {
             gs4_real *row = at + 4 * GS4I_TILE * (GS4I_TILE * k + j);
             gs4i_row r, t;
             GS4I_LOAD(r, row);
-            GS4I_SPLAT_MUL(t, z[k], a); GS4I_SPLAT_MAD(t, ez[k], b);
+            GS4I_SPLAT_MUL(t, w[k][2], a); GS4I_SPLAT_MAD(t, e[k][2], b);
             GS4I_SUM(r, r, t);
             GS4I_STORE(row, r);
         }
@@ -819,35 +861,40 @@ GS4I_INLINE void gs4i_scatter_rows(gs4_real *GS4I_RESTRICT at, const gs4i_row *p
 }
 
 /* The three rows of one z: sums with the weights and with the derivatives along y */
-GS4I_INLINE void gs4i_gather_plane(const gs4_real *at, const gs4_real w[3], const gs4_real d[3], gs4i_row *plain, gs4i_row *slope)
+GS4I_INLINE void gs4i_gather_plane(const gs4_real *at, const gs4i_stencil *s, gs4i_row *plain, gs4i_row *slope)
 {
     gs4i_row r;
     GS4I_LOAD(r, at);
-    GS4I_SPLAT_MUL(*plain, w[0], r); GS4I_SPLAT_MUL(*slope, d[0], r);
+    GS4I_SPLAT_MUL(*plain, s->w[0][1], r); GS4I_SPLAT_MUL(*slope, s->d[0][1], r);
     GS4I_LOAD(r, at + 4 * GS4I_TILE);
-    GS4I_SPLAT_MAD(*plain, w[1], r); GS4I_SPLAT_MAD(*slope, d[1], r);
+    GS4I_SPLAT_MAD(*plain, s->w[1][1], r); GS4I_SPLAT_MAD(*slope, s->d[1][1], r);
     GS4I_LOAD(r, at + 8 * GS4I_TILE);
-    GS4I_SPLAT_MAD(*plain, w[2], r); GS4I_SPLAT_MAD(*slope, d[2], r);
+    GS4I_SPLAT_MAD(*plain, s->w[2][1], r); GS4I_SPLAT_MAD(*slope, s->d[2][1], r);
 }
 
-/* s0 = sum_jk w_j w_k row_jk, s1 and s2 with the derivative along y and along z: what is left is the sum along x */
-GS4I_INLINE void gs4i_gather_rows(const gs4_real *at, const gs4i_stencil *s, gs4i_row *s0, gs4i_row *s1, gs4i_row *s2)
+/* What nodes give to a particle: the value (lane 3: of the fourth number) and the columns of its gradient. */
+typedef struct gs4i_local { gs4i_quad value, dx, dy, dz; } gs4i_local;
+
+/* value = sum_i w_i f_i, dx = sum_i dw_i/dx f_i, ...; wx and dx the spread weights and derivatives along x */
+GS4I_INLINE void gs4i_gather_local(const gs4_real *at, const gs4i_stencil *s, const gs4i_row *wx, const gs4i_row *dx, gs4i_local *l)
 {
     const int next = 4 * GS4I_TILE * GS4I_TILE;
-    gs4i_row plain, slope;
-    gs4i_gather_plane(at, s->w[1], s->d[1], &plain, &slope);
-    GS4I_SPLAT_MUL(*s0, s->w[2][0], plain); GS4I_SPLAT_MUL(*s1, s->w[2][0], slope); GS4I_SPLAT_MUL(*s2, s->d[2][0], plain);
-    gs4i_gather_plane(at + next, s->w[1], s->d[1], &plain, &slope);
-    GS4I_SPLAT_MAD(*s0, s->w[2][1], plain); GS4I_SPLAT_MAD(*s1, s->w[2][1], slope); GS4I_SPLAT_MAD(*s2, s->d[2][1], plain);
-    gs4i_gather_plane(at + 2 * next, s->w[1], s->d[1], &plain, &slope);
-    GS4I_SPLAT_MAD(*s0, s->w[2][2], plain); GS4I_SPLAT_MAD(*s1, s->w[2][2], slope); GS4I_SPLAT_MAD(*s2, s->d[2][2], plain);
+    gs4i_row plain, slope, s0, s1, s2;
+    gs4i_gather_plane(at, s, &plain, &slope);
+    GS4I_SPLAT_MUL(s0, s->w[0][2], plain); GS4I_SPLAT_MUL(s1, s->w[0][2], slope); GS4I_SPLAT_MUL(s2, s->d[0][2], plain);
+    gs4i_gather_plane(at + next, s, &plain, &slope);
+    GS4I_SPLAT_MAD(s0, s->w[1][2], plain); GS4I_SPLAT_MAD(s1, s->w[1][2], slope); GS4I_SPLAT_MAD(s2, s->d[1][2], plain);
+    gs4i_gather_plane(at + 2 * next, s, &plain, &slope);
+    GS4I_SPLAT_MAD(s0, s->w[2][2], plain); GS4I_SPLAT_MAD(s1, s->w[2][2], slope); GS4I_SPLAT_MAD(s2, s->d[2][2], plain);
+    gs4i_row_dot(&l->value, wx, &s0);
+    gs4i_row_dot(&l->dx, dx, &s0); gs4i_row_dot(&l->dy, wx, &s1); gs4i_row_dot(&l->dz, wx, &s2);
 }
 
 /* The x-weights of a particle, spread over rows. */
 GS4I_INLINE void gs4i_x_weights(const gs4i_stencil *s, gs4i_row *w, gs4i_row *d)
 {
-    gs4i_row_of_nodes(w, s->w[0][0], s->w[0][1], s->w[0][2]);
-    gs4i_row_of_nodes(d, s->d[0][0], s->d[0][1], s->d[0][2]);
+    gs4i_row_of_nodes(w, s->w[0][0], s->w[1][0], s->w[2][0]);
+    gs4i_row_of_nodes(d, s->d[0][0], s->d[1][0], s->d[2][0]);
 }
 
 /* ==== [[grid]] blocks of nodes where there is material ============================================= *
@@ -1118,25 +1165,33 @@ static void gs4i_tile_add(const gs4i_grid *g, int o, const gs4_real *GS4I_RESTRI
 
 #ifdef GS4_DOUBLE
 typedef float gs4i_half;                /* half of gs4_real's width: enough for a small difference, see S2 in [[transfer]] */
-GS4I_INLINE gs4i_half gs4i_to_half(gs4_real v) { return (gs4i_half)v; }
-GS4I_INLINE gs4_real gs4i_from_half(gs4i_half v) { return (gs4_real)v; }
 #else
 typedef uint16_t gs4i_half;             /* the upper half of a float, rounded */
-GS4I_INLINE gs4i_half gs4i_to_half(gs4_real v)
-{
-    uint32_t u; memcpy(&u, &v, sizeof u);
-    return (gs4i_half)((u + 0x7fffu + ((u >> 16) & 1u)) >> 16);
-}
-GS4I_INLINE gs4_real gs4i_from_half(gs4i_half v)
-{
-    uint32_t u = (uint32_t)v << 16; gs4_real r;
-    memcpy(&r, &u, sizeof r);
-    return r;
-}
 #endif
 
+GS4I_INLINE gs4i_half gs4i_to_half(gs4_real v)
+{
+#ifdef GS4_DOUBLE
+    return (gs4i_half)v;
+#else
+    uint32_t u; memcpy(&u, &v, sizeof u);
+    return (gs4i_half)((u + 0x7fffu + ((u >> 16) & 1u)) >> 16);
+#endif
+}
+
+GS4I_INLINE gs4_real gs4i_from_half(gs4i_half v)
+{
+#ifdef GS4_DOUBLE
+    return (gs4_real)v;
+#else
+    const uint32_t u = (uint32_t)v << 16; gs4_real r;
+    memcpy(&r, &u, sizeof r);
+    return r;
+#endif
+}
+
 typedef struct gs4i_particles {
-    int count, capacity, with_rates;
+    int count, capacity, with_rates;    /* arrays are one element longer than that: a quad may be read over the end */
     gs4_real *position;                 /* 4: x y z, mass */
     gs4_real *velocity;                 /* 4: v, volume ratio J */
     gs4_real *rate;                     /* 4: dv/dt, dJ/dt; NULL for symplectic Euler */
@@ -1169,7 +1224,7 @@ static void gs4i_particles_free(gs4i_memory *m, gs4i_particles *p)
     gs4i_array a[GS4I_ARRAYS];
     int i;
     gs4i_particle_arrays(p, a);
-    for (i = 0; i < GS4I_ARRAYS; i++) { gs4i_free(m, *a[i].data, (size_t)p->capacity, a[i].size); *a[i].data = NULL; }
+    for (i = 0; i < GS4I_ARRAYS; i++) { gs4i_free(m, *a[i].data, (size_t)p->capacity + 1, a[i].size); *a[i].data = NULL; }
     p->capacity = 0;
 }
 
@@ -1185,7 +1240,7 @@ static int gs4i_particles_reserve(gs4i_memory *m, gs4i_particles *p, int wanted)
     for (i = 0; i < GS4I_ARRAYS; i++) *to[i].data = NULL;
     grown.capacity = wanted;
     for (i = 0; i < GS4I_ARRAYS && !failed; i++)
-        if (to[i].wanted) failed = (*to[i].data = gs4i_alloc(m, (size_t)wanted, to[i].size)) == NULL;
+        if (to[i].wanted) failed = (*to[i].data = gs4i_alloc(m, (size_t)wanted + 1, to[i].size)) == NULL;
     if (failed) { gs4i_particles_free(m, &grown); return GS4_ERROR_MEMORY; }
     for (i = 0; i < GS4I_ARRAYS; i++)
         if (*from[i].data) memcpy(*to[i].data, *from[i].data, (size_t)p->count * from[i].size);
@@ -1262,15 +1317,18 @@ GS4I_INLINE void gs4i_chunk(const gs4i_sorting *s, int index, int *begin, int *e
     *end = (int)((int64_t)s->p->count * (index + 1) / s->chunks);
 }
 
-/* The predicted position of particle i (S2): with the grid's velocity, which is v - lag. */
-GS4I_INLINE void gs4i_predicted_position(const gs4i_particles *p, size_t i, gs4_real reach, gs4_real x[3])
+/* The predicted position of particle i (S2): with the grid's velocity, which is v - lag. Lane 3 means nothing. */
+GS4I_INLINE void gs4i_predicted_position(const gs4i_particles *p, size_t i, gs4_real reach, gs4i_quad *x)
 {
-    int a;
-    for (a = 0; a < 3; a++) {
-        gs4_real v = p->velocity[4 * i + (size_t)a];
-        if (p->lag) v -= gs4i_from_half(p->lag[3 * i + (size_t)a]);
-        x[a] = p->position[4 * i + (size_t)a] + reach * v;
+    gs4i_quad v;
+    GS4I_LOAD(*x, p->position + 4 * i);
+    GS4I_LOAD(v, p->velocity + 4 * i);
+    if (p->lag) {
+        const gs4i_half *lag = p->lag + 3 * i;
+        const gs4i_quad l = { GS4I_LANES(gs4i_from_half(lag[0]), gs4i_from_half(lag[1]), gs4i_from_half(lag[2]), 0) };
+        GS4I_DIFFERENCE(v, v, l);
     }
+    GS4I_SPLAT_MAD(*x, reach, v);
 }
 
 static void gs4i_sort_keys_task(int index, void *context)
@@ -1280,11 +1338,11 @@ static void gs4i_sort_keys_task(int index, void *context)
     int i, end, a;
     gs4i_chunk(s, index, &i, &end);
     for (; i < end; i++) {
-        gs4_real x[3];
+        gs4i_quad x;
         int cell[3];
-        gs4i_predicted_position(s->p, (size_t)i, s->reach, x);
+        gs4i_predicted_position(s->p, (size_t)i, s->reach, &x);
         for (a = 0; a < 3; a++) {
-            gs4_real c = (x[a] - origin[a]) * s->g->inv_h;
+            gs4_real c = (GS4I_LANE(x, a) - origin[a]) * s->g->inv_h;
             cell[a] = c >= 0 ? (c < GS4I_C(s->g->cells[a]) ? (int)c : s->g->cells[a] - 1) : 0;
         }
         s->p->order[i] = gs4i_home_block(s->g, cell);
@@ -1378,19 +1436,13 @@ GS4I_INLINE gs4_real gs4i_pressure(const gs4i_law *law, gs4_real J)
 /* Speed of sound at J over that at rest: sqrt(-(J^2/rho0) dp/dJ) / c0 = J^-3. */
 GS4I_INLINE gs4_real gs4i_stiffening(gs4_real J) { return GS4I_C(1) / (J * J * J); }
 
-/* Viscosity (Pa s) at the shear rate sqrt(2 D:D); D = (L + L^T)/2, grad[3 j + i] = dv_i/dx_j. */
-GS4I_INLINE gs4_real gs4i_viscosity(const gs4i_law *law, const gs4_real D[6])
+/* Viscosity (Pa s) from the callback at the shear rate sqrt(2 D:D), of the columns of 2 D. */
+static gs4_real gs4i_viscosity(const gs4i_law *law, const gs4i_quad D2[3])
 {
-    if (!law->viscosity_fn) return law->viscosity;
-    return law->viscosity_fn(0, GS4I_SQRT(2 * (D[0] * D[0] + D[1] * D[1] + D[2] * D[2]
-                                              + 2 * (D[3] * D[3] + D[4] * D[4] + D[5] * D[5]))), law->viscosity_user);
-}
-
-/* D as xx yy zz xy xz yz. */
-GS4I_INLINE void gs4i_strain_rate(const gs4_real grad[9], gs4_real D[6])
-{
-    D[0] = grad[0]; D[1] = grad[4]; D[2] = grad[8];
-    D[3] = GS4I_C(0.5) * (grad[1] + grad[3]); D[4] = GS4I_C(0.5) * (grad[2] + grad[6]); D[5] = GS4I_C(0.5) * (grad[5] + grad[7]);
+    gs4_real sum = 0;
+    int i, j;
+    for (j = 0; j < 3; j++) for (i = 0; i < 3; i++) sum += GS4I_LANE(D2[j], i) * GS4I_LANE(D2[j], i);
+    return law->viscosity_fn(0, GS4I_SQRT(GS4I_C(0.5) * sum), law->viscosity_user);
 }
 
 /* Liquids to start from, density (kg/m^3) and viscosity (Pa s) near the temperature given. */
@@ -1942,7 +1994,8 @@ typedef struct gs4i_rule {
     gs4_real dt, alpha_m, alpha_f, gamma;
     gs4_real reach;                     /* alpha_f dt: from t_n to the stage */
     gs4_real s;                         /* alpha_f gamma dt / alpha_m: weight of the new rate at the stage */
-    gs4_real decay;                     /* 1 / flip_decay_time, 1/s */
+    gs4_real decay, damped;             /* k = 1 / flip_decay_time, 1/s; 1 / (1 + s k) */
+    gs4_real inv_alpha_m;
     int afresh;                         /* no rates yet: first step, or after an edit */
 } gs4i_rule;
 
@@ -1994,6 +2047,7 @@ static void gs4i_report_clear(gs4i_report *r)
     r->min_J = GS4I_HUGE;
 }
 
+/* The extremes of `r` into those of `into`. */
 static void gs4i_report_merge(gs4i_report *into, const gs4i_report *r)
 {
     into->max_speed = gs4i_max(into->max_speed, r->max_speed);
@@ -2018,57 +2072,97 @@ enum { GS4I_BAD_VOLUME = 1, GS4I_BAD_MOTION, GS4I_BAD_VISCOSITY };
 
 typedef struct gs4i_pass { gs4_sim *sim; const int32_t *blocks; } gs4i_pass;
 
-/* Where tile coordinates begin: (x - origin) / h - first. */
-GS4I_INLINE void gs4i_tile_first(const gs4i_grid *g, int o, gs4_real first[3])
+/* From particle to tile coordinates: (x - origin) / h - first. */
+typedef struct gs4i_frame { gs4i_quad origin, first; } gs4i_frame;
+
+GS4I_INLINE gs4i_frame gs4i_tile_frame(const gs4i_grid *g, int o)
 {
-    int at[3], a;
+    gs4i_frame f;
+    int at[3];
     gs4i_block_coordinates(g, g->occupied_block[o], at);
-    for (a = 0; a < 3; a++) first[a] = GS4I_C(4 * (at[a] - 1) - 2);
+    {
+        const gs4i_quad origin = { GS4I_LANES(g->origin.x, g->origin.y, g->origin.z, 0) };
+        const gs4i_quad first = { GS4I_LANES(GS4I_C(4 * at[0] - 6), GS4I_C(4 * at[1] - 6), GS4I_C(4 * at[2] - 6), 0) };
+        f.origin = origin; f.first = first;
+    }
+    return f;
 }
 
 /* S2: weights at the predicted position x~ = x + alpha_f dt (v - lag). */
-GS4I_INLINE void gs4i_predicted_stencil(const gs4_sim *sim, size_t i, gs4_real reach, const gs4_real first[3], gs4i_stencil *s)
+GS4I_INLINE void gs4i_predicted_stencil(const gs4_sim *sim, size_t i, gs4_real reach, const gs4i_frame *f, gs4i_stencil *s)
 {
-    const gs4i_grid *g = &sim->grid;
-    gs4_real x[3];
-    gs4i_predicted_position(&sim->particles, i, reach, x);
-    x[0] = (x[0] - g->origin.x) * g->inv_h - first[0];
-    x[1] = (x[1] - g->origin.y) * g->inv_h - first[1];
-    x[2] = (x[2] - g->origin.z) * g->inv_h - first[2];
-    gs4i_stencil_at(s, x, g->inv_h);
+    gs4i_quad x;
+    gs4i_predicted_position(&sim->particles, i, reach, &x);
+    GS4I_DIFFERENCE(x, x, f->origin);
+    GS4I_SPLAT_MUL(x, sim->grid.inv_h, x);
+    GS4I_DIFFERENCE(x, x, f->first);
+    gs4i_stencil_at(s, &x, sim->grid.inv_h);
 }
+
+/* The columns of a particle's velocity gradient, lane 3 zero. */
+GS4I_INLINE void gs4i_load_affine(const gs4_real *C, gs4i_quad c[3])
+{
+    const gs4i_quad mask = { GS4I_LANES(1, 1, 1, 0) };
+    int j;
+    for (j = 0; j < 3; j++) { GS4I_LOAD(c[j], C + 3 * j); GS4I_MUL(c[j], c[j], mask); }
+}
+
+GS4I_INLINE void gs4i_store_affine(gs4_real *C, const gs4i_quad c[3])
+{
+    gs4_real last[4];
+    GS4I_STORE(C, c[0]); GS4I_STORE(C + 3, c[1]);           /* each overwrites what the one before had too much */
+    GS4I_STORE(last, c[2]);
+    memcpy(C + 6, last, 3 * sizeof *C);
+}
+
+GS4I_INLINE void gs4i_store_lag(gs4i_half *to, const gs4i_quad *lag)
+{
+    int a;
+    for (a = 0; a < 3; a++) to[a] = gs4i_to_half(GS4I_LANE(*lag, a));
+}
+
+/* Sums over i of |column i|^2: its three lanes add up to |C|^2. */
+GS4I_INLINE void gs4i_squares(const gs4i_quad c[3], gs4i_quad *n)
+{
+    GS4I_MUL(*n, c[0], c[0]); GS4I_MAD(*n, c[1], c[1]); GS4I_MAD(*n, c[2], c[2]);
+}
+
+GS4I_INLINE gs4_real gs4i_sum3(const gs4i_quad *q) { return (GS4I_LANE(*q, 0) + GS4I_LANE(*q, 1)) + GS4I_LANE(*q, 2); }
 
 /* |C| dt is bounded by 1/4: the factor that makes it so. */
-GS4I_INLINE gs4_real gs4i_affine_bound(const gs4_real *C, gs4_real dt)
+GS4I_INLINE gs4_real gs4i_affine_bound(const gs4i_quad c[3], gs4_real dt)
 {
-    gs4_real n = 0;
-    int i;
-    for (i = 0; i < 9; i++) n += C[i] * C[i];
-    n *= dt * dt;
-    return n > GS4I_C(0.0625) ? GS4I_C(0.25) / GS4I_SQRT(n) : GS4I_C(1);
+    gs4i_quad n;
+    gs4_real squared;
+    gs4i_squares(c, &n);
+    squared = gs4i_sum3(&n) * (dt * dt);
+    return squared > GS4I_C(0.0625) ? GS4I_C(0.25) / GS4I_SQRT(squared) : GS4I_C(1);
 }
 
-/* tile += w_ip (m v + Q (x_i - x), m), Q_ij = Q[3 j + i] in kg/s: a velocity field that is affine around the particle */
-GS4I_INLINE void gs4i_scatter_affine(gs4_real *tile, const gs4i_stencil *s, gs4_real h, const gs4_real mv[3], gs4_real m, const gs4_real Q[9])
+/* tile += w_ip (m v + Q (x_i - x), m): a velocity field that is affine around the particle; mv has m in lane 3, the
+ * columns of Q (kg/s) have 0 there. */
+GS4I_INLINE void gs4i_scatter_affine(gs4_real *tile, gs4i_stencil *s, gs4_real h, const gs4i_quad *mv, const gs4i_quad Q[3])
 {
     gs4i_row w, wx, v, q, p0, p1, p2;
-    gs4_real ey[3], ez[3];
+    gs4i_quad t, r;
+    gs4_real e[3][4];
     int i;
-    for (i = 0; i < 3; i++) {
-        ey[i] = s->w[1][i] * ((GS4I_C(i - 1) - s->xi[1]) * h);
-        ez[i] = s->w[2][i] * ((GS4I_C(i - 1) - s->xi[2]) * h);
+    for (i = 0; i < 3; i++) {                               /* e_i = w_i (x_i - x) */
+        GS4I_SPLAT_MUL(t, -h, s->xi); GS4I_SHIFT(t, t, GS4I_C(i - 1) * h);
+        GS4I_LOAD(r, s->w[i]);
+        GS4I_MUL(t, t, r);
+        GS4I_STORE(e[i], t);
     }
-    gs4i_row_of_nodes(&w, s->w[0][0], s->w[0][1], s->w[0][2]);
-    gs4i_row_of_nodes(&wx, s->w[0][0] * ((GS4I_C(-1) - s->xi[0]) * h), s->w[0][1] * (-s->xi[0] * h),
-                      s->w[0][2] * ((GS4I_C(1) - s->xi[0]) * h));
-    gs4i_row_of_quad(&v, mv[0], mv[1], mv[2], m);
-    gs4i_row_of_quad(&q, Q[0], Q[1], Q[2], 0);
+    gs4i_row_of_nodes(&w, s->w[0][0], s->w[1][0], s->w[2][0]);
+    gs4i_row_of_nodes(&wx, e[0][0], e[1][0], e[2][0]);
+    gs4i_row_of_quad(&v, mv);
+    gs4i_row_of_quad(&q, &Q[0]);
     GS4I_MUL(p0, w, v); GS4I_MAD(p0, wx, q);
-    gs4i_row_of_quad(&q, Q[3], Q[4], Q[5], 0);
+    gs4i_row_of_quad(&q, &Q[1]);
     GS4I_MUL(p1, w, q);
-    gs4i_row_of_quad(&q, Q[6], Q[7], Q[8], 0);
+    gs4i_row_of_quad(&q, &Q[2]);
     GS4I_MUL(p2, w, q);
-    gs4i_scatter_rows(tile + 4 * s->base, &p0, &p1, &p2, s->w[1], ey, s->w[2], ez);
+    gs4i_scatter_rows(tile + 4 * s->base, &p0, &p1, &p2, s->w, e);
 }
 
 /* S3: m_i = sum w m, m_i v_i = sum w m (v~ + C (x_i - x~)) with v~ = v + alpha_f dt a. */
@@ -2076,46 +2170,64 @@ static void gs4i_scatter_momentum(int index, void *context)
 {
     const gs4i_pass *pass = (const gs4i_pass *)context;
     gs4_sim *sim = pass->sim;
-    const gs4i_rule *rule = &sim->rule;
     const gs4i_particles *p = &sim->particles;
+    const gs4_real reach = sim->rule.reach, dt = sim->rule.dt;
     const int o = pass->blocks[index];
-    gs4_real tile[GS4I_TILE_REALS], first[3];
+    const gs4i_frame frame = gs4i_tile_frame(&sim->grid, o);
+    gs4_real tile[GS4I_TILE_REALS];
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
+    int strayed = 0, j;
     gs4i_report_clear(&sim->reports[o]);
     memset(tile, 0, sizeof tile);
-    gs4i_tile_first(&sim->grid, o, first);
     for (; i < end; i++) {
-        const gs4_real *v = p->velocity + 4 * i, *a = p->rate + 4 * i, *C = p->affine + 9 * i, m = p->position[4 * i + 3];
-        const gs4_real bound = m * gs4i_affine_bound(C, rule->dt);
-        gs4_real mv[3], Q[9];
+        const gs4_real m = p->position[4 * i + 3];
+        gs4i_quad C[3], mv, a;
         gs4i_stencil s;
-        int c;
-        gs4i_predicted_stencil(sim, i, rule->reach, first, &s);
-        if (s.base < 0) { sim->reports[o].strayed++; continue; }
-        for (c = 0; c < 3; c++) mv[c] = m * (v[c] + rule->reach * a[c]);
-        for (c = 0; c < 9; c++) Q[c] = bound * C[c];
-        gs4i_scatter_affine(tile, &s, sim->grid.h, mv, m, Q);
+        gs4_real bound;
+        gs4i_predicted_stencil(sim, i, reach, &frame, &s);
+        if (s.base < 0) { strayed++; continue; }
+        gs4i_load_affine(p->affine + 9 * i, C);
+        bound = m * gs4i_affine_bound(C, dt);
+        for (j = 0; j < 3; j++) GS4I_SPLAT_MUL(C[j], bound, C[j]);
+        GS4I_LOAD(mv, p->velocity + 4 * i);
+        GS4I_LOAD(a, p->rate + 4 * i);
+        GS4I_SPLAT_MAD(mv, reach, a);
+        GS4I_SPLAT_MUL(mv, m, mv);
+        GS4I_LANE(mv, 3) = m;
+        gs4i_scatter_affine(tile, &s, sim->grid.h, &mv, C);
     }
+    sim->reports[o].strayed = strayed;
     gs4i_tile_add(&sim->grid, o, tile, sim->grid.momentum);
 }
 
-/* Cauchy stress (Pa, tension positive) of a Newtonian liquid: -p I + 2 mu D. Returns the viscosity used. */
-GS4I_INLINE gs4_real gs4i_liquid_stress(const gs4i_law *law, gs4_real J, const gs4_real L[9], gs4_real sigma[6])
+/* Cauchy stress (Pa, tension positive, by columns) of a Newtonian liquid, -p I + 2 mu D. Returns the viscosity used. */
+GS4I_INLINE gs4_real gs4i_liquid_stress(const gs4i_law *law, gs4_real J, const gs4i_quad L[3], gs4i_quad sigma[3])
 {
     const gs4_real p = gs4i_pressure(law, J);
-    gs4_real D[6], mu;
-    int c;
-    gs4i_strain_rate(L, D);
-    mu = gs4i_viscosity(law, D);
-    for (c = 0; c < 6; c++) sigma[c] = 2 * mu * D[c] - (c < 3 ? p : GS4I_C(0));
+    const gs4i_quad px = { GS4I_LANES(p, 0, 0, 0) }, py = { GS4I_LANES(0, p, 0, 0) }, pz = { GS4I_LANES(0, 0, p, 0) };
+    gs4i_quad D2[3];                                        /* 2 D = L + L^T */
+    gs4_real mu;
+    gs4i_transpose(&L[0], &L[1], &L[2], D2);
+    GS4I_SUM(D2[0], D2[0], L[0]); GS4I_SUM(D2[1], D2[1], L[1]); GS4I_SUM(D2[2], D2[2], L[2]);
+    mu = law->viscosity_fn ? gs4i_viscosity(law, D2) : law->viscosity;
+    GS4I_SPLAT_MUL(sigma[0], mu, D2[0]); GS4I_SPLAT_MUL(sigma[1], mu, D2[1]); GS4I_SPLAT_MUL(sigma[2], mu, D2[2]);
+    GS4I_DIFFERENCE(sigma[0], sigma[0], px); GS4I_DIFFERENCE(sigma[1], sigma[1], py); GS4I_DIFFERENCE(sigma[2], sigma[2], pz);
     return mu;
 }
 
-GS4I_INLINE void gs4i_see_liquid(gs4i_report *r, const gs4i_law *law, gs4_real J, gs4_real mu)
+/* Extremes of a liquid on its way through a pass. */
+typedef struct gs4i_seen { gs4_real min_J, max_J, max_viscosity, max_sound; } gs4i_seen;
+
+GS4I_INLINE void gs4i_see_liquid(gs4i_seen *r, const gs4i_law *law, gs4_real J, gs4_real mu)
 {
     r->min_J = gs4i_min(r->min_J, J); r->max_J = gs4i_max(r->max_J, J);
     r->max_viscosity = gs4i_max(r->max_viscosity, mu * law->inv_density);
     r->max_sound = gs4i_max(r->max_sound, law->sound_speed * gs4i_stiffening(J));
+}
+
+static void gs4i_report_liquid(gs4i_report *r, const gs4i_seen *seen)
+{
+    r->min_J = seen->min_J; r->max_J = seen->max_J; r->max_viscosity = seen->max_viscosity; r->max_sound = seen->max_sound;
 }
 
 GS4I_INLINE void gs4i_see_bad(gs4i_report *r, int reason, uint32_t id)
@@ -2129,46 +2241,42 @@ static void gs4i_scatter_forces(int index, void *context)
 {
     const gs4i_pass *pass = (const gs4i_pass *)context;
     gs4_sim *sim = pass->sim;
-    const gs4i_rule *rule = &sim->rule;
     const gs4i_particles *p = &sim->particles;
+    const gs4_real reach = sim->rule.reach, weight = sim->rule.s;
     const int o = pass->blocks[index];
-    const gs4_vec3 g = sim->desc.gravity;
-    gs4i_report report = sim->reports[o];
-    gs4_real nodes[GS4I_TILE_REALS], tile[GS4I_TILE_REALS], first[3];
+    const gs4i_frame frame = gs4i_tile_frame(&sim->grid, o);
+    const gs4i_quad g = { GS4I_LANES(sim->desc.gravity.x, sim->desc.gravity.y, sim->desc.gravity.z, 0) };
+    gs4i_report *report = &sim->reports[o];
+    gs4i_seen seen = { GS4I_HUGE, 0, 0, 0 };
+    gs4_real nodes[GS4I_TILE_REALS], tile[GS4I_TILE_REALS];
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
     gs4i_tile_load(&sim->grid, o, sim->grid.momentum, nodes);
     memset(tile, 0, sizeof tile);
-    gs4i_tile_first(&sim->grid, o, first);
     for (; i < end; i++) {
         const gs4i_law *law = &sim->laws[p->material[i]];
         const gs4_real m = p->position[4 * i + 3], J = p->velocity[4 * i + 3], Jr = p->rate[4 * i + 3];
-        gs4_real L[9], sigma[6], stage_J, V, mu;
-        gs4i_row w, d, s0, s1, s2, p0, p1, p2, f;
-        gs4i_quad gx, gy, gz;
+        gs4_real stage_J, V, mu;
+        gs4i_row w, d, p0, p1, p2, f;
+        gs4i_quad L[3], sigma[3], t;
+        gs4i_local n;
         gs4i_stencil s;
-        int c;
-        gs4i_predicted_stencil(sim, i, rule->reach, first, &s);
+        gs4i_predicted_stencil(sim, i, reach, &frame, &s);
         gs4i_x_weights(&s, &w, &d);
-        gs4i_gather_rows(nodes + 4 * s.base, &s, &s0, &s1, &s2);
-        gs4i_row_dot(&gx, &d, &s0); gs4i_row_dot(&gy, &w, &s1); gs4i_row_dot(&gz, &w, &s2);
-        for (c = 0; c < 3; c++) { L[c] = GS4I_LANE(gx, c); L[3 + c] = GS4I_LANE(gy, c); L[6 + c] = GS4I_LANE(gz, c); }
-        stage_J = (J + (rule->reach - rule->s) * Jr) / (1 - rule->s * (L[0] + L[4] + L[8]));   /* (J~ - J**)/s = J~ div v */
-        if (!(stage_J > GS4I_J_LOW && stage_J < GS4I_J_HIGH)) { gs4i_see_bad(&report, GS4I_BAD_VOLUME, p->id[i]); continue; }
+        gs4i_gather_local(nodes + 4 * s.base, &s, &w, &d, &n);
+        L[0] = n.dx; L[1] = n.dy; L[2] = n.dz;
+        stage_J = (J + (reach - weight) * Jr) / (1 - weight * (GS4I_LANE(n.dx, 0) + GS4I_LANE(n.dy, 1) + GS4I_LANE(n.dz, 2)));
+        if (!(stage_J > GS4I_J_LOW && stage_J < GS4I_J_HIGH)) { gs4i_see_bad(report, GS4I_BAD_VOLUME, p->id[i]); continue; }
         mu = gs4i_liquid_stress(law, stage_J, L, sigma);
-        if (!(mu >= 0 && mu < GS4I_HUGE)) { gs4i_see_bad(&report, GS4I_BAD_VISCOSITY, p->id[i]); continue; }
-        gs4i_see_liquid(&report, law, stage_J, mu);
+        if (!(mu >= 0 && mu < GS4I_HUGE)) { gs4i_see_bad(report, GS4I_BAD_VISCOSITY, p->id[i]); continue; }
+        gs4i_see_liquid(&seen, law, stage_J, mu);
         V = -m * law->inv_density * stage_J;
-        gs4i_row_of_quad(&f, V * sigma[0], V * sigma[3], V * sigma[4], 0);
-        GS4I_MUL(p0, d, f);
-        gs4i_row_of_quad(&f, m * g.x, m * g.y, m * g.z, 0);
-        GS4I_MAD(p0, w, f);
-        gs4i_row_of_quad(&f, V * sigma[3], V * sigma[1], V * sigma[5], 0);
-        GS4I_MUL(p1, w, f);
-        gs4i_row_of_quad(&f, V * sigma[4], V * sigma[5], V * sigma[2], 0);
-        GS4I_MUL(p2, w, f);
-        gs4i_scatter_rows(tile + 4 * s.base, &p0, &p1, &p2, s.w[1], s.d[1], s.w[2], s.d[2]);
+        GS4I_SPLAT_MUL(t, V, sigma[0]); gs4i_row_of_quad(&f, &t); GS4I_MUL(p0, d, f);
+        GS4I_SPLAT_MUL(t, m, g);        gs4i_row_of_quad(&f, &t); GS4I_MAD(p0, w, f);
+        GS4I_SPLAT_MUL(t, V, sigma[1]); gs4i_row_of_quad(&f, &t); GS4I_MUL(p1, w, f);
+        GS4I_SPLAT_MUL(t, V, sigma[2]); gs4i_row_of_quad(&f, &t); GS4I_MUL(p2, w, f);
+        gs4i_scatter_rows(tile + 4 * s.base, &p0, &p1, &p2, s.w, s.d);
     }
-    sim->reports[o] = report;
+    gs4i_report_liquid(report, &seen);
     gs4i_tile_add(&sim->grid, o, tile, sim->grid.force);
 }
 
@@ -2180,11 +2288,11 @@ static int gs4i_load_jumps(const gs4i_grid *g, int o, gs4_real *tile)
     for (i = 0; i < 27; i++) any |= g->jump_of[nb[i]];
     if (!any) return 0;
     memset(tile, 0, GS4I_TILE_REALS * sizeof *tile);
-    for (z = 0; z < GS4I_TILE; z++) for (y = 0; y < GS4I_TILE; y++) for (x = 0; x < GS4I_TILE; x++) {
-        int32_t slot = nb[((z + 2) / 4 * 3 + (y + 2) / 4) * 3 + (x + 2) / 4];
+    for (z = 0; z < GS4I_TILE; z++) for (y = 0; y < GS4I_TILE; y++) for (x = 0; x < GS4I_TILE; x += 2) {    /* two nodes at once */
+        const int32_t slot = nb[((z + 2) / 4 * 3 + (y + 2) / 4) * 3 + (x + 2) / 4];
         if (!g->jump_of[slot]) continue;
         memcpy(tile + 4 * ((z * GS4I_TILE + y) * GS4I_TILE + x),
-               gs4i_jump_at(g, (uint32_t)slot * 64 + (uint32_t)((((z + 2) & 3) << 4) | (((y + 2) & 3) << 2) | ((x + 2) & 3))), 4 * sizeof *tile);
+               gs4i_jump_at(g, (uint32_t)slot * 64 + (uint32_t)((((z + 2) & 3) << 4) | (((y + 2) & 3) << 2) | ((x + 2) & 3))), 8 * sizeof *tile);
     }
     return 1;
 }
@@ -2205,93 +2313,142 @@ GS4I_INLINE int gs4i_has_left(const gs4i_grid *g, const gs4_real x[3])
           && x[2] >= g->origin.z && x[2] < g->origin.z + GS4I_C(g->cells[2]) * g->h);
 }
 
-/* What the nodes tell a particle at S7. */
-typedef struct gs4i_gathered { gs4_real U[3], A[3], jump[3], L[9], slope[9]; } gs4i_gathered;
+/* A particle as S7 leaves it, and what nodes and contact said. */
+typedef struct gs4i_corrected { gs4i_quad x, v, a, lag, C[3]; } gs4i_corrected;
 
-/* S7, motion: v by rule 1 with the FLIP motion decaying at its rate, implicit in itself; x with the grid's velocity,
- * brought from the stage to the middle of the step; the gradient carried to the next stage, D(grad v)/Dt = grad a - L L. */
-GS4I_INLINE void gs4i_correct_motion(const gs4i_rule *r, const gs4i_gathered *n, gs4_real x[3], gs4_real v[3], gs4_real a[3],
-                                     gs4_real C[9], gs4_real lag[3])
+/* S7. Velocity by rule 1, the motion that the grid cannot see (v - U) decaying at its rate, implicit in itself; J by 2021
+ * (57), implicit in J for known div u; both as one quad (v, J) with its rate. Position with the grid's velocity U, brought
+ * from the stage to the middle of the step. Gradient carried to the next stage: D(grad v)/Dt = grad acc - L L. */
+GS4I_INLINE void gs4i_correct_one(const gs4i_rule *r, const gs4i_local *u, const gs4i_local *acc, const gs4i_quad *jump, gs4i_corrected *q)
 {
-    int i, j;
-    for (i = 0; i < 3; i++) {
-        const gs4_real from = v[i] + (r->reach - r->s) * a[i];          /* v** */
-        const gs4_real rate = (n->A[i] - r->decay * (from - n->U[i])) / (1 + r->s * r->decay);
-        const gs4_real change = (rate - a[i]) / r->alpha_m;
-        lag[i] = (v[i] + r->reach * a[i] + n->jump[i]) - n->U[i];
-        v[i] += r->dt * a[i] + r->gamma * r->dt * change + n->jump[i];
-        a[i] += change;
-        x[i] += r->dt * (n->U[i] - (r->alpha_f - GS4I_C(0.5)) * r->dt * n->A[i]);
-        for (j = 0; j < 3; j++)
-            C[3 * j + i] = n->L[3 * j + i] + r->dt * (n->slope[3 * j + i]
-                - (n->L[i] * n->L[3 * j] + n->L[3 + i] * n->L[3 * j + 1] + n->L[6 + i] * n->L[3 * j + 2]));
+    const gs4_real J = GS4I_LANE(q->v, 3), Jr = GS4I_LANE(q->a, 3);
+    const gs4_real div = GS4I_LANE(u->dx, 0) + GS4I_LANE(u->dy, 1) + GS4I_LANE(u->dz, 2);
+    const gs4i_quad *L[3], *slope[3];
+    gs4i_quad change, t;
+    int j;
+    L[0] = &u->dx; L[1] = &u->dy; L[2] = &u->dz; slope[0] = &acc->dx; slope[1] = &acc->dy; slope[2] = &acc->dz;
+    t = q->v; GS4I_SPLAT_MAD(t, r->reach - r->s, q->a);                 /* v** */
+    GS4I_DIFFERENCE(t, u->value, t);
+    GS4I_SPLAT_MUL(t, r->decay, t);
+    GS4I_SUM(t, t, acc->value);
+    GS4I_SPLAT_MUL(t, r->damped, t);                                    /* a~ = (sum w acc - k (v** - U)) / (1 + s k) */
+    GS4I_DIFFERENCE(change, t, q->a);
+    GS4I_SPLAT_MUL(change, r->inv_alpha_m, change);
+    GS4I_LANE(change, 3) = ((J + r->reach * Jr) * div - Jr) / (r->alpha_m - r->alpha_f * r->gamma * r->dt * div);
+    q->lag = q->v; GS4I_SPLAT_MAD(q->lag, r->reach, q->a);
+    GS4I_SUM(q->lag, q->lag, *jump);
+    GS4I_DIFFERENCE(q->lag, q->lag, u->value);
+    GS4I_SPLAT_MAD(q->v, r->dt, q->a);
+    GS4I_SPLAT_MAD(q->v, r->gamma * r->dt, change);
+    GS4I_SUM(q->v, q->v, *jump);
+    GS4I_SUM(q->a, q->a, change);
+    t = u->value; GS4I_SPLAT_MAD(t, (GS4I_C(0.5) - r->alpha_f) * r->dt, acc->value);
+    GS4I_SPLAT_MAD(q->x, r->dt, t);
+    for (j = 0; j < 3; j++) {
+        GS4I_SPLAT_MUL(t, GS4I_LANE(*L[j], 0), u->dx); GS4I_SPLAT_MAD(t, GS4I_LANE(*L[j], 1), u->dy); GS4I_SPLAT_MAD(t, GS4I_LANE(*L[j], 2), u->dz);
+        GS4I_DIFFERENCE(t, *slope[j], t);
+        q->C[j] = *L[j]; GS4I_SPLAT_MAD(q->C[j], r->dt, t);
     }
+}
+
+/* Walls, bodies and mouths on one particle after the step. */
+static void gs4i_correct_contact(gs4_sim *sim, gs4i_corrected *q, gs4i_report *report)
+{
+    gs4_real x[4], v[4], a[4], lag[4], C[9];
+    int j;
+    GS4I_STORE(x, q->x); GS4I_STORE(v, q->v); GS4I_STORE(a, q->a); GS4I_STORE(lag, q->lag);
+    gs4i_store_affine(C, q->C);
+    gs4i_put_back(&sim->boundary, &sim->grid, x, v);
+    gs4i_hold_in_mouth(&sim->boundary, x, v, a, C, lag);
+    report->left += gs4i_has_left(&sim->grid, x);
+    GS4I_LOAD(q->x, x); GS4I_LOAD(q->v, v); GS4I_LOAD(q->a, a); GS4I_LOAD(q->lag, lag);
+    for (j = 0; j < 3; j++) {
+        const gs4i_quad c = { GS4I_LANES(C[3 * j], C[3 * j + 1], C[3 * j + 2], 0) };
+        q->C[j] = c;
+    }
+}
+
+/* Is the result one that may be kept? Moved at most two cells, all finite, J in its range. */
+GS4I_INLINE void gs4i_judge(const gs4i_corrected *q, const gs4_real *old_x, gs4_real h, gs4i_report *report, uint32_t id)
+{
+    gs4_real moved = 0, all = 0;
+    gs4i_quad n;
+    int c;
+    gs4i_squares(q->C, &n);
+    for (c = 0; c < 3; c++) {
+        const gs4_real d = GS4I_LANE(q->x, c) - old_x[c];
+        moved += d * d;
+        all += GS4I_LANE(q->v, c) * GS4I_LANE(q->v, c) + GS4I_LANE(q->a, c);
+    }
+    if (!(GS4I_LANE(q->v, 3) > GS4I_J_LOW && GS4I_LANE(q->v, 3) < GS4I_J_HIGH && gs4i_finite(GS4I_LANE(q->a, 3)))) gs4i_see_bad(report, GS4I_BAD_VOLUME, id);
+    if (!(gs4i_finite(all) && gs4i_finite(gs4i_sum3(&n)) && moved <= 4 * h * h)) gs4i_see_bad(report, GS4I_BAD_MOTION, id);
+}
+
+/* Largest speed along an axis, and a bound of the largest |C|, as squares in lanes. */
+typedef struct gs4i_fastest { gs4i_quad speed2, gradient2; } gs4i_fastest;
+
+GS4I_INLINE void gs4i_see_motion(gs4i_fastest *f, const gs4i_corrected *q)
+{
+    gs4i_quad n;
+    GS4I_MUL(n, q->v, q->v); GS4I_GREATER(f->speed2, n, f->speed2);
+    gs4i_squares(q->C, &n); GS4I_GREATER(f->gradient2, n, f->gradient2);
+}
+
+static void gs4i_report_motion(gs4i_report *r, const gs4i_fastest *f)
+{
+    r->max_speed = gs4i_max(GS4I_LANE(f->speed2, 0), gs4i_max(GS4I_LANE(f->speed2, 1), GS4I_LANE(f->speed2, 2)));
+    r->max_gradient = gs4i_sum3(&f->gradient2);
+}
+
+GS4I_INLINE void gs4i_store_corrected(gs4i_particles *p, size_t i, const gs4i_corrected *q)
+{
+    gs4i_quad x = q->x;
+    GS4I_LANE(x, 3) = p->position[4 * i + 3];
+    GS4I_STORE(p->position + 4 * i, x); GS4I_STORE(p->velocity + 4 * i, q->v);
+    gs4i_store_affine(p->affine + 9 * i, q->C);
+    if (!p->with_rates) return;
+    GS4I_STORE(p->rate + 4 * i, q->a);
+    gs4i_store_lag(p->lag + 3 * i, &q->lag);
 }
 
 /* S7: gather and correct. With `commit` 0 nothing is written: a rehearsal that only reports. */
 GS4I_INLINE void gs4i_correct(gs4_sim *sim, int o, int commit)
 {
-    const gs4i_rule *rule = &sim->rule;
+    const gs4i_rule rule = sim->rule;
     gs4i_particles *p = &sim->particles;
     gs4i_grid *grid = &sim->grid;
-    gs4i_report report = sim->reports[o];
-    gs4_real u_nodes[GS4I_TILE_REALS], a_nodes[GS4I_TILE_REALS], j_nodes[GS4I_TILE_REALS], first[3];
+    gs4i_report *report = &sim->reports[o];
+    const gs4i_frame frame = gs4i_tile_frame(grid, o);
+    const gs4i_quad zero = { GS4I_LANES(0, 0, 0, 0) };
+    gs4i_fastest fastest = { zero, zero };
+    gs4_real u_nodes[GS4I_TILE_REALS], a_nodes[GS4I_TILE_REALS], j_nodes[GS4I_TILE_REALS];
     const int jumps = gs4i_load_jumps(grid, o, j_nodes), edge = jumps || gs4i_at_edge(grid, o);
     size_t i = (size_t)grid->first[o], end = (size_t)grid->first[o + 1];
     gs4i_tile_load(grid, o, grid->momentum, u_nodes);
     gs4i_tile_load(grid, o, grid->force, a_nodes);
-    gs4i_tile_first(grid, o, first);
     for (; i < end; i++) {
-        gs4_real *X = p->position + 4 * i, *V = p->velocity + 4 * i, *R = p->rate + 4 * i;
-        gs4_real x[3], v[4], a[4], C[9], lag[3], div, speed2 = 0, grad2 = 0, moved = 0;
-        gs4i_row w, d, s0, s1, s2;
-        gs4i_quad q0, q1, q2, q3;
+        gs4i_row w, d;
         gs4i_stencil s;
-        gs4i_gathered n;
-        int c;
-        gs4i_predicted_stencil(sim, i, rule->reach, first, &s);
+        gs4i_local u, acc;
+        gs4i_quad jump = zero;
+        gs4i_corrected q;
+        gs4i_predicted_stencil(sim, i, rule.reach, &frame, &s);
         gs4i_x_weights(&s, &w, &d);
-        gs4i_gather_rows(u_nodes + 4 * s.base, &s, &s0, &s1, &s2);
-        gs4i_row_dot(&q0, &w, &s0); gs4i_row_dot(&q1, &d, &s0); gs4i_row_dot(&q2, &w, &s1); gs4i_row_dot(&q3, &w, &s2);
-        for (c = 0; c < 3; c++) { n.U[c] = GS4I_LANE(q0, c); n.L[c] = GS4I_LANE(q1, c); n.L[3 + c] = GS4I_LANE(q2, c); n.L[6 + c] = GS4I_LANE(q3, c); }
-        gs4i_gather_rows(a_nodes + 4 * s.base, &s, &s0, &s1, &s2);
-        gs4i_row_dot(&q0, &w, &s0); gs4i_row_dot(&q1, &d, &s0); gs4i_row_dot(&q2, &w, &s1); gs4i_row_dot(&q3, &w, &s2);
-        for (c = 0; c < 3; c++) { n.A[c] = GS4I_LANE(q0, c); n.slope[c] = GS4I_LANE(q1, c); n.slope[3 + c] = GS4I_LANE(q2, c); n.slope[6 + c] = GS4I_LANE(q3, c); }
-        n.jump[0] = n.jump[1] = n.jump[2] = 0;
+        gs4i_gather_local(u_nodes + 4 * s.base, &s, &w, &d, &u);
+        gs4i_gather_local(a_nodes + 4 * s.base, &s, &w, &d, &acc);
         if (jumps) {
-            gs4i_gather_rows(j_nodes + 4 * s.base, &s, &s0, &s1, &s2);
-            gs4i_row_dot(&q0, &w, &s0);
-            for (c = 0; c < 3; c++) n.jump[c] = GS4I_LANE(q0, c);
+            gs4i_local from;
+            gs4i_gather_local(j_nodes + 4 * s.base, &s, &w, &d, &from);
+            jump = from.value; GS4I_LANE(jump, 3) = 0;
         }
-        for (c = 0; c < 3; c++) x[c] = X[c];
-        for (c = 0; c < 4; c++) { v[c] = V[c]; a[c] = R[c]; }
-        gs4i_correct_motion(rule, &n, x, v, a, C, lag);
-        div = n.L[0] + n.L[4] + n.L[8];
-        {                                                   /* J: 2021 (57), implicit in J for known div u */
-            const gs4_real change = ((v[3] + rule->reach * a[3]) * div - a[3]) / (rule->alpha_m - rule->alpha_f * rule->gamma * rule->dt * div);
-            v[3] += rule->dt * a[3] + rule->gamma * rule->dt * change;
-            a[3] += change;
-        }
-        for (c = 0; c < 3; c++) { speed2 += v[c] * v[c]; moved += (x[c] - X[c]) * (x[c] - X[c]); }
-        for (c = 0; c < 9; c++) grad2 += C[c] * C[c];
-        if (!commit) {
-            if (!(v[3] > GS4I_J_LOW && v[3] < GS4I_J_HIGH && gs4i_finite(a[3]))) gs4i_see_bad(&report, GS4I_BAD_VOLUME, p->id[i]);
-            if (!(gs4i_finite(speed2) && gs4i_finite(grad2) && gs4i_finite(a[0] + a[1] + a[2]) && moved <= 4 * grid->h * grid->h))
-                gs4i_see_bad(&report, GS4I_BAD_MOTION, p->id[i]);
-            continue;
-        }
-        report.max_speed = gs4i_max(report.max_speed, speed2);
-        report.max_gradient = gs4i_max(report.max_gradient, grad2);
-        if (edge) {
-            gs4i_put_back(&sim->boundary, grid, x, v);
-            gs4i_hold_in_mouth(&sim->boundary, x, v, a, C, lag);
-            report.left += gs4i_has_left(grid, x);
-        }
-        for (c = 0; c < 3; c++) { X[c] = x[c]; p->lag[3 * i + (size_t)c] = gs4i_to_half(lag[c]); }
-        for (c = 0; c < 4; c++) { V[c] = v[c]; R[c] = a[c]; }
-        for (c = 0; c < 9; c++) p->affine[9 * i + (size_t)c] = C[c];
+        GS4I_LOAD(q.x, p->position + 4 * i); GS4I_LOAD(q.v, p->velocity + 4 * i); GS4I_LOAD(q.a, p->rate + 4 * i);
+        gs4i_correct_one(&rule, &u, &acc, &jump, &q);
+        if (!commit) { gs4i_judge(&q, p->position + 4 * i, grid->h, report, p->id[i]); continue; }
+        if (edge) gs4i_correct_contact(sim, &q, report);
+        gs4i_see_motion(&fastest, &q);
+        gs4i_store_corrected(p, i, &q);
     }
-    sim->reports[o] = report;
+    if (commit) gs4i_report_motion(report, &fastest);
 }
 
 static void gs4i_correct_task(int index, void *context)
@@ -2315,31 +2472,36 @@ static void gs4i_scatter_euler(int index, void *context)
     const gs4i_particles *p = &sim->particles;
     const int o = pass->blocks[index];
     const gs4_real dt = sim->rule.dt, h = sim->grid.h;
-    const gs4_vec3 g = sim->desc.gravity;
-    gs4i_report report;
-    gs4_real tile[GS4I_TILE_REALS], first[3];
+    const gs4i_frame frame = gs4i_tile_frame(&sim->grid, o);
+    const gs4i_quad g = { GS4I_LANES(dt * sim->desc.gravity.x, dt * sim->desc.gravity.y, dt * sim->desc.gravity.z, 0) };
+    gs4i_report *report = &sim->reports[o];
+    gs4i_seen seen = { GS4I_HUGE, 0, 0, 0 };
+    gs4_real tile[GS4I_TILE_REALS];
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
-    gs4i_report_clear(&report);
+    int j;
+    gs4i_report_clear(report);
     memset(tile, 0, sizeof tile);
-    gs4i_tile_first(&sim->grid, o, first);
     for (; i < end; i++) {
         const gs4i_law *law = &sim->laws[p->material[i]];
-        const gs4_real *v = p->velocity + 4 * i, *C = p->affine + 9 * i, m = p->position[4 * i + 3], J = v[3];
-        const gs4_real bound = m * gs4i_affine_bound(C, dt), k = -dt * m * law->inv_density * J * (4 / (h * h));
-        gs4_real mv[3], Q[9], sigma[6], mu;
+        const gs4_real m = p->position[4 * i + 3], J = p->velocity[4 * i + 3], k = -dt * m * law->inv_density * J * (4 / (h * h));
+        gs4_real bound, mu;
+        gs4i_quad C[3], sigma[3], mv;
         gs4i_stencil s;
-        gs4i_predicted_stencil(sim, i, 0, first, &s);
-        if (s.base < 0) { report.strayed++; continue; }
+        gs4i_predicted_stencil(sim, i, 0, &frame, &s);
+        if (s.base < 0) { report->strayed++; continue; }
+        gs4i_load_affine(p->affine + 9 * i, C);
         mu = gs4i_liquid_stress(law, J, C, sigma);
-        if (!(mu >= 0 && mu < GS4I_HUGE)) { gs4i_see_bad(&report, GS4I_BAD_VISCOSITY, p->id[i]); continue; }
-        gs4i_see_liquid(&report, law, J, mu);
-        mv[0] = m * (v[0] + dt * g.x); mv[1] = m * (v[1] + dt * g.y); mv[2] = m * (v[2] + dt * g.z);
-        Q[0] = bound * C[0] + k * sigma[0]; Q[1] = bound * C[1] + k * sigma[3]; Q[2] = bound * C[2] + k * sigma[4];
-        Q[3] = bound * C[3] + k * sigma[3]; Q[4] = bound * C[4] + k * sigma[1]; Q[5] = bound * C[5] + k * sigma[5];
-        Q[6] = bound * C[6] + k * sigma[4]; Q[7] = bound * C[7] + k * sigma[5]; Q[8] = bound * C[8] + k * sigma[2];
-        gs4i_scatter_affine(tile, &s, h, mv, m, Q);
+        if (!(mu >= 0 && mu < GS4I_HUGE)) { gs4i_see_bad(report, GS4I_BAD_VISCOSITY, p->id[i]); continue; }
+        gs4i_see_liquid(&seen, law, J, mu);
+        bound = m * gs4i_affine_bound(C, dt);
+        for (j = 0; j < 3; j++) { GS4I_SPLAT_MUL(C[j], bound, C[j]); GS4I_SPLAT_MAD(C[j], k, sigma[j]); }
+        GS4I_LOAD(mv, p->velocity + 4 * i);
+        GS4I_SUM(mv, mv, g);
+        GS4I_SPLAT_MUL(mv, m, mv);
+        GS4I_LANE(mv, 3) = m;
+        gs4i_scatter_affine(tile, &s, h, &mv, C);
     }
-    sim->reports[o] = report;
+    gs4i_report_liquid(report, &seen);
     gs4i_tile_add(&sim->grid, o, tile, sim->grid.momentum);
 }
 
@@ -2349,48 +2511,35 @@ GS4I_INLINE void gs4i_gather_euler(gs4_sim *sim, int o, int commit)
     const gs4_real dt = sim->rule.dt;
     gs4i_particles *p = &sim->particles;
     gs4i_grid *grid = &sim->grid;
-    gs4i_report report = sim->reports[o];
-    gs4_real nodes[GS4I_TILE_REALS], first[3];
+    gs4i_report *report = &sim->reports[o];
+    const gs4i_frame frame = gs4i_tile_frame(grid, o);
+    const gs4i_quad zero = { GS4I_LANES(0, 0, 0, 0) };
+    gs4i_fastest fastest = { zero, zero };
+    gs4_real nodes[GS4I_TILE_REALS];
     int edge = gs4i_at_edge(grid, o), c;
     size_t i = (size_t)grid->first[o], end = (size_t)grid->first[o + 1];
     for (c = 0; c < 27; c++) edge |= grid->jump_of[grid->neighbour[27 * (size_t)o + (size_t)c]];
     gs4i_tile_load(grid, o, grid->momentum, nodes);
-    gs4i_tile_first(grid, o, first);
     for (; i < end; i++) {
-        gs4_real *X = p->position + 4 * i, *V = p->velocity + 4 * i, *C = p->affine + 9 * i;
-        gs4_real x[3], v[4], none[4], L[9], J, speed2 = 0, grad2 = 0;
-        gs4i_row w, d, s0, s1, s2;
-        gs4i_quad q0, q1, q2, q3;
+        const gs4_real J = p->velocity[4 * i + 3];
+        gs4i_row w, d;
         gs4i_stencil s;
-        gs4i_predicted_stencil(sim, i, 0, first, &s);
+        gs4i_local u;
+        gs4i_corrected q;
+        gs4i_predicted_stencil(sim, i, 0, &frame, &s);
         gs4i_x_weights(&s, &w, &d);
-        gs4i_gather_rows(nodes + 4 * s.base, &s, &s0, &s1, &s2);
-        gs4i_row_dot(&q0, &w, &s0); gs4i_row_dot(&q1, &d, &s0); gs4i_row_dot(&q2, &w, &s1); gs4i_row_dot(&q3, &w, &s2);
-        for (c = 0; c < 3; c++) {
-            v[c] = GS4I_LANE(q0, c); L[c] = GS4I_LANE(q1, c); L[3 + c] = GS4I_LANE(q2, c); L[6 + c] = GS4I_LANE(q3, c);
-            x[c] = X[c] + dt * v[c];
-            speed2 += v[c] * v[c];
-        }
-        for (c = 0; c < 9; c++) grad2 += L[c] * L[c];
-        J = V[3] + dt * V[3] * (L[0] + L[4] + L[8]);
-        if (!commit) {
-            if (!(J > GS4I_J_LOW && J < GS4I_J_HIGH)) gs4i_see_bad(&report, GS4I_BAD_VOLUME, p->id[i]);
-            if (!(gs4i_finite(grad2) && speed2 * dt * dt <= 4 * grid->h * grid->h)) gs4i_see_bad(&report, GS4I_BAD_MOTION, p->id[i]);
-            continue;
-        }
-        report.max_speed = gs4i_max(report.max_speed, speed2);
-        report.max_gradient = gs4i_max(report.max_gradient, grad2);
-        v[3] = J;
-        if (edge) {
-            gs4i_put_back(&sim->boundary, grid, x, v);
-            gs4i_hold_in_mouth(&sim->boundary, x, v, none, L, none);
-            report.left += gs4i_has_left(grid, x);
-        }
-        for (c = 0; c < 3; c++) X[c] = x[c];
-        for (c = 0; c < 4; c++) V[c] = v[c];
-        for (c = 0; c < 9; c++) C[c] = L[c];
+        gs4i_gather_local(nodes + 4 * s.base, &s, &w, &d, &u);
+        GS4I_LOAD(q.x, p->position + 4 * i);
+        GS4I_SPLAT_MAD(q.x, dt, u.value);
+        q.v = u.value; q.a = zero; q.lag = zero;
+        q.C[0] = u.dx; q.C[1] = u.dy; q.C[2] = u.dz;
+        GS4I_LANE(q.v, 3) = J + dt * J * (GS4I_LANE(u.dx, 0) + GS4I_LANE(u.dy, 1) + GS4I_LANE(u.dz, 2));
+        if (!commit) { gs4i_judge(&q, p->position + 4 * i, grid->h, report, p->id[i]); continue; }
+        if (edge) gs4i_correct_contact(sim, &q, report);
+        gs4i_see_motion(&fastest, &q);
+        gs4i_store_corrected(p, i, &q);
     }
-    sim->reports[o] = report;
+    if (commit) gs4i_report_motion(report, &fastest);
 }
 
 static void gs4i_gather_euler_task(int index, void *context)
@@ -2504,19 +2653,22 @@ static gs4_real gs4i_stable_dt(const gs4_sim *sim, const gs4i_report *r)
 static void gs4i_look_at_particles(const gs4_sim *sim, gs4i_report *r)
 {
     const gs4i_particles *p = &sim->particles;
+    gs4i_seen seen = { GS4I_HUGE, 0, 0, 0 };
     size_t i;
     int c;
     gs4i_report_clear(r);
     for (i = 0; i < (size_t)p->count; i++) {
         const gs4_real *v = p->velocity + 4 * i, *C = p->affine + 9 * i;
         const gs4i_law *law = &sim->laws[p->material[i]];
-        gs4_real D[6], grad2 = 0;
-        gs4i_strain_rate(C, D);
-        gs4i_see_liquid(r, law, v[3], gs4i_viscosity(law, D));
+        gs4i_quad L[3], sigma[3];
+        gs4_real grad2 = 0;
+        gs4i_load_affine(C, L);
+        gs4i_see_liquid(&seen, law, v[3], gs4i_liquid_stress(law, v[3], L, sigma));
         for (c = 0; c < 9; c++) grad2 += C[c] * C[c];
         r->max_speed = gs4i_max(r->max_speed, v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
         r->max_gradient = gs4i_max(r->max_gradient, grad2);
     }
+    gs4i_report_liquid(r, &seen);
     r->max_speed = GS4I_SQRT(r->max_speed);
     r->max_gradient = GS4I_SQRT(r->max_gradient);
     for (c = 0; c < sim->boundary.body_count; c++) {        /* what bodies and mouths will do to their nodes */
@@ -2537,6 +2689,8 @@ static gs4i_rule gs4i_make_rule(const gs4_sim *sim, gs4_real dt)
     k.reach = k.alpha_f * dt;
     k.s = k.alpha_f * k.gamma * dt / k.alpha_m;
     k.decay = sim->desc.flip_decay_time > 0 && gs4i_finite(sim->desc.flip_decay_time) ? 1 / sim->desc.flip_decay_time : GS4I_C(0);
+    k.damped = 1 / (1 + k.s * k.decay);
+    k.inv_alpha_m = 1 / k.alpha_m;
     return k;
 }
 

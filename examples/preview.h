@@ -38,7 +38,7 @@ static const float preview_speed[PREVIEW_COLOURS][3] = {
 
 /* ---- what to draw beside the particles ---- */
 typedef enum preview_kind {
-    PREVIEW_FLOOR = 0,              /* endless plane through a, normal b (zero: up); radius: side of its squares, 0: plain */
+    PREVIEW_FLOOR = 0,              /* endless plane through a, normal b or up; radius: side of its squares, 0: plain */
     PREVIEW_SPHERE,                 /* centre a, radius */
     PREVIEW_BOX,                    /* low corner a, high corner b */
     PREVIEW_ROOM,                   /* the same seen from within: only its far walls are drawn, and cast no shadow */
@@ -79,8 +79,14 @@ static preview_vec preview_add(preview_vec a, preview_vec b, float s)   /* a + s
 static preview_vec preview_mul(preview_vec a, preview_vec b) { return preview_make(a.x * b.x, a.y * b.y, a.z * b.z); }
 static preview_vec preview_scale(preview_vec a, float s) { return preview_make(a.x * s, a.y * s, a.z * s); }
 static preview_vec preview_mix(preview_vec a, preview_vec b, float t) { return preview_add(preview_scale(a, 1 - t), b, t); }
-static preview_vec preview_low(preview_vec a, preview_vec b)  { return preview_make(fminf(a.x, b.x), fminf(a.y, b.y), fminf(a.z, b.z)); }
-static preview_vec preview_high(preview_vec a, preview_vec b) { return preview_make(fmaxf(a.x, b.x), fmaxf(a.y, b.y), fmaxf(a.z, b.z)); }
+static preview_vec preview_low(preview_vec a, preview_vec b)
+{
+    return preview_make(fminf(a.x, b.x), fminf(a.y, b.y), fminf(a.z, b.z));
+}
+static preview_vec preview_high(preview_vec a, preview_vec b)
+{
+    return preview_make(fmaxf(a.x, b.x), fmaxf(a.y, b.y), fmaxf(a.z, b.z));
+}
 static preview_vec preview_power(preview_vec a, float x) { return preview_make(powf(a.x, x), powf(a.y, x), powf(a.z, x)); }
 static preview_vec preview_cross(preview_vec a, preview_vec b)
 {
@@ -503,7 +509,8 @@ static float preview_spacing(const preview_cloud *cloud)
 
 /* Draws spheres, for a light: nearest depth, length of the ray inside. For a map of what a ray may meet, `back` is
  * given: nearest and farthest depth of blocks as deep as they are wide, and one pixel wider. */
-static void preview_splat(const preview_camera *c, const preview_cloud *cloud, float radius, float *front, float *back, float *length)
+static void preview_splat(const preview_camera *c, const preview_cloud *cloud, float radius,
+                          float *front, float *back, float *length)
 {
     float fill = cloud->spacing / radius;                               /* spheres overlap: chords count for less */
     fill *= fill * fill / 4.19f;
@@ -546,7 +553,9 @@ static long preview_spline(const preview_grid *g, preview_vec p, float w[3][3], 
     if (!(x[0] < (float)(g->nx - 2) && x[1] < (float)(g->ny - 2) && x[2] < (float)(g->nz - 2))) return -1;
     for (int k = 0; k < 3; ++k) {
         float f = x[k] - (float)(i[k] = (int)(x[k] - 0.5f));
-        w[k][0] = 0.5f * (1.5f - f) * (1.5f - f); w[k][1] = 0.75f - (f - 1) * (f - 1); w[k][2] = 0.5f * (f - 0.5f) * (f - 0.5f);
+        w[k][0] = 0.5f * (1.5f - f) * (1.5f - f);
+        w[k][1] = 0.75f - (f - 1) * (f - 1);
+        w[k][2] = 0.5f * (f - 0.5f) * (f - 0.5f);
         slope[k][0] = f - 1.5f; slope[k][1] = 2 - 2 * f; slope[k][2] = f - 0.5f;
     }
     return ((long)i[2] * g->ny + i[1]) * g->nx + i[0];
@@ -620,7 +629,7 @@ static int preview_fill(preview_grid *g, const preview_cloud *cloud, preview_vec
 /* First depth between t and `end` at which the ray enters the liquid, 1e30 if it does not. */
 static float preview_enter(const preview_grid *g, preview_vec from, preview_vec dir, float t, float end)
 {
-    float step = 0.6f * g->cell, before = 0, now;
+    float step = 0.8f * g->cell, before = 0, now;
     for (; t < end; t += step, before = now) {
         now = preview_sample(g, g->fraction, preview_add(from, dir, t), NULL) - PREVIEW_LEVEL;
         if (now < 0) continue;
@@ -721,7 +730,10 @@ static int preview_trace(preview_scene *s)
     preview_splat(&coarse, &s->cloud, 2.2f * s->cloud.spacing, nearest, farthest, NULL);
     for (int y = 0; y < c->height; ++y) for (int x = 0; x < c->width; ++x) {
         int at = y * c->width + x, block = (y / 4) * coarse.width + x / 4;
-        preview_vec from, dir = preview_ray(c, x, y, &from);
+        preview_vec from, dir;
+        s->front[at] = 1e30f;
+        if (nearest[block] > s->wall[at] || farthest[block] <= 0) continue;
+        dir = preview_ray(c, x, y, &from);
         s->front[at] = preview_enter(&s->grid, from, dir, fmaxf(nearest[block], 0), fminf(farthest[block], s->wall[at]));
     }
     free(nearest);
@@ -748,8 +760,8 @@ static preview_entry preview_new_entry(const preview_scene *s, int at, int liqui
         here = preview_sample(g, g->fraction, e.p, &e.n);
         e.n = preview_scale(preview_unit(e.n), -1);
         e.value = g->value && here > 0 ? preview_sample(g, g->value, e.p, NULL) / here : 0.5f * (s->set.low + s->set.high);
-        for (float t = depth + 0.5f * g->cell; s->set.clarity > 0 && t < end; t += g->cell)
-            e.length += g->cell * fminf(preview_sample(g, g->fraction, preview_add(from, dir, t), NULL), 1);
+        for (float step = 1.5f * g->cell, t = depth + 0.5f * step; s->set.clarity > 0 && t < end; t += step)
+            e.length += step * fminf(preview_sample(g, g->fraction, preview_add(from, dir, t), NULL), 1);
     } else e.n = preview_scale(s->normal[at], preview_dot(s->normal[at], dir) > 0 ? -1.0f : 1.0f);
     e.direct = 0.22f * (1 - preview_dot(e.n, s->up));                   /* light that comes back from below */
     return e;
@@ -781,7 +793,7 @@ static int preview_list(preview_scene *s)
 }
 
 /* ---- light ---- */
-enum { PREVIEW_KEYS = 14, PREVIEW_LIGHTS = 38, PREVIEW_MAP = 320 };
+enum { PREVIEW_KEYS = 12, PREVIEW_LIGHTS = 36, PREVIEW_MAP = 320 };
 
 /* Direction and strength of light i: the first few fill a disc around the key, the others the sky. Together they
  * give an open floor the light 1. */
@@ -810,9 +822,11 @@ static void preview_add_light(preview_scene *s, float *map, int i)
 {
     float strength, bound = s->bound, h = s->cloud.spacing, fine = i < PREVIEW_KEYS ? 1.0f : 0.5f;
     preview_vec light = preview_light(s, i, &strength);
-    int size = (int)preview_clamp(3.3f * fine * bound / h, 64, fine * PREVIEW_MAP), n = size * size, clear = s->set.clarity > 0;
+    int size = (int)preview_clamp(3.3f * fine * bound / h, 64, fine * (float)PREVIEW_MAP), n = size * size;
+    int clear = s->set.clarity > 0;
     float *wall = map, *front = map + n, *length = map + 2 * n, texel = 2 * bound / (float)size, edge = (float)(size - 1);
-    preview_camera c = preview_aim(preview_add(s->centre, light, 2 * bound), preview_scale(light, -1), s->eye.right, size, size);
+    preview_vec source = preview_add(s->centre, light, 2 * bound);
+    preview_camera c = preview_aim(source, preview_scale(light, -1), s->eye.right, size, size);
     c.parallel = 1; c.focal = 1 / texel;
     for (int k = 0; k < n; ++k) { wall[k] = front[k] = 1e30f; length[k] = 0; }
     preview_draw_solids(&c, &s->set, s->up, wall, NULL, NULL);
@@ -858,7 +872,8 @@ static preview_vec preview_studio(const preview_scene *s, preview_vec d)
     float h = preview_dot(d, s->up), tall = preview_ramp(h, -0.25f, 0) * (1 - preview_ramp(h, 0.75f, 0.9f));
     preview_vec flat = preview_unit(preview_add(d, s->up, -h));
     preview_vec to = preview_unit(preview_add(s->key, s->up, -preview_dot(s->key, s->up)));
-    float lamps = 14 * preview_ramp(preview_dot(flat, to), 0.93f, 0.96f) + 1.5f * preview_ramp(preview_dot(d, s->eye.right), 0.75f, 0.85f);
+    float lamps = 14 * preview_ramp(preview_dot(flat, to), 0.93f, 0.96f);
+    lamps += 1.5f * preview_ramp(preview_dot(d, s->eye.right), 0.75f, 0.85f);
     return preview_add(preview_scale(s->backdrop, h < 0 ? 0.70f : 0.85f), preview_make(1, 0.98f, 0.95f), tall * lamps);
 }
 
@@ -879,7 +894,8 @@ static preview_vec preview_shade_solid(const preview_scene *s, const preview_ent
     preview_vec dir = preview_unit(preview_add(e->p, s->eye.eye, -1)), colour = preview_load(solid->colour);
     float far = preview_size(preview_add(e->p, s->centre, -1)) / s->bound;
     if (preview_size(colour) > 0) colour = preview_power(colour, 2.2f);
-    else colour = solid->kind == PREVIEW_FLOOR || solid->kind == PREVIEW_ROOM ? s->backdrop : preview_make(0.70f, 0.71f, 0.73f);
+    else if (solid->kind == PREVIEW_FLOOR || solid->kind == PREVIEW_ROOM) colour = s->backdrop;
+    else colour = preview_make(0.70f, 0.71f, 0.73f);
     colour = preview_mul(colour, preview_light_on(e, preview_colour(&s->set, 0.5f * (s->set.low + s->set.high))));
     if (s->ids[e->at] & 128) colour = preview_scale(colour, 0.82f);
     if (solid->kind == PREVIEW_FLOOR) return preview_mix(colour, preview_backdrop(s, dir), preview_ramp(far, 1.5f, 7));
@@ -890,11 +906,12 @@ static preview_vec preview_shade_solid(const preview_scene *s, const preview_ent
 static preview_vec preview_behind(const preview_scene *s, const preview_entry *e)
 {
     const preview_camera *c = &s->eye;
-    float slide = 0.25f * e->length * c->focal / s->front[e->at];
+    float slide = fminf(0.25f * e->length * c->focal / fmaxf(s->front[e->at], 1e-3f * s->bound), (float)c->width);
     int x = e->at % c->width - (int)(slide * preview_dot(e->n, c->right));
-    int y = e->at / c->width + (int)(slide * preview_dot(e->n, c->up)), at = e->at;
+    int y = e->at / c->width + (int)(slide * preview_dot(e->n, c->up)), at = e->at, inside;
     preview_vec from;
-    if (x >= 0 && y >= 0 && x < c->width && y < c->height && s->wall[y * c->width + x] > s->front[at]) at = y * c->width + x;
+    inside = x >= 0 && y >= 0 && x < c->width && y < c->height;
+    if (inside && s->wall[y * c->width + x] > s->front[at]) at = y * c->width + x;
     if (s->lit[0][at] >= 0) return s->entries[s->lit[0][at]].colour;
     return preview_backdrop(s, preview_ray(c, at % c->width, at / c->width, &from));
 }
@@ -903,11 +920,12 @@ static preview_vec preview_shade_liquid(const preview_scene *s, const preview_en
 {
     preview_vec dir = preview_unit(preview_add(e->p, s->eye.eye, -1)), body = preview_colour(&s->set, e->value);
     preview_vec colour = preview_mul(body, preview_light_on(e, body)), mirror;
-    float fresnel = fminf(s->set.shine * preview_fresnel(dir, e->n), 1), open = preview_clamp(e->direct + e->tinted, 0.15f, 1);
+    float fresnel = fminf(s->set.shine * preview_fresnel(dir, e->n), 1);
+    float open = preview_clamp(e->direct + e->tinted, 0.15f, 1);        /* dark corners mirror dark corners */
     if (s->set.clarity > 0) {                                           /* what passes, and what is scattered on the way */
-        float deep = e->length / s->set.clarity, cloud = 0.75f * (1 - expf(-deep));
+        float deep = e->length / s->set.clarity, cloud = 0.6f * (1 - expf(-deep));
         deep = 2 * (1 - expf(-0.5f * deep));                            /* of many paths the short ones are seen */
-        colour = preview_mul(colour, preview_power(body, 0.25f * deep));
+        colour = preview_mul(colour, preview_scale(preview_power(body, 0.15f * deep), 1.1f));
         colour = preview_mix(preview_mul(preview_behind(s, e), preview_power(body, deep)), colour, cloud);
     }
     mirror = preview_studio(s, preview_add(dir, e->n, -2 * preview_dot(dir, e->n)));

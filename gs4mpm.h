@@ -705,8 +705,6 @@ static void gs4i_shape_bounds(const gs4_shape *s, gs4_vec3 *low, gs4_vec3 *high)
 #endif
 #endif
 #ifdef GS4I_VECTORS
-typedef gs4_real gs4i_row  __attribute__((vector_size(16 * sizeof(gs4_real))));
-typedef gs4_real gs4i_pair __attribute__((vector_size(8 * sizeof(gs4_real))));
 typedef gs4_real gs4i_quad __attribute__((vector_size(4 * sizeof(gs4_real))));
 typedef int32_t  gs4i_int4 __attribute__((vector_size(16)));
 #ifdef GS4_DOUBLE
@@ -726,7 +724,6 @@ typedef int32_t  gs4i_mask __attribute__((vector_size(16)));
 #define GS4I_GREATER(r, a, b) do { const gs4i_mask gs4i_m = (a) > (b); \
     (r) = (gs4i_quad)(((gs4i_mask)(a) & gs4i_m) | ((gs4i_mask)(b) & ~gs4i_m)); } while (0)
 #else
-typedef struct gs4i_row  { gs4_real lane[16]; } gs4i_row;
 typedef struct gs4i_quad { gs4_real lane[4]; } gs4i_quad;
 #define GS4I_LANE(v, i) ((v).lane[i])
 #define GS4I_LANES(...) { __VA_ARGS__ }
@@ -745,22 +742,51 @@ typedef struct gs4i_quad { gs4_real lane[4]; } gs4i_quad;
 #define GS4I_LOAD(v, p) memcpy(&(v), (p), sizeof(v))
 #define GS4I_STORE(p, v) memcpy((p), &(v), sizeof(v))
 
-/* (a a a a  b b b b  c c c c  0 0 0 0): one number a node, spread over its four lanes */
+/* A row is one vector of sixteen where the machine has such, three quads elsewhere: it is not left to the compiler to
+ * break up long vectors, which costs gcc a factor of four. */
+#if defined(GS4I_VECTORS) && defined(__AVX512F__) && !defined(GS4_DOUBLE)
+#define GS4I_LONG_ROWS 1
+typedef gs4_real gs4i_pair __attribute__((vector_size(8 * sizeof(gs4_real))));
+typedef gs4_real gs4i_row  __attribute__((vector_size(16 * sizeof(gs4_real))));
+#define GS4I_ROW_LOAD GS4I_LOAD
+#define GS4I_ROW_STORE GS4I_STORE
+#define GS4I_ROW_MUL GS4I_MUL
+#define GS4I_ROW_MAD GS4I_MAD
+#define GS4I_ROW_SPLAT_MUL GS4I_SPLAT_MUL
+#define GS4I_ROW_SPLAT_MAD GS4I_SPLAT_MAD
+#define GS4I_ROW_SUM GS4I_SUM
+#define GS4I_ROW_DIFFERENCE GS4I_DIFFERENCE
+#else
+typedef struct gs4i_row { gs4i_quad a, b, c; } gs4i_row;                /* one quad a node */
+#define GS4I_ROW_LOAD(v, p) do { GS4I_LOAD((v).a, p); GS4I_LOAD((v).b, (p) + 4); GS4I_LOAD((v).c, (p) + 8); } while (0)
+#define GS4I_ROW_STORE(p, v) do { GS4I_STORE(p, (v).a); GS4I_STORE((p) + 4, (v).b); GS4I_STORE((p) + 8, (v).c); } while (0)
+#define GS4I_ROW_MUL(r, x, y) do { GS4I_MUL((r).a, (x).a, (y).a); GS4I_MUL((r).b, (x).b, (y).b); GS4I_MUL((r).c, (x).c, (y).c); } while (0)
+#define GS4I_ROW_MAD(r, x, y) do { GS4I_MAD((r).a, (x).a, (y).a); GS4I_MAD((r).b, (x).b, (y).b); GS4I_MAD((r).c, (x).c, (y).c); } while (0)
+#define GS4I_ROW_SPLAT_MUL(r, s, x) do { GS4I_SPLAT_MUL((r).a, s, (x).a); GS4I_SPLAT_MUL((r).b, s, (x).b); GS4I_SPLAT_MUL((r).c, s, (x).c); } while (0)
+#define GS4I_ROW_SPLAT_MAD(r, s, x) do { GS4I_SPLAT_MAD((r).a, s, (x).a); GS4I_SPLAT_MAD((r).b, s, (x).b); GS4I_SPLAT_MAD((r).c, s, (x).c); } while (0)
+#define GS4I_ROW_SUM(r, x, y) do { GS4I_SUM((r).a, (x).a, (y).a); GS4I_SUM((r).b, (x).b, (y).b); GS4I_SUM((r).c, (x).c, (y).c); } while (0)
+#define GS4I_ROW_DIFFERENCE(r, x, y) do { GS4I_DIFFERENCE((r).a, (x).a, (y).a); GS4I_DIFFERENCE((r).b, (x).b, (y).b); GS4I_DIFFERENCE((r).c, (x).c, (y).c); } while (0)
+#endif
+
+/* (a a a a  b b b b  c c c c): one number a node, spread over its four lanes */
 GS4I_INLINE void gs4i_row_of_nodes(gs4i_row *r, gs4_real a, gs4_real b, gs4_real c)
 {
-    const gs4i_row all = { GS4I_LANES(a, a, a, a, b, b, b, b, c, c, c, c, 0, 0, 0, 0) };
+#ifdef GS4I_LONG_ROWS
+    const gs4i_row all = { a, a, a, a, b, b, b, b, c, c, c, c, 0, 0, 0, 0 };
+#else
+    const gs4i_row all = { { GS4I_LANES(a, a, a, a) }, { GS4I_LANES(b, b, b, b) }, { GS4I_LANES(c, c, c, c) } };
+#endif
     *r = all;
 }
 
-/* (x y z w  x y z w  x y z w  x y z w): the same four numbers for each node */
+/* (x y z w  x y z w  x y z w): the same four numbers for each node */
 GS4I_INLINE void gs4i_row_of_quad(gs4i_row *r, const gs4i_quad *q)
 {
-#ifdef GS4I_VECTORS
+#ifdef GS4I_LONG_ROWS
     const gs4i_pair p = __builtin_shufflevector(*q, *q, 0, 1, 2, 3, 0, 1, 2, 3);    /* doubled twice: in one go gcc goes through memory */
     *r = __builtin_shufflevector(p, p, 0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7);
 #else
-    int i;
-    for (i = 0; i < 16; i++) r->lane[i] = q->lane[i & 3];
+    r->a = *q; r->b = *q; r->c = *q;
 #endif
 }
 
@@ -799,18 +825,18 @@ GS4I_INLINE void gs4i_split(const gs4i_quad *x, int cell[4], gs4i_quad *xi)
 #endif
 }
 
-/* q = sum over the nodes of a row of a_i b_i: (node 0 + node 2) + (node 1 + nothing) */
-GS4I_INLINE void gs4i_row_dot(gs4i_quad *q, const gs4i_row *a, const gs4i_row *b)
+/* q = sum over the nodes of a row of x_i y_i: (node 0 + node 2) + node 1 */
+GS4I_INLINE void gs4i_row_dot(gs4i_quad *q, const gs4i_row *x, const gs4i_row *y)
 {
-#ifdef GS4I_VECTORS
-    const gs4i_row t = *a * *b;
-    const gs4i_pair p = __builtin_shufflevector(t, t, 0, 1, 2, 3, 4, 5, 6, 7) + __builtin_shufflevector(t, t, 8, 9, 10, 11, 12, 13, 14, 15);
-    *q = __builtin_shufflevector(p, p, 0, 1, 2, 3) + __builtin_shufflevector(p, p, 4, 5, 6, 7);
+    gs4i_row t;
+    GS4I_ROW_MUL(t, *x, *y);
+#ifdef GS4I_LONG_ROWS
+    {
+        const gs4i_pair p = __builtin_shufflevector(t, t, 0, 1, 2, 3, 4, 5, 6, 7) + __builtin_shufflevector(t, t, 8, 9, 10, 11, 12, 13, 14, 15);
+        *q = __builtin_shufflevector(p, p, 0, 1, 2, 3) + __builtin_shufflevector(p, p, 4, 5, 6, 7);
+    }
 #else
-    int i;
-    for (i = 0; i < 4; i++)
-        GS4I_LANE(*q, i) = (GS4I_LANE(*a, i) * GS4I_LANE(*b, i) + GS4I_LANE(*a, 8 + i) * GS4I_LANE(*b, 8 + i))
-                         + (GS4I_LANE(*a, 4 + i) * GS4I_LANE(*b, 4 + i) + GS4I_LANE(*a, 12 + i) * GS4I_LANE(*b, 12 + i));
+    GS4I_SUM(*q, t.a, t.c); GS4I_SUM(*q, *q, t.b);
 #endif
 }
 
@@ -847,15 +873,15 @@ GS4I_INLINE void gs4i_scatter_rows(gs4_real *GS4I_RESTRICT at, const gs4i_row *p
     int j, k;
     for (j = 0; j < 3; j++) {
         gs4i_row a, b;
-        GS4I_SPLAT_MUL(a, w[j][1], *p0); GS4I_SPLAT_MAD(a, e[j][1], *p1);
-        GS4I_SPLAT_MUL(b, w[j][1], *p2);
+        GS4I_ROW_SPLAT_MUL(a, w[j][1], *p0); GS4I_ROW_SPLAT_MAD(a, e[j][1], *p1);
+        GS4I_ROW_SPLAT_MUL(b, w[j][1], *p2);
         for (k = 0; k < 3; k++) {
             gs4_real *row = at + 4 * GS4I_TILE * (GS4I_TILE * k + j);
             gs4i_row r, t;
-            GS4I_LOAD(r, row);
-            GS4I_SPLAT_MUL(t, w[k][2], a); GS4I_SPLAT_MAD(t, e[k][2], b);
-            GS4I_SUM(r, r, t);
-            GS4I_STORE(row, r);
+            GS4I_ROW_LOAD(r, row);
+            GS4I_ROW_SPLAT_MUL(t, w[k][2], a); GS4I_ROW_SPLAT_MAD(t, e[k][2], b);
+            GS4I_ROW_SUM(r, r, t);
+            GS4I_ROW_STORE(row, r);
         }
     }
 }
@@ -864,12 +890,12 @@ GS4I_INLINE void gs4i_scatter_rows(gs4_real *GS4I_RESTRICT at, const gs4i_row *p
 GS4I_INLINE void gs4i_gather_plane(const gs4_real *at, const gs4i_stencil *s, gs4i_row *plain, gs4i_row *slope)
 {
     gs4i_row r;
-    GS4I_LOAD(r, at);
-    GS4I_SPLAT_MUL(*plain, s->w[0][1], r); GS4I_SPLAT_MUL(*slope, s->d[0][1], r);
-    GS4I_LOAD(r, at + 4 * GS4I_TILE);
-    GS4I_SPLAT_MAD(*plain, s->w[1][1], r); GS4I_SPLAT_MAD(*slope, s->d[1][1], r);
-    GS4I_LOAD(r, at + 8 * GS4I_TILE);
-    GS4I_SPLAT_MAD(*plain, s->w[2][1], r); GS4I_SPLAT_MAD(*slope, s->d[2][1], r);
+    GS4I_ROW_LOAD(r, at);
+    GS4I_ROW_SPLAT_MUL(*plain, s->w[0][1], r); GS4I_ROW_SPLAT_MUL(*slope, s->d[0][1], r);
+    GS4I_ROW_LOAD(r, at + 4 * GS4I_TILE);
+    GS4I_ROW_SPLAT_MAD(*plain, s->w[1][1], r); GS4I_ROW_SPLAT_MAD(*slope, s->d[1][1], r);
+    GS4I_ROW_LOAD(r, at + 8 * GS4I_TILE);
+    GS4I_ROW_SPLAT_MAD(*plain, s->w[2][1], r); GS4I_ROW_SPLAT_MAD(*slope, s->d[2][1], r);
 }
 
 /* What nodes give to a particle: the value (lane 3: of the fourth number) and the columns of its gradient. */
@@ -881,11 +907,11 @@ GS4I_INLINE void gs4i_gather_local(const gs4_real *at, const gs4i_stencil *s, co
     const int next = 4 * GS4I_TILE * GS4I_TILE;
     gs4i_row plain, slope, s0, s1, s2;
     gs4i_gather_plane(at, s, &plain, &slope);
-    GS4I_SPLAT_MUL(s0, s->w[0][2], plain); GS4I_SPLAT_MUL(s1, s->w[0][2], slope); GS4I_SPLAT_MUL(s2, s->d[0][2], plain);
+    GS4I_ROW_SPLAT_MUL(s0, s->w[0][2], plain); GS4I_ROW_SPLAT_MUL(s1, s->w[0][2], slope); GS4I_ROW_SPLAT_MUL(s2, s->d[0][2], plain);
     gs4i_gather_plane(at + next, s, &plain, &slope);
-    GS4I_SPLAT_MAD(s0, s->w[1][2], plain); GS4I_SPLAT_MAD(s1, s->w[1][2], slope); GS4I_SPLAT_MAD(s2, s->d[1][2], plain);
+    GS4I_ROW_SPLAT_MAD(s0, s->w[1][2], plain); GS4I_ROW_SPLAT_MAD(s1, s->w[1][2], slope); GS4I_ROW_SPLAT_MAD(s2, s->d[1][2], plain);
     gs4i_gather_plane(at + 2 * next, s, &plain, &slope);
-    GS4I_SPLAT_MAD(s0, s->w[2][2], plain); GS4I_SPLAT_MAD(s1, s->w[2][2], slope); GS4I_SPLAT_MAD(s2, s->d[2][2], plain);
+    GS4I_ROW_SPLAT_MAD(s0, s->w[2][2], plain); GS4I_ROW_SPLAT_MAD(s1, s->w[2][2], slope); GS4I_ROW_SPLAT_MAD(s2, s->d[2][2], plain);
     gs4i_row_dot(&l->value, wx, &s0);
     gs4i_row_dot(&l->dx, dx, &s0); gs4i_row_dot(&l->dy, wx, &s1); gs4i_row_dot(&l->dz, wx, &s2);
 }
@@ -1129,31 +1155,36 @@ GS4I_INLINE void gs4i_tile_row(const gs4i_grid *g, int o, int y, int z, ptrdiff_
     for (i = 0; i < 3; i++) at[i] = (ptrdiff_t)nb[(bz * 3 + by) * 3 + i] * GS4I_NODE_REALS + row;
 }
 
-static void gs4i_tile_load(const gs4i_grid *g, int o, const gs4_real *GS4I_RESTRICT field, gs4_real *GS4I_RESTRICT tile)
+/* Rows of a tile that particles touch, a bit each: row (y, z) is bit 8 z + y. */
+GS4I_INLINE uint64_t gs4i_touched_rows(int base) { return (uint64_t)0x070707u << (base / GS4I_TILE); }
+
+/* The touched rows of a field into a tile, and the row behind each, because reads may run a node over the end. */
+static void gs4i_tile_load(const gs4i_grid *g, int o, uint64_t rows, const gs4_real *GS4I_RESTRICT field, gs4_real *GS4I_RESTRICT tile)
 {
-    int y, z;
-    for (z = 0; z < GS4I_TILE; z++) for (y = 0; y < GS4I_TILE; y++) {
+    int row;
+    rows |= rows << 1;
+    for (row = 0; row < 64; row++, tile += 4 * GS4I_TILE) {
         ptrdiff_t at[3];
-        gs4i_tile_row(g, o, y, z, at);
+        if (!(rows >> row & 1)) continue;
+        gs4i_tile_row(g, o, row & 7, row >> 3, at);
         memcpy(tile, field + at[0] + 8, 8 * sizeof(gs4_real));
         memcpy(tile + 8, field + at[1], 16 * sizeof(gs4_real));
         memcpy(tile + 24, field + at[2], 8 * sizeof(gs4_real));
-        tile += 4 * GS4I_TILE;
     }
     memset(tile, 0, 16 * sizeof(gs4_real));
 }
 
-static void gs4i_tile_add(const gs4i_grid *g, int o, const gs4_real *GS4I_RESTRICT tile, gs4_real *GS4I_RESTRICT field)
+static void gs4i_tile_add(const gs4i_grid *g, int o, uint64_t rows, const gs4_real *GS4I_RESTRICT tile, gs4_real *GS4I_RESTRICT field)
 {
-    int y, z, i;
-    for (z = 0; z < GS4I_TILE; z++) for (y = 0; y < GS4I_TILE; y++) {
+    int row, i;
+    for (row = 0; row < 64; row++, tile += 4 * GS4I_TILE) {
         ptrdiff_t at[3];
         gs4_real *to;
-        gs4i_tile_row(g, o, y, z, at);
+        if (!(rows >> row & 1)) continue;
+        gs4i_tile_row(g, o, row & 7, row >> 3, at);
         for (to = field + at[0] + 8, i = 0; i < 8; i++) to[i] += tile[i];
         for (to = field + at[1], i = 0; i < 16; i++) to[i] += tile[8 + i];
         for (to = field + at[2], i = 0; i < 8; i++) to[i] += tile[24 + i];
-        tile += 4 * GS4I_TILE;
     }
 }
 
@@ -2003,6 +2034,7 @@ typedef struct gs4i_rule {
 typedef struct gs4i_report {
     gs4_real max_speed, max_gradient, min_J, max_J, max_viscosity /* kinematic */, max_sound;
     int strayed;                        /* particles outside of the tile: sort and try again */
+    uint64_t rows;                      /* of the tile that its particles touch */
     int left;                           /* particles that went out through an open wall */
     int bad; uint32_t bad_id;           /* a particle that cannot be trusted, 1 + reason */
 } gs4i_report;
@@ -2064,7 +2096,10 @@ static void gs4i_report_merge(gs4i_report *into, const gs4i_report *r)
  *
  * Each kernel does one occupied block: predicted positions, weights, 27 nodes a particle. Kernels that scatter run
  * colour by colour, so that no two tiles in work share a node; sums within a block run in the order of its particles.
- * They are long because everything that one particle needs happens while its weights are in registers. */
+ * Within a block particles go in batches, stage by stage: a particle's own chain of operations is long, and several of
+ * them overlap only if each loop is short (measured: 1.9 times faster than all stages in one loop). */
+
+enum { GS4I_BATCH = 16 };
 
 #define GS4I_J_LOW GS4I_C(0.0625)       /* a volume ratio outside of this range is refused */
 #define GS4I_J_HIGH GS4I_C(16)
@@ -2073,7 +2108,7 @@ enum { GS4I_BAD_VOLUME = 1, GS4I_BAD_MOTION, GS4I_BAD_VISCOSITY };
 typedef struct gs4i_pass { gs4_sim *sim; const int32_t *blocks; } gs4i_pass;
 
 /* From particle to tile coordinates: (x - origin) / h - first. */
-typedef struct gs4i_frame { gs4i_quad origin, first; } gs4i_frame;
+typedef struct gs4i_frame { gs4i_quad origin, first; gs4_real inv_h; } gs4i_frame;
 
 GS4I_INLINE gs4i_frame gs4i_tile_frame(const gs4i_grid *g, int o)
 {
@@ -2083,20 +2118,20 @@ GS4I_INLINE gs4i_frame gs4i_tile_frame(const gs4i_grid *g, int o)
     {
         const gs4i_quad origin = { GS4I_LANES(g->origin.x, g->origin.y, g->origin.z, 0) };
         const gs4i_quad first = { GS4I_LANES(GS4I_C(4 * at[0] - 6), GS4I_C(4 * at[1] - 6), GS4I_C(4 * at[2] - 6), 0) };
-        f.origin = origin; f.first = first;
+        f.origin = origin; f.first = first; f.inv_h = g->inv_h;
     }
     return f;
 }
 
 /* S2: weights at the predicted position x~ = x + alpha_f dt (v - lag). */
-GS4I_INLINE void gs4i_predicted_stencil(const gs4_sim *sim, size_t i, gs4_real reach, const gs4i_frame *f, gs4i_stencil *s)
+GS4I_INLINE void gs4i_predicted_stencil(const gs4i_particles *p, size_t i, gs4_real reach, const gs4i_frame *f, gs4i_stencil *s)
 {
     gs4i_quad x;
-    gs4i_predicted_position(&sim->particles, i, reach, &x);
+    gs4i_predicted_position(p, i, reach, &x);
     GS4I_DIFFERENCE(x, x, f->origin);
-    GS4I_SPLAT_MUL(x, sim->grid.inv_h, x);
+    GS4I_SPLAT_MUL(x, f->inv_h, x);
     GS4I_DIFFERENCE(x, x, f->first);
-    gs4i_stencil_at(s, &x, sim->grid.inv_h);
+    gs4i_stencil_at(s, &x, f->inv_h);
 }
 
 /* The columns of a particle's velocity gradient, lane 3 zero. */
@@ -2139,30 +2174,38 @@ GS4I_INLINE gs4_real gs4i_affine_bound(const gs4i_quad c[3], gs4_real dt)
     return squared > GS4I_C(0.0625) ? GS4I_C(0.25) / GS4I_SQRT(squared) : GS4I_C(1);
 }
 
-/* tile += w_ip (m v + Q (x_i - x), m): a velocity field that is affine around the particle; mv has m in lane 3, the
- * columns of Q (kg/s) have 0 there. */
-GS4I_INLINE void gs4i_scatter_affine(gs4_real *tile, gs4i_stencil *s, gs4_real h, const gs4i_quad *mv, const gs4i_quad Q[3])
+/* tile += w_ip (m v + Q (x_i - x), m): a velocity field that is affine around the particle; mv has m in lane 3, the columns
+ * of Q (kg/s) have 0 there. Written from the middle node: w_ij (B + (i - 1) Q_x h + (j - 1) Q_y h + (k - 1) Q_z h). */
+GS4I_INLINE void gs4i_scatter_affine(gs4_real *tile, const gs4i_stencil *s, gs4_real h, const gs4i_quad *mv, const gs4i_quad Q[3])
 {
-    gs4i_row w, wx, v, q, p0, p1, p2;
-    gs4i_quad t, r;
-    gs4_real e[3][4];
-    int i;
-    for (i = 0; i < 3; i++) {                               /* e_i = w_i (x_i - x) */
-        GS4I_SPLAT_MUL(t, -h, s->xi); GS4I_SHIFT(t, t, GS4I_C(i - 1) * h);
-        GS4I_LOAD(r, s->w[i]);
-        GS4I_MUL(t, t, r);
-        GS4I_STORE(e[i], t);
-    }
+    gs4i_row w, wx, v, p0, p1, p2, side[3], r, t;
+    gs4i_quad qx, qy, qz, b, product, y[3];
+    gs4_real yz[3][4];
+    int j, k;
+    GS4I_SPLAT_MUL(qx, h, Q[0]); GS4I_SPLAT_MUL(qy, h, Q[1]); GS4I_SPLAT_MUL(qz, h, Q[2]);
+    b = *mv;
+    GS4I_SPLAT_MAD(b, -GS4I_LANE(s->xi, 0), qx); GS4I_SPLAT_MAD(b, -GS4I_LANE(s->xi, 1), qy); GS4I_SPLAT_MAD(b, -GS4I_LANE(s->xi, 2), qz);
+    GS4I_LOAD(y[0], s->w[0]); GS4I_LOAD(y[1], s->w[1]); GS4I_LOAD(y[2], s->w[2]);
+    gs4i_transpose(&y[0], &y[1], &y[2], y);
+    for (k = 0; k < 3; k++) { GS4I_SPLAT_MUL(product, s->w[k][2], y[1]); GS4I_STORE(yz[k], product); }      /* w_j w_k */
     gs4i_row_of_nodes(&w, s->w[0][0], s->w[1][0], s->w[2][0]);
-    gs4i_row_of_nodes(&wx, e[0][0], e[1][0], e[2][0]);
-    gs4i_row_of_quad(&v, mv);
-    gs4i_row_of_quad(&q, &Q[0]);
-    GS4I_MUL(p0, w, v); GS4I_MAD(p0, wx, q);
-    gs4i_row_of_quad(&q, &Q[1]);
-    GS4I_MUL(p1, w, q);
-    gs4i_row_of_quad(&q, &Q[2]);
-    GS4I_MUL(p2, w, q);
-    gs4i_scatter_rows(tile + 4 * s->base, &p0, &p1, &p2, s->w, e);
+    gs4i_row_of_nodes(&wx, -s->w[0][0], 0, s->w[2][0]);
+    gs4i_row_of_quad(&v, &b); GS4I_ROW_MUL(p0, w, v);
+    gs4i_row_of_quad(&v, &qx); GS4I_ROW_MAD(p0, wx, v);
+    gs4i_row_of_quad(&v, &qy); GS4I_ROW_MUL(p1, w, v);
+    gs4i_row_of_quad(&v, &qz); GS4I_ROW_MUL(p2, w, v);
+    for (j = 0; j < 3; j++) {
+        if (j == 0) GS4I_ROW_DIFFERENCE(side[1], p0, p1); else if (j == 1) side[1] = p0; else GS4I_ROW_SUM(side[1], p0, p1);
+        GS4I_ROW_DIFFERENCE(side[0], side[1], p2);
+        GS4I_ROW_SUM(side[2], side[1], p2);
+        for (k = 0; k < 3; k++) {
+            gs4_real *row = tile + 4 * (s->base + GS4I_TILE * (GS4I_TILE * k + j));
+            GS4I_ROW_LOAD(r, row);
+            GS4I_ROW_SPLAT_MUL(t, yz[k][j], side[k]);
+            GS4I_ROW_SUM(r, r, t);
+            GS4I_ROW_STORE(row, r);
+        }
+    }
 }
 
 /* S3: m_i = sum w m, m_i v_i = sum w m (v~ + C (x_i - x~)) with v~ = v + alpha_f dt a. */
@@ -2170,34 +2213,44 @@ static void gs4i_scatter_momentum(int index, void *context)
 {
     const gs4i_pass *pass = (const gs4i_pass *)context;
     gs4_sim *sim = pass->sim;
-    const gs4i_particles *p = &sim->particles;
-    const gs4_real reach = sim->rule.reach, dt = sim->rule.dt;
+    const gs4i_particles p = sim->particles;               /* copies: stores cannot alias them */
+    const gs4_real reach = sim->rule.reach, dt = sim->rule.dt, h = sim->grid.h;
     const int o = pass->blocks[index];
     const gs4i_frame frame = gs4i_tile_frame(&sim->grid, o);
     gs4_real tile[GS4I_TILE_REALS];
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
     int strayed = 0, j;
+    uint64_t rows = 0;
     gs4i_report_clear(&sim->reports[o]);
     memset(tile, 0, sizeof tile);
-    for (; i < end; i++) {
-        const gs4_real m = p->position[4 * i + 3];
-        gs4i_quad C[3], mv, a;
-        gs4i_stencil s;
-        gs4_real bound;
-        gs4i_predicted_stencil(sim, i, reach, &frame, &s);
-        if (s.base < 0) { strayed++; continue; }
-        gs4i_load_affine(p->affine + 9 * i, C);
-        bound = m * gs4i_affine_bound(C, dt);
-        for (j = 0; j < 3; j++) GS4I_SPLAT_MUL(C[j], bound, C[j]);
-        GS4I_LOAD(mv, p->velocity + 4 * i);
-        GS4I_LOAD(a, p->rate + 4 * i);
-        GS4I_SPLAT_MAD(mv, reach, a);
-        GS4I_SPLAT_MUL(mv, m, mv);
-        GS4I_LANE(mv, 3) = m;
-        gs4i_scatter_affine(tile, &s, sim->grid.h, &mv, C);
+    for (; i < end; i += GS4I_BATCH) {
+        const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
+        gs4i_stencil s[GS4I_BATCH];
+        gs4i_quad C[GS4I_BATCH][3], mv[GS4I_BATCH], a;
+        int b;
+        for (b = 0; b < n; b++) gs4i_predicted_stencil(&p, i + (size_t)b, reach, &frame, &s[b]);
+        for (b = 0; b < n; b++) {
+            const size_t k = i + (size_t)b;
+            const gs4_real m = p.position[4 * k + 3];
+            gs4_real bound;
+            gs4i_load_affine(p.affine + 9 * k, C[b]);
+            bound = m * gs4i_affine_bound(C[b], dt);
+            for (j = 0; j < 3; j++) GS4I_SPLAT_MUL(C[b][j], bound, C[b][j]);
+            GS4I_LOAD(mv[b], p.velocity + 4 * k);
+            GS4I_LOAD(a, p.rate + 4 * k);
+            GS4I_SPLAT_MAD(mv[b], reach, a);
+            GS4I_SPLAT_MUL(mv[b], m, mv[b]);
+            GS4I_LANE(mv[b], 3) = m;
+        }
+        for (b = 0; b < n; b++) {
+            if (s[b].base < 0) { strayed++; continue; }
+            rows |= gs4i_touched_rows(s[b].base);
+            gs4i_scatter_affine(tile, &s[b], h, &mv[b], C[b]);
+        }
     }
     sim->reports[o].strayed = strayed;
-    gs4i_tile_add(&sim->grid, o, tile, sim->grid.momentum);
+    sim->reports[o].rows = rows;
+    gs4i_tile_add(&sim->grid, o, rows, tile, sim->grid.momentum);
 }
 
 /* Cauchy stress (Pa, tension positive, by columns) of a Newtonian liquid, -p I + 2 mu D. Returns the viscosity used. */
@@ -2235,49 +2288,75 @@ GS4I_INLINE void gs4i_see_bad(gs4i_report *r, int reason, uint32_t id)
     if (!r->bad) { r->bad = reason; r->bad_id = id; }
 }
 
+/* Stress at the stage of one particle: f = columns of -V sigma, and m g. */
+GS4I_INLINE void gs4i_stage_force(const gs4i_law *laws, const gs4i_particles *p, size_t i, gs4_real reach, gs4_real weight,
+                                  const gs4i_local *n, const gs4i_quad *g, gs4i_quad f[4], gs4i_seen *seen, gs4i_report *report)
+{
+    const gs4i_law *law = &laws[p->material[i]];
+    const gs4_real m = p->position[4 * i + 3], J = p->velocity[4 * i + 3], Jr = p->rate[4 * i + 3];
+    const gs4_real div = GS4I_LANE(n->dx, 0) + GS4I_LANE(n->dy, 1) + GS4I_LANE(n->dz, 2);
+    const gs4_real stage_J = (J + (reach - weight) * Jr) / (1 - weight * div);      /* (J~ - J**) / s = J~ div v */
+    const gs4_real V = -m * law->inv_density * stage_J;
+    gs4i_quad L[3], sigma[3];
+    gs4_real mu;
+    L[0] = n->dx; L[1] = n->dy; L[2] = n->dz;
+    mu = gs4i_liquid_stress(law, stage_J, L, sigma);
+    if (!(stage_J > GS4I_J_LOW && stage_J < GS4I_J_HIGH)) gs4i_see_bad(report, GS4I_BAD_VOLUME, p->id[i]);
+    if (!(mu >= 0 && mu < GS4I_HUGE)) gs4i_see_bad(report, GS4I_BAD_VISCOSITY, p->id[i]);
+    gs4i_see_liquid(seen, law, stage_J, mu);
+    GS4I_SPLAT_MUL(f[0], V, sigma[0]); GS4I_SPLAT_MUL(f[1], V, sigma[1]); GS4I_SPLAT_MUL(f[2], V, sigma[2]);
+    GS4I_SPLAT_MUL(f[3], m, *g);
+}
+
+/* tile += (-V sigma) grad w + w m g */
+GS4I_INLINE void gs4i_scatter_force(gs4_real *tile, gs4i_stencil *s, const gs4i_row *w, const gs4i_row *d, const gs4i_quad f[4])
+{
+    gs4i_row p0, p1, p2, r;
+    gs4i_row_of_quad(&r, &f[0]); GS4I_ROW_MUL(p0, *d, r);
+    gs4i_row_of_quad(&r, &f[3]); GS4I_ROW_MAD(p0, *w, r);
+    gs4i_row_of_quad(&r, &f[1]); GS4I_ROW_MUL(p1, *w, r);
+    gs4i_row_of_quad(&r, &f[2]); GS4I_ROW_MUL(p2, *w, r);
+    gs4i_scatter_rows(tile + 4 * s->base, &p0, &p1, &p2, s->w, s->d);
+}
+
 /* S4 and S5: L~ = sum v_i (x) grad w, J~ by rule 1 and implicit in itself for known L~, stress there, and
  * f_i = - sum V sigma grad w + sum w m g. */
 static void gs4i_scatter_forces(int index, void *context)
 {
     const gs4i_pass *pass = (const gs4i_pass *)context;
     gs4_sim *sim = pass->sim;
-    const gs4i_particles *p = &sim->particles;
+    const gs4i_particles p = sim->particles;               /* copies: stores cannot alias them */
     const gs4_real reach = sim->rule.reach, weight = sim->rule.s;
     const int o = pass->blocks[index];
     const gs4i_frame frame = gs4i_tile_frame(&sim->grid, o);
     const gs4i_quad g = { GS4I_LANES(sim->desc.gravity.x, sim->desc.gravity.y, sim->desc.gravity.z, 0) };
     gs4i_report *report = &sim->reports[o];
+    const gs4i_law *laws = sim->laws;
     gs4i_seen seen = { GS4I_HUGE, 0, 0, 0 };
     gs4_real nodes[GS4I_TILE_REALS], tile[GS4I_TILE_REALS];
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
-    gs4i_tile_load(&sim->grid, o, sim->grid.momentum, nodes);
+    gs4i_tile_load(&sim->grid, o, report->rows, sim->grid.momentum, nodes);
     memset(tile, 0, sizeof tile);
-    for (; i < end; i++) {
-        const gs4i_law *law = &sim->laws[p->material[i]];
-        const gs4_real m = p->position[4 * i + 3], J = p->velocity[4 * i + 3], Jr = p->rate[4 * i + 3];
-        gs4_real stage_J, V, mu;
-        gs4i_row w, d, p0, p1, p2, f;
-        gs4i_quad L[3], sigma[3], t;
-        gs4i_local n;
-        gs4i_stencil s;
-        gs4i_predicted_stencil(sim, i, reach, &frame, &s);
-        gs4i_x_weights(&s, &w, &d);
-        gs4i_gather_local(nodes + 4 * s.base, &s, &w, &d, &n);
-        L[0] = n.dx; L[1] = n.dy; L[2] = n.dz;
-        stage_J = (J + (reach - weight) * Jr) / (1 - weight * (GS4I_LANE(n.dx, 0) + GS4I_LANE(n.dy, 1) + GS4I_LANE(n.dz, 2)));
-        if (!(stage_J > GS4I_J_LOW && stage_J < GS4I_J_HIGH)) { gs4i_see_bad(report, GS4I_BAD_VOLUME, p->id[i]); continue; }
-        mu = gs4i_liquid_stress(law, stage_J, L, sigma);
-        if (!(mu >= 0 && mu < GS4I_HUGE)) { gs4i_see_bad(report, GS4I_BAD_VISCOSITY, p->id[i]); continue; }
-        gs4i_see_liquid(&seen, law, stage_J, mu);
-        V = -m * law->inv_density * stage_J;
-        GS4I_SPLAT_MUL(t, V, sigma[0]); gs4i_row_of_quad(&f, &t); GS4I_MUL(p0, d, f);
-        GS4I_SPLAT_MUL(t, m, g);        gs4i_row_of_quad(&f, &t); GS4I_MAD(p0, w, f);
-        GS4I_SPLAT_MUL(t, V, sigma[1]); gs4i_row_of_quad(&f, &t); GS4I_MUL(p1, w, f);
-        GS4I_SPLAT_MUL(t, V, sigma[2]); gs4i_row_of_quad(&f, &t); GS4I_MUL(p2, w, f);
-        gs4i_scatter_rows(tile + 4 * s.base, &p0, &p1, &p2, s.w, s.d);
+    for (; i < end; i += GS4I_BATCH) {
+        const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
+        gs4i_stencil s[GS4I_BATCH];
+        gs4i_local L[GS4I_BATCH];
+        gs4i_quad f[GS4I_BATCH][4];                         /* -V sigma by columns, and the weight */
+        gs4i_row w, d;
+        int b;
+        for (b = 0; b < n; b++) gs4i_predicted_stencil(&p, i + (size_t)b, reach, &frame, &s[b]);
+        for (b = 0; b < n; b++) {
+            gs4i_x_weights(&s[b], &w, &d);
+            gs4i_gather_local(nodes + 4 * s[b].base, &s[b], &w, &d, &L[b]);
+        }
+        for (b = 0; b < n; b++) gs4i_stage_force(laws, &p, i + (size_t)b, reach, weight, &L[b], &g, f[b], &seen, report);
+        for (b = 0; b < n; b++) {
+            gs4i_x_weights(&s[b], &w, &d);
+            gs4i_scatter_force(tile, &s[b], &w, &d, f[b]);
+        }
     }
     gs4i_report_liquid(report, &seen);
-    gs4i_tile_add(&sim->grid, o, tile, sim->grid.force);
+    gs4i_tile_add(&sim->grid, o, report->rows, tile, sim->grid.force);
 }
 
 /* Whether any block around occupied block o has jumps; then their tile. */
@@ -2306,11 +2385,11 @@ static int gs4i_at_edge(const gs4i_grid *g, int o)
     return edge;
 }
 
-GS4I_INLINE int gs4i_has_left(const gs4i_grid *g, const gs4_real x[3])
+GS4I_INLINE int gs4i_has_left(const gs4i_grid *g, const gs4i_quad *x)
 {
-    return !(x[0] >= g->origin.x && x[0] < g->origin.x + GS4I_C(g->cells[0]) * g->h
-          && x[1] >= g->origin.y && x[1] < g->origin.y + GS4I_C(g->cells[1]) * g->h
-          && x[2] >= g->origin.z && x[2] < g->origin.z + GS4I_C(g->cells[2]) * g->h);
+    return !(GS4I_LANE(*x, 0) >= g->origin.x && GS4I_LANE(*x, 0) < g->origin.x + GS4I_C(g->cells[0]) * g->h
+          && GS4I_LANE(*x, 1) >= g->origin.y && GS4I_LANE(*x, 1) < g->origin.y + GS4I_C(g->cells[1]) * g->h
+          && GS4I_LANE(*x, 2) >= g->origin.z && GS4I_LANE(*x, 2) < g->origin.z + GS4I_C(g->cells[2]) * g->h);
 }
 
 /* A particle as S7 leaves it, and what nodes and contact said. */
@@ -2360,8 +2439,9 @@ static void gs4i_correct_contact(gs4_sim *sim, gs4i_corrected *q, gs4i_report *r
     gs4i_store_affine(C, q->C);
     gs4i_put_back(&sim->boundary, &sim->grid, x, v);
     gs4i_hold_in_mouth(&sim->boundary, x, v, a, C, lag);
-    report->left += gs4i_has_left(&sim->grid, x);
-    GS4I_LOAD(q->x, x); GS4I_LOAD(q->v, v); GS4I_LOAD(q->a, a); GS4I_LOAD(q->lag, lag);
+    GS4I_LOAD(q->x, x);
+    report->left += gs4i_has_left(&sim->grid, &q->x);
+    GS4I_LOAD(q->v, v); GS4I_LOAD(q->a, a); GS4I_LOAD(q->lag, lag);
     for (j = 0; j < 3; j++) {
         const gs4i_quad c = { GS4I_LANES(C[3 * j], C[3 * j + 1], C[3 * j + 2], 0) };
         q->C[j] = c;
@@ -2400,7 +2480,7 @@ static void gs4i_report_motion(gs4i_report *r, const gs4i_fastest *f)
     r->max_gradient = gs4i_sum3(&f->gradient2);
 }
 
-GS4I_INLINE void gs4i_store_corrected(gs4i_particles *p, size_t i, const gs4i_corrected *q)
+GS4I_INLINE void gs4i_store_corrected(const gs4i_particles *p, size_t i, const gs4i_corrected *q)
 {
     gs4i_quad x = q->x;
     GS4I_LANE(x, 3) = p->position[4 * i + 3];
@@ -2415,38 +2495,46 @@ GS4I_INLINE void gs4i_store_corrected(gs4i_particles *p, size_t i, const gs4i_co
 GS4I_INLINE void gs4i_correct(gs4_sim *sim, int o, int commit)
 {
     const gs4i_rule rule = sim->rule;
-    gs4i_particles *p = &sim->particles;
+    const gs4i_particles p = sim->particles;
     gs4i_grid *grid = &sim->grid;
     gs4i_report *report = &sim->reports[o];
     const gs4i_frame frame = gs4i_tile_frame(grid, o);
     const gs4i_quad zero = { GS4I_LANES(0, 0, 0, 0) };
     gs4i_fastest fastest = { zero, zero };
     gs4_real u_nodes[GS4I_TILE_REALS], a_nodes[GS4I_TILE_REALS], j_nodes[GS4I_TILE_REALS];
-    const int jumps = gs4i_load_jumps(grid, o, j_nodes), edge = jumps || gs4i_at_edge(grid, o);
+    const int jumps = gs4i_load_jumps(grid, o, j_nodes), edge = jumps || gs4i_at_edge(grid, o), bodies = sim->boundary.body_count;
     size_t i = (size_t)grid->first[o], end = (size_t)grid->first[o + 1];
-    gs4i_tile_load(grid, o, grid->momentum, u_nodes);
-    gs4i_tile_load(grid, o, grid->force, a_nodes);
-    for (; i < end; i++) {
+    gs4i_tile_load(grid, o, report->rows, grid->momentum, u_nodes);
+    gs4i_tile_load(grid, o, report->rows, grid->force, a_nodes);
+    for (; i < end; i += GS4I_BATCH) {
+        const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
+        gs4i_stencil s[GS4I_BATCH];
+        gs4i_local u[GS4I_BATCH], acc[GS4I_BATCH], from;
+        gs4i_quad jump[GS4I_BATCH];
         gs4i_row w, d;
-        gs4i_stencil s;
-        gs4i_local u, acc;
-        gs4i_quad jump = zero;
-        gs4i_corrected q;
-        gs4i_predicted_stencil(sim, i, rule.reach, &frame, &s);
-        gs4i_x_weights(&s, &w, &d);
-        gs4i_gather_local(u_nodes + 4 * s.base, &s, &w, &d, &u);
-        gs4i_gather_local(a_nodes + 4 * s.base, &s, &w, &d, &acc);
-        if (jumps) {
-            gs4i_local from;
-            gs4i_gather_local(j_nodes + 4 * s.base, &s, &w, &d, &from);
-            jump = from.value; GS4I_LANE(jump, 3) = 0;
+        int b;
+        for (b = 0; b < n; b++) gs4i_predicted_stencil(&p, i + (size_t)b, rule.reach, &frame, &s[b]);
+        for (b = 0; b < n; b++) {
+            gs4i_x_weights(&s[b], &w, &d);
+            gs4i_gather_local(u_nodes + 4 * s[b].base, &s[b], &w, &d, &u[b]);
+            gs4i_gather_local(a_nodes + 4 * s[b].base, &s[b], &w, &d, &acc[b]);
+            jump[b] = zero;
         }
-        GS4I_LOAD(q.x, p->position + 4 * i); GS4I_LOAD(q.v, p->velocity + 4 * i); GS4I_LOAD(q.a, p->rate + 4 * i);
-        gs4i_correct_one(&rule, &u, &acc, &jump, &q);
-        if (!commit) { gs4i_judge(&q, p->position + 4 * i, grid->h, report, p->id[i]); continue; }
-        if (edge) gs4i_correct_contact(sim, &q, report);
-        gs4i_see_motion(&fastest, &q);
-        gs4i_store_corrected(p, i, &q);
+        for (b = 0; b < n && jumps; b++) {
+            gs4i_x_weights(&s[b], &w, &d);
+            gs4i_gather_local(j_nodes + 4 * s[b].base, &s[b], &w, &d, &from);
+            jump[b] = from.value; GS4I_LANE(jump[b], 3) = 0;
+        }
+        for (b = 0; b < n; b++) {
+            const size_t k = i + (size_t)b;
+            gs4i_corrected q;
+            GS4I_LOAD(q.x, p.position + 4 * k); GS4I_LOAD(q.v, p.velocity + 4 * k); GS4I_LOAD(q.a, p.rate + 4 * k);
+            gs4i_correct_one(&rule, &u[b], &acc[b], &jump[b], &q);
+            if (!commit) { gs4i_judge(&q, p.position + 4 * k, grid->h, report, p.id[k]); continue; }
+            if (edge && (bodies || gs4i_has_left(grid, &q.x))) gs4i_correct_contact(sim, &q, report);
+            gs4i_see_motion(&fastest, &q);
+            gs4i_store_corrected(&p, k, &q);
+        }
     }
     if (commit) gs4i_report_motion(report, &fastest);
 }
@@ -2469,75 +2557,93 @@ static void gs4i_scatter_euler(int index, void *context)
 {
     const gs4i_pass *pass = (const gs4i_pass *)context;
     gs4_sim *sim = pass->sim;
-    const gs4i_particles *p = &sim->particles;
+    const gs4i_particles p = sim->particles;               /* copies: stores cannot alias them */
     const int o = pass->blocks[index];
     const gs4_real dt = sim->rule.dt, h = sim->grid.h;
     const gs4i_frame frame = gs4i_tile_frame(&sim->grid, o);
     const gs4i_quad g = { GS4I_LANES(dt * sim->desc.gravity.x, dt * sim->desc.gravity.y, dt * sim->desc.gravity.z, 0) };
     gs4i_report *report = &sim->reports[o];
+    const gs4i_law *laws = sim->laws;
     gs4i_seen seen = { GS4I_HUGE, 0, 0, 0 };
     gs4_real tile[GS4I_TILE_REALS];
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
-    int j;
+    uint64_t rows = 0;
     gs4i_report_clear(report);
     memset(tile, 0, sizeof tile);
-    for (; i < end; i++) {
-        const gs4i_law *law = &sim->laws[p->material[i]];
-        const gs4_real m = p->position[4 * i + 3], J = p->velocity[4 * i + 3], k = -dt * m * law->inv_density * J * (4 / (h * h));
-        gs4_real bound, mu;
-        gs4i_quad C[3], sigma[3], mv;
-        gs4i_stencil s;
-        gs4i_predicted_stencil(sim, i, 0, &frame, &s);
-        if (s.base < 0) { report->strayed++; continue; }
-        gs4i_load_affine(p->affine + 9 * i, C);
-        mu = gs4i_liquid_stress(law, J, C, sigma);
-        if (!(mu >= 0 && mu < GS4I_HUGE)) { gs4i_see_bad(report, GS4I_BAD_VISCOSITY, p->id[i]); continue; }
-        gs4i_see_liquid(&seen, law, J, mu);
-        bound = m * gs4i_affine_bound(C, dt);
-        for (j = 0; j < 3; j++) { GS4I_SPLAT_MUL(C[j], bound, C[j]); GS4I_SPLAT_MAD(C[j], k, sigma[j]); }
-        GS4I_LOAD(mv, p->velocity + 4 * i);
-        GS4I_SUM(mv, mv, g);
-        GS4I_SPLAT_MUL(mv, m, mv);
-        GS4I_LANE(mv, 3) = m;
-        gs4i_scatter_affine(tile, &s, h, &mv, C);
+    for (; i < end; i += GS4I_BATCH) {
+        const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
+        gs4i_stencil s[GS4I_BATCH];
+        gs4i_quad C[GS4I_BATCH][3], mv[GS4I_BATCH], sigma[3];
+        int b, j;
+        for (b = 0; b < n; b++) gs4i_predicted_stencil(&p, i + (size_t)b, 0, &frame, &s[b]);
+        for (b = 0; b < n; b++) {
+            const size_t at = i + (size_t)b;
+            const gs4i_law *law = &laws[p.material[at]];
+            const gs4_real m = p.position[4 * at + 3], J = p.velocity[4 * at + 3], k = -dt * m * law->inv_density * J * (4 / (h * h));
+            gs4_real bound, mu;
+            gs4i_load_affine(p.affine + 9 * at, C[b]);
+            mu = gs4i_liquid_stress(law, J, C[b], sigma);
+            if (!(mu >= 0 && mu < GS4I_HUGE)) gs4i_see_bad(report, GS4I_BAD_VISCOSITY, p.id[at]);
+            gs4i_see_liquid(&seen, law, J, mu);
+            bound = m * gs4i_affine_bound(C[b], dt);
+            for (j = 0; j < 3; j++) { GS4I_SPLAT_MUL(C[b][j], bound, C[b][j]); GS4I_SPLAT_MAD(C[b][j], k, sigma[j]); }
+            GS4I_LOAD(mv[b], p.velocity + 4 * at);
+            GS4I_SUM(mv[b], mv[b], g);
+            GS4I_SPLAT_MUL(mv[b], m, mv[b]);
+            GS4I_LANE(mv[b], 3) = m;
+        }
+        for (b = 0; b < n; b++) {
+            if (s[b].base < 0) { report->strayed++; continue; }
+            rows |= gs4i_touched_rows(s[b].base);
+            gs4i_scatter_affine(tile, &s[b], h, &mv[b], C[b]);
+        }
     }
     gs4i_report_liquid(report, &seen);
-    gs4i_tile_add(&sim->grid, o, tile, sim->grid.momentum);
+    report->rows = rows;
+    gs4i_tile_add(&sim->grid, o, rows, tile, sim->grid.momentum);
 }
 
 /* Symplectic Euler, and back: v = sum w v_i, C = sum v_i (x) grad w, J += dt J tr C, x += dt v. */
 GS4I_INLINE void gs4i_gather_euler(gs4_sim *sim, int o, int commit)
 {
     const gs4_real dt = sim->rule.dt;
-    gs4i_particles *p = &sim->particles;
+    const gs4i_particles p = sim->particles;
     gs4i_grid *grid = &sim->grid;
     gs4i_report *report = &sim->reports[o];
     const gs4i_frame frame = gs4i_tile_frame(grid, o);
     const gs4i_quad zero = { GS4I_LANES(0, 0, 0, 0) };
     gs4i_fastest fastest = { zero, zero };
     gs4_real nodes[GS4I_TILE_REALS];
+    const int bodies = sim->boundary.body_count;
     int edge = gs4i_at_edge(grid, o), c;
     size_t i = (size_t)grid->first[o], end = (size_t)grid->first[o + 1];
     for (c = 0; c < 27; c++) edge |= grid->jump_of[grid->neighbour[27 * (size_t)o + (size_t)c]];
-    gs4i_tile_load(grid, o, grid->momentum, nodes);
-    for (; i < end; i++) {
-        const gs4_real J = p->velocity[4 * i + 3];
+    gs4i_tile_load(grid, o, report->rows, grid->momentum, nodes);
+    for (; i < end; i += GS4I_BATCH) {
+        const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
+        gs4i_stencil s[GS4I_BATCH];
+        gs4i_local u[GS4I_BATCH];
         gs4i_row w, d;
-        gs4i_stencil s;
-        gs4i_local u;
-        gs4i_corrected q;
-        gs4i_predicted_stencil(sim, i, 0, &frame, &s);
-        gs4i_x_weights(&s, &w, &d);
-        gs4i_gather_local(nodes + 4 * s.base, &s, &w, &d, &u);
-        GS4I_LOAD(q.x, p->position + 4 * i);
-        GS4I_SPLAT_MAD(q.x, dt, u.value);
-        q.v = u.value; q.a = zero; q.lag = zero;
-        q.C[0] = u.dx; q.C[1] = u.dy; q.C[2] = u.dz;
-        GS4I_LANE(q.v, 3) = J + dt * J * (GS4I_LANE(u.dx, 0) + GS4I_LANE(u.dy, 1) + GS4I_LANE(u.dz, 2));
-        if (!commit) { gs4i_judge(&q, p->position + 4 * i, grid->h, report, p->id[i]); continue; }
-        if (edge) gs4i_correct_contact(sim, &q, report);
-        gs4i_see_motion(&fastest, &q);
-        gs4i_store_corrected(p, i, &q);
+        int b;
+        for (b = 0; b < n; b++) gs4i_predicted_stencil(&p, i + (size_t)b, 0, &frame, &s[b]);
+        for (b = 0; b < n; b++) {
+            gs4i_x_weights(&s[b], &w, &d);
+            gs4i_gather_local(nodes + 4 * s[b].base, &s[b], &w, &d, &u[b]);
+        }
+        for (b = 0; b < n; b++) {
+            const size_t k = i + (size_t)b;
+            const gs4_real J = p.velocity[4 * k + 3];
+            gs4i_corrected q;
+            GS4I_LOAD(q.x, p.position + 4 * k);
+            GS4I_SPLAT_MAD(q.x, dt, u[b].value);
+            q.v = u[b].value; q.a = zero; q.lag = zero;
+            q.C[0] = u[b].dx; q.C[1] = u[b].dy; q.C[2] = u[b].dz;
+            GS4I_LANE(q.v, 3) = J + dt * J * (GS4I_LANE(u[b].dx, 0) + GS4I_LANE(u[b].dy, 1) + GS4I_LANE(u[b].dz, 2));
+            if (!commit) { gs4i_judge(&q, p.position + 4 * k, grid->h, report, p.id[k]); continue; }
+            if (edge && (bodies || gs4i_has_left(grid, &q.x))) gs4i_correct_contact(sim, &q, report);
+            gs4i_see_motion(&fastest, &q);
+            gs4i_store_corrected(&p, k, &q);
+        }
     }
     if (commit) gs4i_report_motion(report, &fastest);
 }

@@ -1,0 +1,11 @@
+/* All tests in one program: cc tests/main.c -I. -lm; once more with -DGS4_DOUBLE. See run.sh. */
+#define GS4MPM_IMPLEMENTATION
+#include "gs4mpm.h"
+#include "test.h"
+#include "scenes.h"
+
+int main(int count, char **values)
+{
+    test_arguments(count, values);
+    return test_finish();
+}

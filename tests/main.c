@@ -3,9 +3,11 @@
 #include "gs4mpm.h"
 #include "test.h"
 #include "scenes.h"
+#include "test_order.c"
 
 int main(int count, char **values)
 {
     test_arguments(count, values);
+    RUN(test_order_in_time);
     return test_finish();
 }

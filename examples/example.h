@@ -1,0 +1,153 @@
+/* example.h - what the examples share: options, the loop over frames, the progress line, files. MIT licence, as gs4mpm.h.
+ *
+ *     int main(int argc, char **argv)
+ *     {
+ *         example e = {0};
+ *         e.name = "drop"; e.frames = 60; e.cells = 64;       // the defaults
+ *         example_options(&e, argc, argv);                    // --frames N --cells N --threads N --out DIR
+ *         gs4_sim *sim = example_create(&e, &desc);           // threads and clock filled in
+ *         ...                                                 // the scene; example_need(sim, result) wherever it can fail
+ *         while (example_frame(&e, sim)) { }                  // DIR/drop_0001.ply and .png and so on
+ *         gs4_destroy(sim);
+ *     }
+ *
+ * It holds the implementation of gs4mpm.h, so include it first and in one file only. It needs POSIX for the clock, the
+ * threads and mkdir; the library itself needs none of it. */
+#ifndef EXAMPLE_H
+#define EXAMPLE_H
+#ifndef _POSIX_C_SOURCE
+#define _POSIX_C_SOURCE 200809L
+#endif
+#define GS4_PTHREADS
+#define GS4MPM_IMPLEMENTATION
+#include "gs4mpm.h"
+#include "preview.h"
+#include <errno.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+typedef enum example_colour { EXAMPLE_PLAIN = 0, EXAMPLE_MATERIAL, EXAMPLE_SPEED } example_colour;
+
+typedef struct example {
+    const char *name, *out;             /* files are OUT/NAME_0001.png; no `out`: the directory "out" */
+    int frames, cells, threads;         /* threads 0: two */
+    double frame_time;                  /* s from frame to frame; 0: 1/30 */
+    example_colour colour;              /* what the pictures show: one colour, the number of the material, or the speed */
+    preview_settings look;
+    int frame;                          /* how many are done */
+    double pace;                        /* s of waiting a frame, of late */
+} example;
+
+/* Numbers and vectors as the library wants them, float or double. */
+static gs4_real real(double x) { return (gs4_real)x; }
+static gs4_vec3 vec(double x, double y, double z) { gs4_vec3 v; v.x = real(x); v.y = real(y); v.z = real(z); return v; }
+
+static double example_clock(void *user)
+{
+    struct timespec t;
+    (void)user;
+    return clock_gettime(CLOCK_MONOTONIC, &t) ? 0 : (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+/* Says what is wrong and how it is meant, and leaves. */
+static void example_misuse(const example *e, const char *what, const char *which)
+{
+    fprintf(stderr, "%s: %s%s\nusage: %s [--frames N] [--cells N] [--threads N] [--out DIR]   (%d frames, %d cells, %d threads, %s)\n",
+            e->name, what, which, e->name, e->frames, e->cells, e->threads, e->out);
+    exit(2);
+}
+
+static int example_number(const example *e, const char *option, const char *text, int low, int high)
+{
+    char *end, say[120];
+    long n = strtol(text, &end, 10);
+    sprintf(say, "%.20s takes a whole number from %d to %d, not ", option, low, high);
+    if (end == text || *end || n < low || n > high) example_misuse(e, say, *text ? text : "nothing");
+    return (int)n;
+}
+
+static void example_options(example *e, int argc, char **argv)
+{
+    struct stat is;
+    if (!e->out) e->out = "out";
+    if (!e->threads) e->threads = 2;
+    if (!(e->frame_time > 0)) e->frame_time = 1.0 / 30;
+    for (int i = 1; i < argc; ++i) {
+        const char *o = argv[i], *value = i + 1 < argc ? argv[i + 1] : "";
+        if (!strcmp(o, "--frames")) e->frames = example_number(e, o, value, 1, 9999);
+        else if (!strcmp(o, "--cells")) e->cells = example_number(e, o, value, 8, 1024);
+        else if (!strcmp(o, "--threads")) e->threads = example_number(e, o, value, 1, 256);
+        else if (strcmp(o, "--out")) example_misuse(e, "there is no option ", o);
+        else if (!*value) example_misuse(e, "--out takes the name of a directory", "");
+        else e->out = value;
+        ++i;
+    }
+    if (strlen(e->out) > 900) example_misuse(e, "the name of the directory is too long: ", e->out);
+    if (mkdir(e->out, 0777) && (errno != EEXIST || stat(e->out, &is) || !S_ISDIR(is.st_mode))) {
+        fprintf(stderr, "%s: the directory %s cannot be made: %s\n", e->name, e->out, strerror(errno));
+        exit(1);
+    }
+}
+
+/* Passes a good result on; at an error prints the library's sentence and leaves. */
+static int example_need(const gs4_sim *sim, int result)
+{
+    if (result >= 0) return result;
+    fprintf(stderr, "\n%s: %s\n", gs4_result_string(result), gs4_last_error(sim));
+    exit(1);
+}
+
+static gs4_sim *example_create(const example *e, gs4_sim_desc *desc)
+{
+    gs4_sim *sim = NULL;
+    desc->threads = e->threads;
+    desc->now = example_clock;
+    example_need(NULL, gs4_create(desc, &sim));
+    return sim;
+}
+
+static void example_write(const example *e, gs4_sim *sim)
+{
+    gs4_view x = gs4_particles(sim, GS4_FIELD_POSITION), v = gs4_particles(sim, GS4_FIELD_VELOCITY);
+    const uint8_t *material = gs4_particle_materials(sim);
+    gs4_real *number = NULL;
+    char path[1024];
+    int failed = 0;
+    if (!x.count) return;
+    sprintf(path, "%.900s/%.64s_%04d.ply", e->out, e->name, e->frame);
+    example_need(sim, gs4_write_ply(sim, path));
+    strcpy(strrchr(path, '.'), ".png");
+    if (e->colour == EXAMPLE_MATERIAL) {
+        number = (gs4_real *)malloc((size_t)x.count * sizeof *number);
+        for (int i = 0; number && i < x.count; ++i) number[i] = (gs4_real)material[i];
+        failed = !number ? 2 : preview_write_png(path, &e->look, x.count, x.data, x.stride, number, 1, 1);
+        free(number);
+    } else if (e->colour == EXAMPLE_SPEED)
+        failed = preview_write_png(path, &e->look, x.count, x.data, x.stride, v.data, v.components, v.stride);
+    else
+        failed = preview_write_png(path, &e->look, x.count, x.data, x.stride, NULL, 0, 0);
+    if (failed) { fprintf(stderr, "\n%s: %s\n", path, failed == 1 ? "cannot be written" : "out of memory"); exit(1); }
+}
+
+/* Simulates and writes one frame; 0 when all are done. */
+static int example_frame(example *e, gs4_sim *sim)
+{
+    double start = example_clock(NULL), waited;
+    gs4_stats before = gs4_get_stats(sim), s;
+    if (e->frame == e->frames) { if (isatty(2)) fputc('\n', stderr); return 0; }
+    example_need(sim, gs4_advance(sim, real(e->frame_time)));
+    s = gs4_get_stats(sim);
+    ++e->frame;
+    example_write(e, sim);
+    waited = example_clock(NULL) - start;
+    e->pace = e->frame > 1 ? 0.7 * e->pace + 0.3 * waited : waited;
+    waited = e->pace * (e->frames - e->frame);
+    fprintf(stderr, "%s frame %d/%d   t %.3f s   dt %.2g s   %d particles   %.2f ms/step   %d:%02d left%s",
+            isatty(2) ? "\r" : "", e->frame, e->frames, s.time, s.dt, s.particles,
+            1e3 * (s.seconds_total - before.seconds_total) / (double)(s.steps - before.steps), (int)waited / 60, (int)waited % 60,
+            isatty(2) ? "  " : "\n");
+    return 1;
+}
+
+#endif

@@ -2056,6 +2056,7 @@ typedef struct gs4i_rule {
     gs4i_reach reach;                   /* ahead = alpha_f dt: from t_n to the stage */
     gs4_real s;                         /* alpha_f gamma dt / alpha_m: weight of the new rate at the stage */
     gs4_real decay, damped;             /* k = 1 / flip_decay_time, 1/s; 1 / (1 + s k) */
+    gs4_real wall_decay;                /* what is added to k at a wall, see S7: c0 / h */
     gs4_real inv_alpha_m, next_shift;
     int afresh;                         /* no rates yet: first step, or after an edit */
 } gs4i_rule;
@@ -2407,7 +2408,7 @@ static void gs4i_scatter_forces(int index, void *context)
     gs4i_tile_add(&sim->grid, o, report->rows, tile, sim->grid.force);
 }
 
-/* Whether any block around occupied block o has jumps; then their tile. */
+/* Whether any block around occupied block o has jumps; then their tile, with 1 in lane 3 of images in contact, else 0. */
 static int gs4i_load_jumps(const gs4i_grid *g, int o, gs4_real *tile)
 {
     int any = 0, i, x, y, z;
@@ -2417,9 +2418,11 @@ static int gs4i_load_jumps(const gs4i_grid *g, int o, gs4_real *tile)
     memset(tile, 0, GS4I_TILE_REALS * sizeof *tile);
     for (z = 0; z < GS4I_TILE; z++) for (y = 0; y < GS4I_TILE; y++) for (x = 0; x < GS4I_TILE; x += 2) {    /* two nodes at once */
         const int32_t slot = nb[((z + 2) / 4 * 3 + (y + 2) / 4) * 3 + (x + 2) / 4];
+        gs4_real *to;
         if (!g->jump_of[slot]) continue;
-        memcpy(tile + 4 * ((z * GS4I_TILE + y) * GS4I_TILE + x),
-               gs4i_jump_at(g, (uint32_t)slot * 64 + (uint32_t)((((z + 2) & 3) << 4) | (((y + 2) & 3) << 2) | ((x + 2) & 3))), 8 * sizeof *tile);
+        to = tile + 4 * ((z * GS4I_TILE + y) * GS4I_TILE + x);
+        memcpy(to, gs4i_jump_at(g, (uint32_t)slot * 64 + (uint32_t)((((z + 2) & 3) << 4) | (((y + 2) & 3) << 2) | ((x + 2) & 3))), 8 * sizeof *tile);
+        to[3] = GS4I_C(((int)to[3] & 7) != 0); to[7] = GS4I_C(((int)to[7] & 7) != 0);
     }
     return 1;
 }
@@ -2536,7 +2539,7 @@ GS4I_INLINE void gs4i_store_corrected(const gs4i_particles *p, size_t i, const g
 /* S7: gather and correct. With `commit` 0 nothing is written: a rehearsal that only reports. */
 GS4I_INLINE void gs4i_correct(gs4_sim *sim, int o, int commit)
 {
-    const gs4i_rule rule = sim->rule;
+    gs4i_rule rule = sim->rule;
     const gs4i_particles p = sim->particles;
     gs4i_grid *grid = &sim->grid;
     gs4i_report *report = &sim->reports[o];
@@ -2565,13 +2568,17 @@ GS4I_INLINE void gs4i_correct(gs4_sim *sim, int o, int commit)
         for (b = 0; b < n && jumps; b++) {
             gs4i_x_weights(&s[b], &w, &d);
             gs4i_gather_value(j_nodes + 4 * s[b].base, &s[b], &w, &jump[b]);
-            GS4I_LANE(jump[b], 3) = 0;
         }
         for (b = 0; b < n; b++) {
             const size_t k = i + (size_t)b;
             gs4i_corrected q;
             GS4I_LOAD(q.x, p.position + 4 * k); GS4I_LOAD(q.v, p.velocity + 4 * k); GS4I_LOAD(q.a, p.rate + 4 * k);
             gs4i_position_rate(&p, k, rule.reach.shift, &q.lag);
+            if (jumps) {                                    /* lane 3: the share of its nodes that are images of a wall */
+                rule.decay = sim->rule.decay + GS4I_LANE(jump[b], 3) * rule.wall_decay;
+                rule.damped = 1 / (1 + rule.s * rule.decay);
+                GS4I_LANE(jump[b], 3) = 0;
+            }
             gs4i_correct_one(&rule, &u[b], &acc[b], &jump[b], &q);
             if (!commit) { gs4i_judge(&q, p.position + 4 * k, grid->h, report, p.id[k]); continue; }
             if (edge && (bodies || gs4i_has_left(grid, &q.x))) gs4i_correct_contact(sim, &q, report);
@@ -2832,6 +2839,7 @@ static gs4i_rule gs4i_make_rule(const gs4_sim *sim, gs4_real dt)
 {
     const gs4_real r = sim->desc.rho_inf, s = sim->desc.rho_inf_spurious;
     gs4i_rule k;
+    int i;
     k.dt = dt;
     k.afresh = sim->afresh;
     k.alpha_m = k.afresh ? GS4I_C(1) : (3 + r + s - r * s) / (2 * (1 + r) * (1 + s));
@@ -2844,6 +2852,8 @@ static gs4i_rule gs4i_make_rule(const gs4_sim *sim, gs4_real dt)
     k.decay = sim->desc.flip_decay_time > 0 && gs4i_finite(sim->desc.flip_decay_time) ? 1 / sim->desc.flip_decay_time : GS4I_C(0);
     k.damped = 1 / (1 + k.s * k.decay);
     k.inv_alpha_m = 1 / k.alpha_m;
+    k.wall_decay = 0;
+    for (i = 0; i < sim->material_count; i++) k.wall_decay = gs4i_max(k.wall_decay, sim->laws[i].sound_speed / sim->grid.h);
     return k;
 }
 
@@ -2877,36 +2887,12 @@ static void gs4i_clear_nodes(int index, void *context)
     memset(g->force + (size_t)begin * GS4I_NODE_REALS, 0, bytes);
 }
 
-/* Keep what the velocities would be without contact: -v, in the place of the jumps. */
-static void gs4i_begin_jumps(int index, void *context)
+static void gs4i_clear_jumps(int index, void *context)
 {
-    const gs4i_node_pass *pass = (const gs4i_node_pass *)context;
-    const gs4i_grid *g = &pass->sim->grid;
-    int s, i, c;
-    for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
-        if (!g->jump_of[s]) continue;
-        for (i = 0; i < GS4I_BLOCK_NODES; i++) {
-            const gs4_real *q = g->momentum + (size_t)s * GS4I_NODE_REALS + 4 * i;
-            gs4_real *jump = gs4i_jump_at(g, (uint32_t)(64 * s + i));
-            for (c = 0; c < 3; c++) jump[c] = q[3] > pass->lightest ? -q[c] / q[3] : GS4I_C(0);
-            jump[3] = 0;
-        }
-    }
-}
-
-static void gs4i_end_jumps(int index, void *context)
-{
-    const gs4i_node_pass *pass = (const gs4i_node_pass *)context;
-    const gs4i_grid *g = &pass->sim->grid;
-    int s, i, c;
-    for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
-        if (!g->jump_of[s]) continue;
-        for (i = 0; i < GS4I_BLOCK_NODES; i++) {
-            const gs4_real *q = g->momentum + (size_t)s * GS4I_NODE_REALS + 4 * i;
-            gs4_real *jump = gs4i_jump_at(g, (uint32_t)(64 * s + i));
-            for (c = 0; c < 3; c++) jump[c] += q[c];
-        }
-    }
+    const gs4i_grid *g = &((const gs4i_node_pass *)context)->sim->grid;
+    int s;
+    for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++)
+        if (g->jump_of[s]) memset(gs4i_jump_at(g, (uint32_t)(64 * s)), 0, GS4I_NODE_REALS * sizeof(gs4_real));
 }
 
 GS4I_INLINE gs4_vec3 gs4i_node_position(const gs4i_grid *g, int slot, int i)
@@ -2917,17 +2903,20 @@ GS4I_INLINE gs4_vec3 gs4i_node_position(const gs4i_grid *g, int slot, int i)
         GS4I_C(4 * at[1] - 4 + (i >> 2 & 3)) + GS4I_C(0.5), GS4I_C(4 * at[2] - 4 + (i >> 4)) + GS4I_C(0.5)), g->h));
 }
 
-/* All bodies on the nodes of one block. */
-static void gs4i_hold_nodes(const gs4_sim *sim, int slot, gs4_real *velocity, gs4_real *acceleration)
+/* All bodies on the nodes of one block; what they take from the velocity at once is added to the jumps where `jump` is given. */
+static void gs4i_hold_nodes(const gs4_sim *sim, int slot, gs4_real *velocity, gs4_real *acceleration, gs4_real *jump)
 {
-    gs4_real none[3];
-    int b, i;
+    gs4_real none[3], before[3];
+    int b, i, c;
     if (!sim->grid.jump_of[slot]) return;
     for (b = 0; b < sim->boundary.body_count; b++)
         for (i = 0; i < GS4I_BLOCK_NODES && !sim->boundary.bodies[b].asleep; i++) {
+            gs4_real *v = velocity + 4 * i;
             none[0] = none[1] = none[2] = 0;
-            gs4i_body_hold(&sim->boundary.bodies[b], gs4i_node_position(&sim->grid, slot, i), sim->grid.h, sim->rule.dt,
-                           velocity + 4 * i, acceleration ? acceleration + 4 * i : none);
+            for (c = 0; c < 3; c++) before[c] = v[c];
+            if (!gs4i_body_hold(&sim->boundary.bodies[b], gs4i_node_position(&sim->grid, slot, i), sim->grid.h, sim->rule.dt,
+                                v, acceleration ? acceleration + 4 * i : none)) continue;
+            for (c = 0; c < 3 && jump && v[3] > 0; c++) jump[4 * i + c] += v[c] - before[c];
         }
 }
 
@@ -2946,7 +2935,7 @@ static void gs4i_node_velocities(int index, void *context)
             for (c = 0; c < 3; c++) { r->momentum[c] += (double)q[4 * i + c]; q[4 * i + c] *= inverse; }
             r->mass += (double)m;
         }
-        gs4i_hold_nodes(pass->sim, s, q, NULL);
+        gs4i_hold_nodes(pass->sim, s, q, NULL, g->jump_of[s] ? gs4i_jump_at(g, (uint32_t)(64 * s)) : NULL);
     }
 }
 
@@ -2985,7 +2974,7 @@ static void gs4i_node_accelerations(int index, void *context)
                 q[i + c] += share * (acc - gs4i_remembered(rule, ag + i, c, acc));
             }
         }
-        gs4i_hold_nodes(pass->sim, s, q, f);
+        gs4i_hold_nodes(pass->sim, s, q, f, NULL);
     }
 }
 
@@ -3095,11 +3084,10 @@ static void gs4i_set_velocities(gs4_sim *sim, gs4i_node_pass *nodes)
     const int groups = gs4i_groups(sim);
     double sum[4] = { 0, 0, 0, 0 };
     int i, c;
-    gs4i_parallel_for(&sim->tasks, groups, gs4i_begin_jumps, nodes);
+    gs4i_parallel_for(&sim->tasks, groups, gs4i_clear_jumps, nodes);
     gs4i_fold_momentum(&sim->boundary, &sim->grid);
     gs4i_parallel_for(&sim->tasks, groups, gs4i_node_velocities, nodes);
     gs4i_fill_images(&sim->boundary, &sim->grid, sim->grid.momentum);
-    gs4i_parallel_for(&sim->tasks, groups, gs4i_end_jumps, nodes);
     for (i = 0; i < groups; i++) {
         for (c = 0; c < 3; c++) sum[c] += nodes->reports[i].momentum[c];
         sum[3] += nodes->reports[i].mass;

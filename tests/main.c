@@ -4,10 +4,17 @@
 #include "test.h"
 #include "scenes.h"
 #include "test_order.c"
+#include "test_physics.c"
 
 int main(int count, char **values)
 {
     test_arguments(count, values);
+    RUN(test_free_flight);
+    RUN(test_spin);
+    RUN(test_poiseuille);
+    RUN(test_column_at_rest);
+    RUN(test_sound_speed);
+    RUN(test_drop_at_rest);
     RUN(test_order_in_time);
     return test_finish();
 }

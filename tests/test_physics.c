@@ -1,0 +1,242 @@
+/* What the whole step must reproduce: exact solutions of moving liquids, conservation, rest. */
+
+/* Stepping by the default fraction of the limit. */
+static int physics_run(gs4_sim *sim, double time)
+{
+    const int result = gs4_advance(sim, (gs4_real)(time - gs4_get_stats(sim).time));
+    if (result < 0) printf("    %s\n", gs4_last_error(sim));
+    return result;
+}
+
+static gs4_sim *physics_create(const gs4_sim_desc *d, const gs4_material *m)
+{
+    gs4_sim *sim = NULL;
+    CHECK_RESULT(NULL, gs4_create(d, &sim), GS4_OK);
+    if (sim && m) CHECK_RESULT(sim, gs4_add_material(sim, m), GS4_OK);
+    return sim;
+}
+
+static gs4_integrator physics_integrators[2] = { GS4_INTEGRATOR_GS4, GS4_INTEGRATOR_SYMPLECTIC_EULER };
+
+/* x0 + v0 t + g t^2 / 2 to rounding for any dt where rho_inf_spurious is 0; else an error that falls as dt^2. */
+static double flight_error(double rho, double spurious, double fraction, double *dt)
+{
+    static double x0[3 * 4096], x1[3 * 4096];
+    gs4_sim_desc d = scene_cube(32);
+    gs4_material m = scene_liquid(1000, 0.1, 20);
+    gs4_fill f = scene_fill(at(0.3, 0.5, -0.2));
+    const double v0[3] = { 0.3, 0.5, -0.2 };
+    double worst = 0, t;
+    gs4_sim *sim;
+    int i, n, steps = (int)(40 / fraction);
+    d.rho_inf = (gs4_real)rho; d.rho_inf_spurious = (gs4_real)spurious; d.gravity = at(0, -9.81, 0);
+    sim = physics_create(&d, &m);
+    n = gs4_add_particles(sim, gs4_box(at(0.35, 0.5, 0.35), at(0.58, 0.73, 0.58)), &f);
+    CHECK(n > 0 && n <= 4096);
+    scene_by_id(sim, GS4_FIELD_POSITION, x0);
+    *dt = fraction * 1e-3;
+    for (i = 0; i < steps; i++) CHECK_RESULT(sim, gs4_step(sim, (gs4_real)*dt), GS4_OK);
+    scene_by_id(sim, GS4_FIELD_POSITION, x1);
+    t = gs4_get_stats(sim).time;
+    for (i = 0; i < 3 * n; i++) {
+        const double e = fabs(x1[i] - (x0[i] + v0[i % 3] * t - (i % 3 == 1 ? 0.5 * 9.81 * t * t : 0)));
+        if (e > worst) worst = e;
+    }
+    CHECK_CLOSE(gs4_get_stats(sim).momentum[1] / gs4_get_stats(sim).mass, 0.5 - 9.81 * t, sizeof(gs4_real) == 8 ? 1e-12 : 2e-6);
+    gs4_destroy(sim);
+    return worst;
+}
+
+static void test_free_flight(void)
+{
+    const double rounding = sizeof(gs4_real) == 8 ? 2e-14 : 6e-6;
+    double dt, coarse, fine;
+    CHECK(flight_error(0, 0, 1, &dt) < rounding);
+    CHECK(flight_error(0.5, 0, 0.37, &dt) < rounding);
+    CHECK(flight_error(1, 0, 0.7, &dt) < rounding);
+    coarse = flight_error(0.5, 0.5, 1, &dt); fine = flight_error(0.5, 0.5, 0.5, &dt);
+    if (sizeof(gs4_real) == 8) CHECK_CLOSE(log2(coarse / fine), 2, 0.1);
+}
+
+/* A spinning ball in free space: what it keeps of its angular momentum; momentum and mass to rounding. */
+static double spin_kept(gs4_integrator integrator, double decay)
+{
+    gs4_sim_desc d = scene_cube(24);
+    gs4_material m = scene_liquid(1000, 5, 5);
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    gs4_stats before, after;
+    gs4_sim *sim;
+    d.integrator = integrator; d.flip_decay_time = (gs4_real)decay;
+    sim = physics_create(&d, &m);
+    f.angular_velocity = at(0, 0, 1);
+    CHECK(gs4_add_particles(sim, gs4_sphere(at(0.5, 0.5, 0.5), (gs4_real)0.25), &f) > 0);
+    before = gs4_get_stats(sim);
+    CHECK(physics_run(sim, 1) == 0);
+    after = gs4_get_stats(sim);
+    CHECK_CLOSE(after.mass, before.mass, 0);
+    CHECK_CLOSE(after.momentum[0], before.momentum[0], before.mass * (sizeof(gs4_real) == 8 ? 1e-13 : 3e-6));
+    gs4_destroy(sim);
+    if (test_filter[0]) printf("integrator %d, decay %g: spin kept %.4f\n", (int)integrator, decay, after.angular_momentum[2] / before.angular_momentum[2]);
+    return after.angular_momentum[2] / before.angular_momentum[2];
+}
+
+static void test_spin(void)
+{
+    CHECK(spin_kept(GS4_INTEGRATOR_GS4, 0) > 0.9);
+    CHECK(spin_kept(GS4_INTEGRATOR_GS4, (double)INFINITY) > 0.99);
+    CHECK(spin_kept(GS4_INTEGRATOR_SYMPLECTIC_EULER, 0) > 0.99);
+}
+
+/* Plane channel along x between walls y = 0 and y = 1, periodic in x and z; profile error (2-norm) at time t. */
+typedef double (*physics_profile)(double y, double t);
+
+static double channel_error(int n, gs4_integrator integrator, int moving_wall, gs4_vec3 gravity, double viscosity, double t, physics_profile exact)
+{
+    static double x[3 * 40000], v[3 * 40000];
+    gs4_sim_desc d = scene_cube(n);
+    gs4_material m = scene_liquid(1, viscosity, 8);
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    gs4_collider plate;
+    gs4_sim *sim;
+    double sum = 0, weight = 0;
+    int i, count;
+    d.cells[0] = d.cells[2] = 4;
+    d.walls[0] = d.walls[1] = d.walls[4] = d.walls[5] = GS4_WALL_PERIODIC;
+    d.walls[2] = d.walls[3] = GS4_WALL_STICK;
+    d.gravity = gravity; d.integrator = integrator;
+    (void)plate; (void)moving_wall;
+    sim = physics_create(&d, &m);
+    count = gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1, 1, 1)), &f);
+    CHECK(count > 0 && count <= 40000);
+    CHECK(physics_run(sim, t) == 0);
+    scene_by_id(sim, GS4_FIELD_POSITION, x); scene_by_id(sim, GS4_FIELD_VELOCITY, v);
+    for (i = 0; i < count; i++) {
+        const double y = x[3 * i + 1], e = v[3 * i] - exact(y, t);
+        if (y < 0.1 || y > 0.9) continue;                   /* away from the walls */
+        sum += e * e; weight += 1;
+    }
+    gs4_destroy(sim);
+    return sqrt(sum / weight);
+}
+
+/* Start-up of Poiseuille flow, g = 8 nu, so that the steady maximum is 1: u = 4 y (1-y) - sum 32/(pi k)^3 sin(k pi y) exp(-k^2 pi^2 nu t) */
+static double poiseuille(double y, double t)
+{
+    const double nu = 0.5, pi = acos(-1.0);
+    double u = 4 * y * (1 - y);
+    int k;
+    for (k = 1; k < 60; k += 2) u -= 32 / pow(k * pi, 3) * sin(k * pi * y) * exp(-k * k * pi * pi * nu * t);
+    return u;
+}
+
+static void test_poiseuille(void)
+{
+    int i;
+    for (i = 0; i < 2; i++) {
+        const double coarse = channel_error(8, physics_integrators[i], 0, at(4, 0, 0), 0.5, 0.15, poiseuille);
+        const double fine = channel_error(16, physics_integrators[i], 0, at(4, 0, 0), 0.5, 0.15, poiseuille);
+        if (test_filter[0]) printf("Poiseuille, integrator %d: errors %.2e %.2e, order %.2f\n", (int)physics_integrators[i], coarse, fine, log2(coarse / fine));
+        CHECK(log2(coarse / fine) > 1.8);
+        CHECK(fine < 5e-3);
+    }
+}
+
+/* A column at rest: pressure profile within 1 %, and it stays at rest. */
+static void column_at_rest(gs4_integrator integrator, gs4_wall floor)
+{
+    gs4_sim_desc d = scene_cube(20);
+    gs4_material m = scene_liquid(1000, 40, 40);
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    const double height = 0.6, k = 1000 * 40.0 * 40.0;
+    double speed, error = 0;
+    gs4_view x, J;
+    gs4_sim *sim;
+    int i;
+    d.cells[0] = d.cells[2] = 6; d.gravity = at(0, -10, 0); d.integrator = integrator; d.walls[2] = floor;
+    sim = physics_create(&d, &m);
+    CHECK(gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(0.3, height, 0.3)), &f) > 0);
+    CHECK(physics_run(sim, 4) == 0);
+    speed = gs4_get_stats(sim).max_speed / sqrt(10 * height);
+    x = gs4_particles(sim, GS4_FIELD_POSITION); J = gs4_particles(sim, GS4_FIELD_VOLUME_RATIO);
+    for (i = 0; i < x.count; i++) {
+        const double y = (double)x.data[(size_t)i * (size_t)x.stride + 1], j = (double)J.data[(size_t)i * (size_t)J.stride];
+        const double p = k / 7 * (pow(j, -7) - 1), e = fabs(p - 1000 * 10 * (height - y)) / (1000 * 10 * height);
+        if (y > 0.05 && y < height - 0.1 && e > error) error = e;
+    }
+    if (test_filter[0]) printf("column, integrator %d, floor %d: speed %.1e sqrt(g h), pressure within %.2f %%\n", (int)integrator, (int)floor, speed, 100 * error);
+    CHECK(speed < 1e-3);
+    CHECK(error < 0.01);
+    gs4_destroy(sim);
+}
+
+static void test_column_at_rest(void)
+{
+    int i;
+    for (i = 0; i < 2; i++) {
+        column_at_rest(physics_integrators[i], GS4_WALL_SLIP);
+        column_at_rest(physics_integrators[i], GS4_WALL_STICK);
+        column_at_rest(physics_integrators[i], GS4_WALL_SEPARATE);
+    }
+}
+
+/* Standing sound wave along x in a periodic box: frequency within 2 % of c0 k. */
+static void sound_speed(gs4_integrator integrator)
+{
+    gs4_sim_desc d = scene_cube(32);
+    gs4_material m = scene_liquid(1, 0, 1);
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    const double pi = acos(-1.0), a = 1e-3;
+    double before = 1, now = 1, t_before = 0, crossing = 0;
+    gs4_edit v; gs4_view x;
+    gs4_sim *sim;
+    int i, w;
+    d.cells[1] = d.cells[2] = 4; d.integrator = integrator;
+    if (integrator == GS4_INTEGRATOR_GS4) d.flip_decay_time = INFINITY;
+    for (w = 0; w < 6; w++) d.walls[w] = GS4_WALL_PERIODIC;
+    sim = physics_create(&d, &m);
+    CHECK(gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1, 0.125, 0.125)), &f) > 0);
+    x = gs4_particles(sim, GS4_FIELD_POSITION);
+    v = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
+    for (i = 0; i < v.count; i++) v.data[(size_t)i * (size_t)v.stride] = (gs4_real)(a * sin(2 * pi * (double)x.data[(size_t)i * (size_t)x.stride]));
+    while (now > 0 && gs4_get_stats(sim).time < 1) {        /* amplitude goes as cos(2 pi c0 t): zero at a quarter */
+        before = now; t_before = gs4_get_stats(sim).time;
+        CHECK_RESULT(sim, gs4_step(sim, (gs4_real)(0.3 * (double)gs4_stable_dt(sim))), GS4_OK);
+        x = gs4_particles(sim, GS4_FIELD_POSITION);
+        now = 0;
+        for (i = 0; i < x.count; i++) {
+            const gs4_view u = gs4_particles(sim, GS4_FIELD_VELOCITY);
+            now += (double)u.data[(size_t)i * (size_t)u.stride] * sin(2 * pi * (double)x.data[(size_t)i * (size_t)x.stride]) / (0.5 * a * x.count);
+        }
+        crossing = t_before + (gs4_get_stats(sim).time - t_before) * before / (before - now);
+    }
+    if (test_filter[0]) printf("sound, integrator %d: speed %.4f of c0\n", (int)integrator, 0.25 / crossing);
+    CHECK_CLOSE(0.25 / crossing, 1, 0.02);
+    gs4_destroy(sim);
+}
+
+static void test_sound_speed(void) { sound_speed(GS4_INTEGRATOR_GS4); sound_speed(GS4_INTEGRATOR_SYMPLECTIC_EULER); }
+
+/* A drop under no force: stays at rest and round. */
+static void test_drop_at_rest(void)
+{
+    static double x0[3 * 30000], x1[3 * 30000];
+    int i, k, n;
+    for (k = 0; k < 2; k++) {
+        gs4_sim_desc d = scene_cube(20);
+        gs4_material m = scene_liquid(1000, 1, 10);
+        gs4_fill f = scene_fill(at(0, 0, 0));
+        gs4_sim *sim;
+        double moved = 0;
+        d.integrator = physics_integrators[k];
+        sim = physics_create(&d, &m);
+        n = gs4_add_particles(sim, gs4_sphere(at(0.5, 0.5, 0.5), (gs4_real)0.3), &f);
+        CHECK(n > 0 && n <= 30000);
+        scene_by_id(sim, GS4_FIELD_POSITION, x0);
+        CHECK(physics_run(sim, 1) == 0);
+        scene_by_id(sim, GS4_FIELD_POSITION, x1);
+        for (i = 0; i < 3 * n; i++) if (fabs(x1[i] - x0[i]) > moved) moved = fabs(x1[i] - x0[i]);
+        CHECK(moved < 1e-6);
+        CHECK(gs4_get_stats(sim).max_speed < 1e-6);
+        gs4_destroy(sim);
+    }
+}

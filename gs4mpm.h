@@ -178,7 +178,7 @@ typedef struct gs4_sim_desc {
     gs4_scheme scheme;
     gs4_integrator integrator;
     gs4_real rho_inf, rho_inf_spurious; /* 0 <= spurious <= rho_inf <= 1 */
-    gs4_real flip_decay_time;       /* s over which particle motion that the grid cannot see fades; 0: 0.1 s (symplectic
+    gs4_real flip_decay_time;       /* s over which particle motion that the grid cannot see fades; 0: 0.5 s (symplectic
                                        Euler: at once, affine PIC); INFINITY: pure FLIP */
     gs4_wall walls[6];              /* -x +x -y +y -z +z */
     gs4_real wall_temperature[6];   int wall_is_isothermal[6];   /* 0: insulated */
@@ -2056,7 +2056,8 @@ typedef struct gs4i_rule {
     gs4i_reach reach;                   /* ahead = alpha_f dt: from t_n to the stage */
     gs4_real s;                         /* alpha_f gamma dt / alpha_m: weight of the new rate at the stage */
     gs4_real decay, damped;             /* k = 1 / flip_decay_time, 1/s; 1 / (1 + s k) */
-    gs4_real wall_decay;                /* what is added to k at a wall, see S7: c0 / h */
+    gs4_real fast_decay;                /* what is added to k where the grid sees little: c0 / h */
+    gs4_real inv_full;                  /* 1 / mass of a node in the midst of the lightest material */
     gs4_real inv_alpha_m, next_shift;
     int afresh;                         /* no rates yet: first step, or after an edit */
 } gs4i_rule;
@@ -2536,10 +2537,20 @@ GS4I_INLINE void gs4i_store_corrected(const gs4i_particles *p, size_t i, const g
     gs4i_store_lag(p->lag + 3 * i, &q->lag);
 }
 
+/* How little the grid sees of a particle among few others, by how full its nodes are: 1 below 8 %, smoothly to 0 at 20 %.
+ * What it does not see of such spray would swing ever more (nodes this light take no part in the corrected gradient), so
+ * there it fades at the rate c0 / h; so it does at walls, by the weight of the images. Both are rates: dt does not matter. */
+GS4I_INLINE gs4_real gs4i_unseen(gs4_real filled)
+{
+    const gs4_real t = (filled - GS4I_C(0.08)) / GS4I_C(0.12);
+    return t >= 1 ? GS4I_C(0) : t <= 0 ? GS4I_C(1) : 1 - t * t * (3 - 2 * t);
+}
+
 /* S7: gather and correct. With `commit` 0 nothing is written: a rehearsal that only reports. */
 GS4I_INLINE void gs4i_correct(gs4_sim *sim, int o, int commit)
 {
     gs4i_rule rule = sim->rule;
+    const gs4_real sim_decay = rule.decay, sim_damped = rule.damped, inv_full = rule.inv_full;
     const gs4i_particles p = sim->particles;
     gs4i_grid *grid = &sim->grid;
     gs4i_report *report = &sim->reports[o];
@@ -2572,10 +2583,13 @@ GS4I_INLINE void gs4i_correct(gs4_sim *sim, int o, int commit)
         for (b = 0; b < n; b++) {
             const size_t k = i + (size_t)b;
             gs4i_corrected q;
+            gs4_real unseen;
             GS4I_LOAD(q.x, p.position + 4 * k); GS4I_LOAD(q.v, p.velocity + 4 * k); GS4I_LOAD(q.a, p.rate + 4 * k);
             gs4i_position_rate(&p, k, rule.reach.shift, &q.lag);
-            if (jumps) {                                    /* lane 3: the share of its nodes that are images of a wall */
-                rule.decay = sim->rule.decay + GS4I_LANE(jump[b], 3) * rule.wall_decay;
+            unseen = gs4i_unseen(GS4I_LANE(u[b].value, 3) * inv_full) + GS4I_LANE(jump[b], 3);
+            rule.decay = sim_decay; rule.damped = sim_damped;
+            if (unseen > 0) {
+                rule.decay += unseen * rule.fast_decay;
                 rule.damped = 1 / (1 + rule.s * rule.decay);
                 GS4I_LANE(jump[b], 3) = 0;
             }
@@ -2784,8 +2798,8 @@ static int gs4i_fail_bad(gs4_sim *sim, const gs4i_report *r)
 
 /* Largest eigenvalues of the discrete operators on particles, times h^2: of div grad as sound meets it, and of
  * 2 div D as viscosity does. Measured in tests/test_stability.c. */
-#define GS4I_SOUND_EIGENVALUE GS4I_C(2.6)
-#define GS4I_VISCOUS_EIGENVALUE GS4I_C(4.0)
+#define GS4I_SOUND_EIGENVALUE GS4I_C(3.0)
+#define GS4I_VISCOUS_EIGENVALUE GS4I_C(2.5)
 #define GS4I_EULER_SOUND_EIGENVALUE GS4I_C(12.0)     /* lone particles with their affine field: sum |grad w|^2 / w */
 #define GS4I_EULER_VISCOUS_EIGENVALUE GS4I_C(16.0)
 
@@ -2852,8 +2866,11 @@ static gs4i_rule gs4i_make_rule(const gs4_sim *sim, gs4_real dt)
     k.decay = sim->desc.flip_decay_time > 0 && gs4i_finite(sim->desc.flip_decay_time) ? 1 / sim->desc.flip_decay_time : GS4I_C(0);
     k.damped = 1 / (1 + k.s * k.decay);
     k.inv_alpha_m = 1 / k.alpha_m;
-    k.wall_decay = 0;
-    for (i = 0; i < sim->material_count; i++) k.wall_decay = gs4i_max(k.wall_decay, sim->laws[i].sound_speed / sim->grid.h);
+    k.fast_decay = 0; k.inv_full = 0;
+    for (i = 0; i < sim->material_count; i++) {
+        k.fast_decay = gs4i_max(k.fast_decay, sim->laws[i].sound_speed / sim->grid.h);
+        k.inv_full = gs4i_max(k.inv_full, sim->laws[i].inv_density / (sim->grid.h * sim->grid.h * sim->grid.h));
+    }
     return k;
 }
 
@@ -2868,7 +2885,6 @@ typedef struct gs4i_node_report {
 typedef struct gs4i_node_pass {
     gs4_sim *sim;
     gs4_real lightest;                  /* nodes with less mass are empty: what they hold is below rounding */
-    gs4_real inv_full;                  /* 1 / mass of a node in the midst of the lightest material */
     gs4_real reference[3];              /* velocity that all share: what matters is what differs from it */
     gs4i_node_report *reports;
 } gs4i_node_pass;
@@ -2967,7 +2983,7 @@ static void gs4i_node_accelerations(int index, void *context)
         const gs4_real *ag = g->memory + (size_t)s * GS4I_NODE_REALS;
         for (i = 0; i < 4 * GS4I_BLOCK_NODES; i += 4) {
             const gs4_real inverse = q[i + 3] > pass->lightest ? 1 / q[i + 3] : GS4I_C(0);
-            const gs4_real share = rule->s * gs4i_node_share(rule, q[i + 3] * pass->inv_full);
+            const gs4_real share = rule->s * gs4i_node_share(rule, q[i + 3] * rule->inv_full);
             for (c = 0; c < 3; c++) {
                 const gs4_real acc = f[i + c] * inverse;
                 f[i + c] = acc;
@@ -3298,14 +3314,6 @@ static void gs4i_finish(gs4_sim *sim)
     gs4i_emit(sim, dt);
 }
 
-static gs4_real gs4i_inverse_full_mass(const gs4_sim *sim)
-{
-    gs4_real lightest = GS4I_HUGE;
-    int i;
-    for (i = 0; i < sim->material_count; i++) lightest = gs4i_min(lightest, sim->laws[i].density);
-    return 1 / (lightest * sim->grid.h * sim->grid.h * sim->grid.h);
-}
-
 /* One step of size dt. Particles are written by stage S7 alone, which is reached only when nothing can fail any more. */
 static int gs4i_step(gs4_sim *sim, gs4_real dt)
 {
@@ -3315,7 +3323,6 @@ static int gs4i_step(gs4_sim *sim, gs4_real dt)
     memset(&nodes, 0, sizeof nodes);
     nodes.sim = sim;
     nodes.lightest = gs4i_max(sim->min_mass * GS4I_EPSILON * GS4I_EPSILON, GS4I_TINY);
-    nodes.inv_full = gs4i_inverse_full_mass(sim);
     sim->rule = gs4i_make_rule(sim, dt);
     GS4I_TRY(gs4i_prepare_emitters(sim, (double)dt));
     if (sim->particles.count) {
@@ -3848,7 +3855,7 @@ static int gs4i_check_numerics(gs4_sim *sim, gs4_sim_desc *d)
     } else {
         if (!(d->flip_decay_time >= 0))                     /* infinity is welcome */
             return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "flip_decay_time is ", (double)d->flip_decay_time, "; it must be 0 or above, INFINITY for pure FLIP");
-        if (d->flip_decay_time == 0) d->flip_decay_time = GS4I_C(0.1);
+        if (d->flip_decay_time == 0) d->flip_decay_time = GS4I_C(0.5);
     }
     GS4I_TRY(gs4i_check(sim, "cfl", d->cfl, GS4I_FRACTION));
     GS4I_TRY(gs4i_check(sim, "max_dt", d->max_dt, GS4I_NOT_NEGATIVE));

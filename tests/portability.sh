@@ -1,0 +1,419 @@
+#!/bin/sh
+# What compilers, linkers, sanitizers and other machines say about gs4mpm.h.
+#   sh tests/portability.sh            everything; what is not installed is skipped and counted as such
+#   sh tests/portability.sh quick      the cheap part
+#   sh tests/portability.sh GROUP...   some groups: see the two lists below
+# A group is a function of that name. Groups run side by side, JOBS at a time (2).
+# shellcheck disable=SC2086             # flags are split on purpose
+set -u
+cd "$(dirname "$0")/.." || exit 1
+CC=${CC:-cc}
+
+quick='layout names units few_warnings few_hashes link'
+full='warnings tsan hashes asan arm hashes_double wasm windows tcc musl i386 layout names units link frames'
+
+# A transfer kernel may be longer than 60 lines; nothing else.
+long_functions=''
+# Tests of tests/main.c that run on foreign machines too: parts of their names. All of them run where it costs no more than here.
+few_tests='kernel files error'
+# What the library may ask of libc; all of libm is allowed, and with GS4_PTHREADS what is named here.
+libc='malloc|free|mem(cpy|move|set|cmp)|str(len|cmp|chr)|f(open|close|read|write|flush|error)|rename|remove|stat|__assert_fail'
+pthreads='pthread_((mutex|cond)_[a-z]+|create|join)'
+
+strict='-Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion -Wdouble-promotion -Wcast-qual -Wundef -Werror'
+strict_c="$strict -Wstrict-prototypes -Wmissing-prototypes"
+
+# ==== counting =================================================================================================
+
+passed=0 failed=0 skipped=0
+
+# check NAME COMMAND...: passes if the command succeeds; else shows what it said
+check() {
+    name=$1; shift
+    if "$@" > "$tmp/said" 2>&1; then passed=$((passed + 1)); return 0; fi
+    failed=$((failed + 1))
+    echo "failed: $group: $name"; sed 's/^/    /;25q' "$tmp/said"
+    return 1
+}
+
+refused() { ! "$@"; }
+
+skip() { skipped=$((skipped + 1)); echo "skipped: $group: $1"; }
+
+# have TOOL: is it there? If not, that is counted and said.
+have() {
+    command -v "$1" > /dev/null 2>&1 || { skip "needs $1"; return 1; }
+}
+
+finish() {
+    if [ $skipped -gt 0 ]; then echo "$passed passed, $failed failed, $skipped skipped"; else echo "$passed passed, $failed failed"; fi
+    [ $failed -eq 0 ]
+}
+
+# ==== sources to compile =======================================================================================
+
+write_sources() {
+    printf '#include "gs4mpm.h"\n#include "gs4mpm.h"\ngs4_view use(const gs4_sim *s);\ngs4_view use(const gs4_sim *s) { return gs4_particles(s, GS4_FIELD_POSITION); }\n' > "$tmp/declarations.c"
+    printf '#include "gs4mpm.h"\n#define GS4MPM_IMPLEMENTATION\n#include "gs4mpm.h"\n#include "gs4mpm.h"\n' > "$tmp/implementation.c"
+    cat > "$tmp/user.c" << 'END'
+#include "gs4mpm.h"
+int main(void)
+{
+    gs4_sim *sim;
+    gs4_sim_desc d = { { 8, 8, 8 }, 1 };
+    return gs4_version() != GS4_VERSION || gs4_real_size() != (int)sizeof(gs4_real) || gs4_create(&d, &sim) != GS4_OK
+        || (gs4_destroy(sim), 0);
+}
+END
+    cat > "$tmp/half.c" << 'END'                    # of a program in both precisions
+#define GS4MPM_IMPLEMENTATION
+#include "gs4mpm.h"
+#ifdef GS4_DOUBLE
+int in_double(void);
+int in_double(void) { return gs4_real_size() == 8 && sizeof(gs4_box) > 0; }
+#else
+int in_double(void);
+int main(void) { return !(gs4_real_size() == 4 && in_double()); }
+#endif
+END
+    cat > "$tmp/fused.c" << 'END'                   # the user's own a * b + c: the header must leave its rounding alone
+#define GS4MPM_IMPLEMENTATION
+#include "gs4mpm.h"
+double users_own(double a, double b, double c);
+double users_own(double a, double b, double c) { return a * b + c; }
+END
+    for f in declarations implementation user half; do cp "$tmp/$f.c" "$tmp/$f.cpp"; done
+}
+
+# ==== warnings =================================================================================================
+
+# compiles BUILD FILE...: strictly, in each configuration
+configurations() {
+    for real in '' -DGS4_DOUBLE; do for threads in '' -DGS4_PTHREADS; do for linkage in '' -DGS4_STATIC; do
+        check "$1 $real $threads $linkage" $1 $real $threads $linkage -I. -S -o /dev/null "$tmp/implementation.$2"
+    done; done; done
+}
+
+warnings() {
+    for cc in gcc clang; do
+        have $cc || continue
+        for std in c99 c11 c17; do configurations "$cc -std=$std $strict_c" c; done
+        for real in '' -DGS4_DOUBLE; do for linkage in '' -DGS4_STATIC; do
+            check "$cc declarations $real $linkage" $cc -std=c99 $strict_c $real $linkage -I. -S -o /dev/null "$tmp/declarations.c"
+        done; check "$cc -O2 $real" $cc -std=c99 -O2 $strict_c $real -I. -S -o /dev/null "$tmp/implementation.c"; done
+        check "$cc without assertions and vectors" $cc -std=c99 -O1 $strict_c -DNDEBUG -DGS4_NO_VECTORS -I. -S -o /dev/null "$tmp/implementation.c"
+    done
+    for cc in g++ clang++; do
+        have $cc || continue
+        for std in c++11 c++14 c++17 c++20; do configurations "$cc -std=$std $strict" cpp; done
+        check "$cc declarations" $cc -std=c++11 $strict -I. -S -o /dev/null "$tmp/declarations.cpp"
+    done
+}
+
+few_warnings() {
+    check "$CC" $CC -std=c99 $strict_c -DGS4_PTHREADS -I. -S -o /dev/null "$tmp/implementation.c"
+    check "$CC declarations" $CC -std=c99 $strict_c -I. -S -o /dev/null "$tmp/declarations.c"
+    have clang && check "clang -DGS4_DOUBLE" clang -std=c11 $strict_c -DGS4_DOUBLE -I. -S -o /dev/null "$tmp/implementation.c"
+    have g++ && check "g++ -DGS4_STATIC" g++ -std=c++11 $strict -DGS4_STATIC -I. -S -o /dev/null "$tmp/implementation.cpp"
+}
+
+# ==== several translation units ================================================================================
+
+# link BUILD_OF_USER USER BUILD_OF_IMPLEMENTATION IMPLEMENTATION
+linked() {
+    $1 -I. -c "$tmp/$2" -o "$tmp/user.o" && $3 -I. -c "$tmp/$4" -o "$tmp/unit.o" && $1 "$tmp/user.o" "$tmp/unit.o" -o "$tmp/linked" -lm
+}
+
+runs_linked() { linked "$@" && "$tmp/linked"; }
+
+units() {
+    check "two units" runs_linked "$CC" user.c "$CC" implementation.c
+    check "two units in double" runs_linked "$CC -DGS4_DOUBLE" user.c "$CC -DGS4_DOUBLE" implementation.c
+    check "float and double in one program" runs_linked "$CC" half.c "$CC -DGS4_DOUBLE" half.c
+    check "a user in float does not link with an implementation in double" refused linked "$CC" user.c "$CC -DGS4_DOUBLE" implementation.c
+    check "nor the other way round" refused linked "$CC -DGS4_DOUBLE" user.c "$CC" implementation.c
+    have g++ || return
+    check "C++ uses C" runs_linked g++ user.cpp "$CC" implementation.c
+    check "C uses C++" runs_linked "$CC" user.c g++ implementation.cpp
+}
+
+# ==== names ====================================================================================================
+
+exported() { $CC "$@" -I. -c "$tmp/implementation.c" -o "$tmp/names.o" && nm -g --defined-only "$tmp/names.o" | awk '{ print $NF }' | sort; }
+
+macros() { $CC -std=c99 "$@" -I. -dM -E - | sed 's/(.*/ /' | awk '{ print $2 }' | sort -u; }
+
+# new_macros FLAGS... < SOURCE: those that the header leaves beside what its own includes do
+new_macros() {
+    cat > "$tmp/macros.c"
+    macros "$@" < "$tmp/macros.c" > "$tmp/after"
+    { grep -h '^#include <' gs4mpm.h | grep -v pthread; } | macros "$@" > "$tmp/before"
+    comm -23 "$tmp/after" "$tmp/before"
+}
+
+tags_of() { ctags -x --language-force=C --kinds-C=+plzm -I GS4I_INLINE+,GS4_API+,GS4I_RESTRICT+,GS4I_THREAD_LOCAL+ --sort=no --_xformat='%K %N %n' gs4mpm.h; }
+implementation_line() { grep -n 'defined(GS4MPM_IMPLEMENTATION)' gs4mpm.h | head -n 1 | cut -d: -f1; }
+
+names() {
+    have nm || return
+    sed -n 's/^#define \(gs4_[a-z0-9_]*\)  *gs4_[a-z0-9_]*_f64$/\1/p' gs4mpm.h | sort > "$tmp/block"
+    sed 's/$/_f64/' "$tmp/block" | sort > "$tmp/block64"
+    exported > "$tmp/float"; exported -DGS4_DOUBLE > "$tmp/double"; exported -DGS4_PTHREADS > "$tmp/threads"; exported -DGS4_STATIC > "$tmp/static"
+    check "the #define block of GS4_DOUBLE is the set of exported functions" diff "$tmp/float" "$tmp/block"
+    check "in double all end in _f64" diff "$tmp/double" "$tmp/block64"
+    check "with threads the same" diff "$tmp/float" "$tmp/threads"
+    check "none with GS4_STATIC" refused grep . "$tmp/static"
+    new_macros < "$tmp/declarations.c" | grep -vxE 'GS4_[A-Z0-9_]+|GS4MPM_H' > "$tmp/m"
+    check "declarations leave macros in GS4_ only" refused grep . "$tmp/m"
+    new_macros < "$tmp/implementation.c" > "$tmp/all"
+    { cat "$tmp/all"; new_macros -DGS4_DOUBLE < "$tmp/implementation.c" | grep -vxFf "$tmp/block"; } |
+        grep -vxE 'GS4I?_[A-Z0-9_]+|GS4MPM_(H|IMPLEMENTATION)' > "$tmp/m"
+    check "the implementation leaves macros in GS4_ and GS4I_ only" refused grep . "$tmp/m"
+    grep '^GS4I_' "$tmp/all" | tr '\n' ' ' | sed 's/^/note: private macros left behind: /' | fold -s -w 150; echo
+    have ctags || return
+    tags_of | grep -v ' __anon' > "$tmp/tags"
+    half=$(implementation_line)
+    grep -E ' (_|[^ ]*__)' "$tmp/tags" > "$tmp/m"
+    check "no identifier begins with an underscore or has two" refused grep . "$tmp/m"
+    grep -vE '^(local|member|parameter) | (gs4i?_|GS4I?_|GS4MPM_H )' "$tmp/tags" > "$tmp/m"
+    check "all of file scope is gs4_ or gs4i_" refused grep . "$tmp/m"
+    awk -v half="$half" '$3 < half { public[$2] = 1 } $3 >= half && $2 ~ /^(gs4|GS4)_/ && !public[$2]' "$tmp/tags" > "$tmp/m"
+    check "what only the implementation has is gs4i_ or GS4I_" refused grep . "$tmp/m"
+    grep '^prototype gs4i_' "$tmp/tags" > "$tmp/m"
+    check "no private function is declared ahead" refused grep . "$tmp/m"
+}
+
+# ==== layout ===================================================================================================
+
+banners() { grep -n '^/\* ==== \[\[' gs4mpm.h | sed 's/^\([0-9]*\):.*\[\[\(.*\)\]\].*/\1 \2/'; }
+
+# The part of the implementation before line $1, closed: as many #endif as are open
+prefix() {
+    echo '#define GS4MPM_IMPLEMENTATION'
+    head -n $(($1 - 1)) gs4mpm.h
+    head -n $(($1 - 1)) gs4mpm.h | awk '/^#if/ { n++ } /^#endif/ { n-- } END { while (n-- > 0) print "#endif" }'
+}
+
+compiles_until() { prefix "$1" > "$tmp/prefix.c" && $CC -std=c99 -fsyntax-only -Wall -Wextra -Wpedantic -Werror -Wno-unused -DGS4_PTHREADS "$tmp/prefix.c"; }
+
+layout() {
+    banners > "$tmp/banners"; cut -d' ' -f2 "$tmp/banners" > "$tmp/sections"
+    awk -v half="$(implementation_line)" -v upper="$tmp/upper" -v lower="$tmp/lower" '{ print $2 > ($1 < half ? upper : lower) }' "$tmp/banners"
+    { sort "$tmp/upper" | uniq -d; sort "$tmp/lower" | uniq -d; } > "$tmp/m"
+    check "no tag twice in one half" refused grep . "$tmp/m"
+    grep -xFf "$tmp/lower" "$tmp/upper" > "$tmp/order_upper"; grep -xFf "$tmp/upper" "$tmp/lower" > "$tmp/order_lower"
+    check "tags of both halves in the same order" diff "$tmp/order_upper" "$tmp/order_lower"
+    grep -o '\[\[[a-z0-9_]*\]\]' gs4mpm.h | tr -d '[]' | sort -u | grep -vxFf "$tmp/sections" > "$tmp/m"
+    check "every [[tag]] that is spoken of is a section" refused grep . "$tmp/m"
+    # the manual's map: the lines before the first banner that begin with a tag
+    head -n "$(head -n 1 "$tmp/banners" | cut -d' ' -f1)" gs4mpm.h | sed '$d' | sed -n 's/^[ *]*\[\[\([a-z0-9_]*\)\]\].*/\1/p' > "$tmp/map"
+    if [ -s "$tmp/map" ]; then check "the map in the manual" diff "$tmp/map" "$tmp/sections"
+    else skip "the manual has no map of sections yet"; fi
+    while read -r line tag; do
+        [ "$line" -lt "$(implementation_line)" ] || check "all before [[$tag]] compiles without the rest" compiles_until "$line"
+    done < "$tmp/banners"
+    awk '/^\{$/ { start = NR - 1; head = last } /^\}/ { n = NR - start + 1; if (start && n > 60) print n, head; start = 0 } { last = $0 }' gs4mpm.h > "$tmp/long"
+    for f in $long_functions; do grep -v "[ *]$f(" "$tmp/long" > "$tmp/m"; cp "$tmp/m" "$tmp/long"; done
+    check "no function is longer than 60 lines" refused grep . "$tmp/long"
+}
+
+# ==== the same bits ============================================================================================
+
+# det BUILD ARGUMENTS [RUNNER]: builds tests/determinism.c, if that build is not there yet, and runs it
+det() {
+    program=$tmp/det$(echo "$1 $real" | cksum | tr ' ' _)$suffix
+    [ -x "$program" ] || $1 $real -I. tests/determinism.c -o "$program" -lm || return 1
+    ${3:-} "$program" steps=$steps ${2:-}
+}
+
+# same NAME BUILD ARGUMENTS [RUNNER]: prints what the reference printed
+same() { check "$1 $real" prints_same "$2" "$3" "${4:-}"; }
+prints_same() { det "$@" > "$tmp/det.out" && tr -d '\r' < "$tmp/det.out" | diff "$tmp/reference" -; }
+
+# reference REAL STEPS: what this compiler gives, to compare all others with
+threaded="$CC -O2 -DGS4_PTHREADS -pthread"
+reference() {
+    real=$1 steps=$2 suffix=''
+    det "$threaded" > "$tmp/reference"
+}
+
+threads_and_checkpoint() {
+    for n in 1 2 3 8; do same "$n threads" "$threaded" threads=$n; done
+    same "tasks in another order" "$threaded" shuffle=1
+    same "from a checkpoint" "$threaded" checkpoint="$tmp/checkpoint"
+}
+
+few_hashes() {
+    reference "" 40
+    same "-O0" "$CC -O0" ""
+    same "GS4_NO_VECTORS" "$CC -O0 -DGS4_NO_VECTORS" ""
+    threads_and_checkpoint
+}
+
+all_hashes() {
+    reference "$1" 500
+    for cc in gcc clang; do
+        have $cc || continue
+        for level in -O0 -O2 '-O3 -march=native' '-O2 -std=c99'; do same "$cc $level" "$cc $level" ""; done
+    done
+    have g++ && same "g++" "g++ -x c++ -O2" ""
+    same "GS4_NO_VECTORS" "$CC -O2 -DGS4_NO_VECTORS" ""
+    threads_and_checkpoint
+}
+hashes() { all_hashes ""; contraction; }
+hashes_double() { all_hashes -DGS4_DOUBLE; }
+
+# Whether the user's own products and sums are still fused where they asked for it
+contraction() {
+    have objdump || return
+    for cc in gcc clang; do
+        have $cc || continue
+        check "$cc: contraction of the code around is as it was" fuses $cc
+    done
+}
+fuses() { $1 -O2 -mfma -ffp-contract=fast -I. -c "$tmp/fused.c" -o "$tmp/fused.o" && objdump -d "$tmp/fused.o" | sed -n '/<users_own>:/,/ret/p' | grep fmadd; }
+
+# ==== sanitizers ===============================================================================================
+
+# sanitized COMPILER FLAGS
+sanitized_det() { $1 -g -O1 -DGS4_PTHREADS -pthread -I. tests/determinism.c -o "$tmp/det" -lm && "$tmp/det" steps=100 $2; }
+sanitized_main() { $1 -g -O1 -DGS4_PTHREADS -pthread -I. tests/main.c -o "$tmp/main" -lm && "$tmp/main"; }
+
+asan() {
+    for cc in gcc clang; do
+        have $cc || continue
+        build="$cc -fsanitize=address,undefined -fno-sanitize-recover=all"
+        check "$cc determinism" sanitized_det "$build" "threads=2 checkpoint=$tmp/checkpoint frames=$tmp/frame"
+        check "$cc determinism in double" sanitized_det "$build -DGS4_DOUBLE -DGS4_NO_VECTORS" "checkpoint=$tmp/checkpoint"
+    done
+    have gcc && check "all tests" sanitized_main "gcc -fsanitize=address,undefined -fno-sanitize-recover=all"
+}
+
+tsan() {
+    have gcc || return
+    for n in 2 3; do check "determinism on $n threads" sanitized_det "gcc -fsanitize=thread" "threads=$n checkpoint=$tmp/checkpoint"; done
+    check "all tests" sanitized_main "gcc -fsanitize=thread"
+}
+
+# ==== other compilers and machines =============================================================================
+
+# few_of_main BUILD RUNNER: some of the tests
+few_of_main() {
+    $1 -I. tests/main.c -o "$tmp/main$suffix" -lm || return 1
+    for t in $few_tests; do $2 "$tmp/main$suffix" "$t" || return 1; done
+}
+
+# machine NAME BUILD RUNNER STEPS: strict, the hashes of this machine, some tests
+machine() {
+    for precision in '' -DGS4_DOUBLE; do
+        reference "$precision" "$4"; suffix=${5:-}
+        check "strict $precision" $2 -std=c99 $6 $precision -I. -c "$tmp/implementation.c" -o "$tmp/strict.o"
+        same "hashes" "$2 -O2" checkpoint="${7:-$tmp}/checkpoint" "$3"
+        check "some tests $precision" few_of_main "$2 -O2 $precision" "$3"
+    done
+}
+
+tcc() { have tcc && machine tcc "$(command -v tcc)" "" 100 "" "-Wall -Werror"; }
+musl() { have musl-gcc && machine musl "musl-gcc -static" "" 100 "" "$strict_c"; }
+i386() {
+    echo 'int main(void) { return 0; }' | gcc -m32 -x c - -o "$tmp/m32" -lm 2> /dev/null || { skip "needs gcc-multilib"; return; }
+    machine i386 "gcc -m32 -msse2 -mfpmath=sse" "" 100 "" "$strict_c"
+}
+arm() {
+    have aarch64-linux-gnu-gcc || return
+    qemu=$(command -v qemu-aarch64-static || command -v qemu-aarch64) || { have qemu-aarch64; return; }
+    machine arm "aarch64-linux-gnu-gcc -static" "$qemu" 20 "" "$strict_c"
+}
+windows() {
+    have x86_64-w64-mingw32-gcc || return
+    check "threads" x86_64-w64-mingw32-gcc -std=c99 $strict_c -DGS4_PTHREADS -I. -c "$tmp/implementation.c" -o "$tmp/strict.o"
+    check "compiles" x86_64-w64-mingw32-gcc -O2 -I. tests/determinism.c -o "$tmp/det.exe" -lm
+    have wine || return
+    WINEPREFIX=$tmp/wine WINEDEBUG=-all; export WINEPREFIX WINEDEBUG
+    wine "$tmp/det.exe" steps=1 > /dev/null 2>&1                       # its first run sets it up
+    machine windows "x86_64-w64-mingw32-gcc -static" wine 100 .exe "$strict_c"
+}
+wasm() {
+    have clang && have node || return
+    echo 'int main(void) { return 0; }' | clang --target=wasm32-wasi -x c - -o "$tmp/wasi" 2> /dev/null || { skip "needs wasi-libc, lld and libclang-rt for wasm32"; return; }
+    cat > "$tmp/run.mjs" << 'END'
+import { readFileSync } from 'node:fs';
+import { WASI } from 'node:wasi';
+const folder = process.argv[2], wasi = new WASI({ version: 'preview1', args: process.argv.slice(3), preopens: { '/work': folder } });
+const module = await WebAssembly.compile(readFileSync(process.argv[3]));
+process.exitCode = wasi.start(await WebAssembly.instantiate(module, wasi.getImportObject())) ?? 0;
+END
+    machine wasm "clang --target=wasm32-wasi -D_WASI_EMULATED_PROCESS_CLOCKS -lwasi-emulated-process-clocks" "node --no-warnings $tmp/run.mjs $tmp" 100 .wasm \
+        "$strict_c -Wno-unused-command-line-argument" /work
+}
+
+# ==== files and linking ========================================================================================
+
+frames() {
+    for python in python3 /usr/bin/python3 ''; do [ -n "$python" ] && $python -c 'import numpy, meshio' 2> /dev/null && break; done
+    [ -n "$python" ] || { skip "needs python3 with numpy and meshio"; return; }
+    cat > "$tmp/frames.py" << 'END'
+import sys, numpy, meshio
+name, real = sys.argv[1:]
+text = numpy.loadtxt(name + '.txt')
+columns = [('x', 0), ('y', 1), ('z', 2), ('vx', 3), ('vy', 4), ('vz', 5), ('volume_ratio', 6), ('mass', 7), ('id', 8), ('material', 9)]
+ply, raw = meshio.read(name + '.ply'), numpy.load(name + '.npy')
+assert len(text) > 1000 and text[:, 9].max() == 1
+assert raw.shape == (len(text),) and raw['velocity'].dtype == real and ply.points.dtype == real
+for key, c in columns:
+    read = ply.points[:, c] if c < 3 else ply.point_data[key]
+    assert (read == text[:, c]).all(), 'PLY: ' + key
+    read = raw['position'][:, c] if c < 3 else raw['velocity'][:, c - 3] if c < 6 else raw[key]
+    assert (read == text[:, c]).all(), 'npy: ' + key
+END
+    for real in float32 float64; do
+        [ $real = float64 ] && flag=-DGS4_DOUBLE || flag=''
+        check "PLY and npy in $real are read back as they were" frames_agree $real $flag
+    done
+}
+frames_agree() {
+    $CC -O2 ${2:-} -I. tests/determinism.c -o "$tmp/det" -lm && "$tmp/det" steps=50 frames="$tmp/frame" && $python "$tmp/frames.py" "$tmp/frame" $1
+}
+
+link() {
+    have nm && have readelf || return
+    nm -D --defined-only "$($CC -print-file-name=libm.so.6)" 2> /dev/null | awk '{ print $NF }' | sed 's/@.*//' > "$tmp/libm"
+    check "asks of libc and libm what it may" asks_only "$libc" ""
+    check "and of threads" asks_only "$libc|$pthreads" -DGS4_PTHREADS
+    check "a program needs no other library" needs_only
+}
+asks_only() {
+    $CC -O1 -fno-stack-protector -U_FORTIFY_SOURCE $2 -I. -c "$tmp/implementation.c" -o "$tmp/link.o" || return 1
+    nm -u "$tmp/link.o" | awk '{ print $NF }' | grep -vxF -f "$tmp/libm" | grep -vxE "$1|_GLOBAL_OFFSET_TABLE_" > "$tmp/m"
+    refused grep . "$tmp/m"
+}
+needs_only() {
+    $CC -I. "$tmp/user.c" "$tmp/link.o" -o "$tmp/linked" -lm || return 1
+    readelf -d "$tmp/linked" | grep NEEDED | grep -vE '\[(lib[cm]\.|ld-)' > "$tmp/m"
+    refused grep . "$tmp/m"
+}
+
+# ==== main =====================================================================================================
+
+tmp=$(mktemp -d) || exit 1
+trap 'rm -rf "$tmp"' EXIT
+trap 'exit 1' HUP INT TERM
+
+if [ "${1:-}" = --group ]; then                     # one group in this process
+    group=$2
+    write_sources
+    "$group"
+    finish
+    exit
+fi
+
+case "${1:-full}" in quick) groups=$quick ;; full) groups=$full ;; *) groups=$* ;; esac
+echo $groups | tr ' ' '\n' | xargs -P "${JOBS:-2}" -I{} sh -c 'sh tests/portability.sh --group "$1" > "$2/$1.log" 2>&1 < /dev/null; cat "$2/$1.log" | sed "$ s/^/$1: /"' sh {} "$tmp"
+for group in $groups; do
+    line=$(tail -n 1 "$tmp/$group.log" 2> /dev/null | grep -E '^[0-9]+ passed, [0-9]+ failed')
+    # shellcheck disable=SC2046
+    set -- $(echo "${line:-0 passed, 1 failed}" | tr -dc '0-9 ')
+    passed=$((passed + $1)) failed=$((failed + $2)) skipped=$((skipped + ${3:-0}))
+    [ -n "$line" ] || echo "failed: $group did not finish"
+done
+finish

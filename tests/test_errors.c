@@ -220,7 +220,8 @@ static void test_errors_material(void)
     m.sound_speed = 0; m.bulk_modulus = (gs4_real)1e5;      /* the fields that exclude each other, one at a time */
     err_try_all(ERR_MATERIAL, &m, sizeof m, fields + 15, 1);
     m.bulk_modulus = 0;
-    err_try_all(ERR_MATERIAL, &m, sizeof m, fields, ERR_COUNT(fields));
+    err_try_all(ERR_MATERIAL, &m, sizeof m, fields, 4);
+    err_try_all(ERR_MATERIAL, &m, sizeof m, fields + 15, 2);
 }
 
 static void test_errors_fill(void)
@@ -727,19 +728,22 @@ static gs4_real err_viscosity(gs4_real temperature, gs4_real rate, void *user)
     return law->value;
 }
 
+/* A drop on its way to a wall. With open walls it is fast and leaves the blocks behind it empty. */
 static gs4_sim *err_moving(int euler, gs4_wall walls, err_law *law)
 {
     gs4_sim_desc d = err_desc();
     gs4_material m = err_material();
-    gs4_fill f = scene_fill(at(1, 0.3, -1));
+    gs4_fill f = scene_fill(walls == GS4_WALL_OPEN ? at(-20, 0.3, -1) : at(1, 0.3, -1));
     gs4_sim *sim = NULL;
     int w;
     if (euler) { d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER; d.rho_inf = 0; }
     for (w = 0; w < 6; w++) d.walls[w] = walls;
+    if (walls == GS4_WALL_OPEN) d.cells[0] = 24;
     if (law) { m.viscosity_law = GS4_VISCOSITY_CALLBACK; m.viscosity_fn = err_viscosity; m.viscosity_user = law; }
     gs4_create(&d, &sim);
     CHECK(gs4_add_material(sim, &m) == 0);
     CHECK(gs4_add_particles(sim, gs4_sphere(at(0.5, 0.5, 0.4), (gs4_real)0.35), &f) > 0);
+    if (walls == GS4_WALL_OPEN) CHECK(gs4_add_particles(sim, gs4_sphere(at(2, 0.5, 0.4), (gs4_real)0.35), &f) > 0);
     return sim;
 }
 

@@ -446,6 +446,12 @@ GS4_API int gs4_load(gs4_sim *sim, const char *path);          /* into a simulat
 #define GS4I_HUGE GS4I_C(1e18)
 #endif
 
+#if defined(__GNUC__) && !defined(__TINYC__)
+#define GS4I_PREFETCH(p) __builtin_prefetch(p)
+#else
+#define GS4I_PREFETCH(p) ((void)(p))
+#endif
+
 #if defined(__GNUC__)
 #define GS4I_RESTRICT __restrict__
 #define GS4I_INLINE static inline __attribute__((always_inline))
@@ -1301,6 +1307,17 @@ GS4I_INLINE void gs4i_tile_row(const gs4i_grid *g, int o, int y, int z, ptrdiff_
 /* Rows of a tile that particles touch, a bit each: row (y, z) is bit 8 z + y. */
 GS4I_INLINE uint64_t gs4i_touched_rows(int base) { return (uint64_t)0x070707u << (base / GS4I_TILE); }
 
+/* Ask for the nodes of a tile before they are needed: their rows are scattered, no processor foresees them. */
+static void gs4i_tile_prefetch(const gs4i_grid *g, int o, const gs4_real *field)
+{
+    int row;
+    for (row = 0; row < 64; row++) {
+        ptrdiff_t at[3];
+        gs4i_tile_row(g, o, row & 7, row >> 3, at);
+        GS4I_PREFETCH(field + at[0] + 8); GS4I_PREFETCH(field + at[1]); GS4I_PREFETCH(field + at[2]);
+    }
+}
+
 /* The touched rows of a field into a tile, and the row behind each, because reads may run a node over the end. */
 static void gs4i_tile_load(const gs4i_grid *g, int o, uint64_t rows, const gs4_real *GS4I_RESTRICT field, gs4_real *GS4I_RESTRICT tile)
 {
@@ -1322,12 +1339,15 @@ static void gs4i_tile_add(const gs4i_grid *g, int o, uint64_t rows, const gs4_re
     int row, i;
     for (row = 0; row < 64; row++, tile += 4 * GS4I_TILE) {
         ptrdiff_t at[3];
-        gs4_real *to;
         if (!(rows >> row & 1)) continue;
         gs4i_tile_row(g, o, row & 7, row >> 3, at);
-        for (to = field + at[0] + 8, i = 0; i < 8; i++) to[i] += tile[i];
-        for (to = field + at[1], i = 0; i < 16; i++) to[i] += tile[8 + i];
-        for (to = field + at[2], i = 0; i < 8; i++) to[i] += tile[24 + i];
+        for (i = 0; i < GS4I_TILE; i++) {
+            gs4_real *to = field + (i < 2 ? at[0] + 8 + 4 * i : i < 6 ? at[1] + 4 * (i - 2) : at[2] + 4 * (i - 6));
+            gs4i_quad sum, q;
+            GS4I_LOAD(sum, to); GS4I_LOAD(q, tile + 4 * i);
+            GS4I_SUM(sum, sum, q);
+            GS4I_STORE(to, sum);
+        }
     }
 }
 
@@ -2264,7 +2284,7 @@ enum { GS4I_BATCH = 16 };
 #define GS4I_J_HIGH GS4I_C(16)
 enum { GS4I_BAD_VOLUME = 1, GS4I_BAD_MOTION, GS4I_BAD_VISCOSITY };
 
-typedef struct gs4i_pass { gs4_sim *sim; const int32_t *blocks; } gs4i_pass;
+typedef struct gs4i_pass { gs4_sim *sim; const int32_t *blocks; int count; } gs4i_pass;
 
 /* From particle to tile coordinates: (x - origin) / h - first. */
 typedef struct gs4i_frame { gs4i_quad origin, first; gs4_real inv_h; } gs4i_frame;
@@ -2401,6 +2421,7 @@ static void gs4i_scatter_momentum(int index, void *context)
     uint64_t rows = 0;
     gs4i_report_clear(&sim->reports[o]);
     memset(tile, 0, sizeof tile);
+    gs4i_tile_prefetch(&sim->grid, o, sim->grid.momentum);
     for (; i < end; i += GS4I_BATCH) {
         const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
         gs4i_stencil s[GS4I_BATCH];
@@ -2512,7 +2533,9 @@ static void gs4i_scatter_forces(int index, void *context)
     gs4_real nodes[GS4I_TILE_REALS], tile[GS4I_TILE_REALS];
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
     gs4i_tile_load(&sim->grid, o, report->rows, sim->grid.momentum, nodes);
+    if (index + 1 < pass->count) gs4i_tile_prefetch(&sim->grid, pass->blocks[index + 1], sim->grid.momentum);
     memset(tile, 0, sizeof tile);
+    gs4i_tile_prefetch(&sim->grid, o, sim->grid.force);
     for (; i < end; i += GS4I_BATCH) {
         const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
         gs4i_stencil s[GS4I_BATCH];
@@ -2673,8 +2696,10 @@ GS4I_INLINE gs4_real gs4i_unseen(gs4_real filled)
 }
 
 /* S7: gather and correct. With `commit` 0 nothing is written: a rehearsal that only reports. */
-GS4I_INLINE void gs4i_correct(gs4_sim *sim, int o, int commit)
+GS4I_INLINE void gs4i_correct(const gs4i_pass *pass, int index, int commit)
 {
+    gs4_sim *sim = pass->sim;
+    const int o = pass->blocks[index];
     gs4i_rule rule = sim->rule;
     const gs4_real sim_decay = rule.decay, sim_damped = rule.damped, inv_full = rule.inv_full;
     const gs4i_particles p = sim->particles;
@@ -2688,6 +2713,10 @@ GS4I_INLINE void gs4i_correct(gs4_sim *sim, int o, int commit)
     size_t i = (size_t)grid->first[o], end = (size_t)grid->first[o + 1];
     gs4i_tile_load(grid, o, report->rows, grid->momentum, u_nodes);
     gs4i_tile_load(grid, o, report->rows, grid->force, a_nodes);
+    if (index + 1 < pass->count) {
+        gs4i_tile_prefetch(grid, pass->blocks[index + 1], grid->momentum);
+        gs4i_tile_prefetch(grid, pass->blocks[index + 1], grid->force);
+    }
     for (; i < end; i += GS4I_BATCH) {
         const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
         gs4i_stencil s[GS4I_BATCH];
@@ -2731,14 +2760,12 @@ GS4I_INLINE void gs4i_correct(gs4_sim *sim, int o, int commit)
 
 static void gs4i_correct_task(int index, void *context)
 {
-    const gs4i_pass *pass = (const gs4i_pass *)context;
-    gs4i_correct(pass->sim, pass->blocks[index], 1);
+    gs4i_correct((const gs4i_pass *)context, index, 1);
 }
 
 static void gs4i_rehearse_task(int index, void *context)
 {
-    const gs4i_pass *pass = (const gs4i_pass *)context;
-    gs4i_correct(pass->sim, pass->blocks[index], 0);
+    gs4i_correct((const gs4i_pass *)context, index, 0);
 }
 
 /* Symplectic Euler, there: momentum with the impulse of stress and weight, as one affine field (MLS-MPM):
@@ -2761,6 +2788,7 @@ static void gs4i_scatter_euler(int index, void *context)
     uint64_t rows = 0;
     gs4i_report_clear(report);
     memset(tile, 0, sizeof tile);
+    gs4i_tile_prefetch(&sim->grid, o, sim->grid.momentum);
     for (; i < end; i += GS4I_BATCH) {
         const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
         gs4i_stencil s[GS4I_BATCH];
@@ -2795,8 +2823,10 @@ static void gs4i_scatter_euler(int index, void *context)
 }
 
 /* Symplectic Euler, and back: v = sum w v_i, C = sum v_i (x) grad w, J += dt J tr C, x += dt v. */
-GS4I_INLINE void gs4i_gather_euler(gs4_sim *sim, int o, int commit)
+GS4I_INLINE void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit)
 {
+    gs4_sim *sim = pass->sim;
+    const int o = pass->blocks[index];
     const gs4i_reach reach = { 0, 0 };
     const gs4_real dt = sim->rule.dt;
     const gs4i_particles p = sim->particles;
@@ -2811,6 +2841,7 @@ GS4I_INLINE void gs4i_gather_euler(gs4_sim *sim, int o, int commit)
     size_t i = (size_t)grid->first[o], end = (size_t)grid->first[o + 1];
     for (c = 0; c < 27; c++) edge |= grid->jump_of[grid->neighbour[27 * (size_t)o + (size_t)c]];
     gs4i_tile_load(grid, o, report->rows, grid->momentum, nodes);
+    if (index + 1 < pass->count) gs4i_tile_prefetch(grid, pass->blocks[index + 1], grid->momentum);
     for (; i < end; i += GS4I_BATCH) {
         const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
         gs4i_stencil s[GS4I_BATCH];
@@ -2842,14 +2873,12 @@ GS4I_INLINE void gs4i_gather_euler(gs4_sim *sim, int o, int commit)
 
 static void gs4i_gather_euler_task(int index, void *context)
 {
-    const gs4i_pass *pass = (const gs4i_pass *)context;
-    gs4i_gather_euler(pass->sim, pass->blocks[index], 1);
+    gs4i_gather_euler((const gs4i_pass *)context, index, 1);
 }
 
 static void gs4i_rehearse_euler_task(int index, void *context)
 {
-    const gs4i_pass *pass = (const gs4i_pass *)context;
-    gs4i_gather_euler(pass->sim, pass->blocks[index], 0);
+    gs4i_gather_euler((const gs4i_pass *)context, index, 0);
 }
 
 /* Run a scattering kernel over all occupied blocks, colour after colour. */
@@ -2860,7 +2889,8 @@ static void gs4i_scatter(gs4_sim *sim, gs4_task_fn kernel)
     pass.sim = sim;
     for (colour = 0; colour < 8; colour++) {
         pass.blocks = sim->grid.by_colour + sim->grid.colour_first[colour];
-        gs4i_parallel_for(&sim->tasks, sim->grid.colour_first[colour + 1] - sim->grid.colour_first[colour], kernel, &pass);
+        pass.count = sim->grid.colour_first[colour + 1] - sim->grid.colour_first[colour];
+        gs4i_parallel_for(&sim->tasks, pass.count, kernel, &pass);
     }
 }
 
@@ -2869,7 +2899,8 @@ static void gs4i_gather(gs4_sim *sim, gs4_task_fn kernel)
     gs4i_pass pass;
     pass.sim = sim;
     pass.blocks = sim->grid.by_colour;
-    gs4i_parallel_for(&sim->tasks, sim->grid.occupied, kernel, &pass);
+    pass.count = sim->grid.occupied;
+    gs4i_parallel_for(&sim->tasks, pass.count, kernel, &pass);
 }
 
 /* Extremes over all blocks of the last pass. */

@@ -10,7 +10,7 @@ cd "$(dirname "$0")/.." || exit 1
 CC=${CC:-cc}
 
 quick='layout names units few_warnings few_hashes link'
-full='warnings tsan hashes asan arm hashes_double wasm windows tcc musl i386 layout names units link frames'
+full='warnings tsan hashes asan arm hashes_double wasm windows tiny musl i386 layout names units link frames'
 
 # A transfer kernel may be longer than 60 lines; nothing else.
 long_functions=''
@@ -313,7 +313,7 @@ machine() {
     done
 }
 
-tcc() { have tcc && machine tcc "$(command -v tcc)" "" 100 "" "-Wall -Werror"; }
+tiny() { have tcc && machine tcc tcc "" 100 "" "-Wall -Werror"; }
 musl() { have musl-gcc && machine musl "musl-gcc -static" "" 100 "" "$strict_c"; }
 i386() {
     echo 'int main(void) { return 0; }' | gcc -m32 -x c - -o "$tmp/m32" -lm 2> /dev/null || { skip "needs gcc-multilib"; return; }
@@ -332,6 +332,7 @@ windows() {
     WINEPREFIX=$tmp/wine WINEDEBUG=-all; export WINEPREFIX WINEDEBUG
     wine "$tmp/det.exe" steps=1 > /dev/null 2>&1                       # its first run sets it up
     machine windows "x86_64-w64-mingw32-gcc -static" wine 100 .exe "$strict_c"
+    wineserver -w                                                      # until it has written its last
 }
 wasm() {
     have clang && have node || return
@@ -396,7 +397,7 @@ needs_only() {
 # ==== main =====================================================================================================
 
 tmp=$(mktemp -d) || exit 1
-trap 'rm -rf "$tmp"' EXIT
+trap 'rm -rf "$tmp" 2> /dev/null' EXIT
 trap 'exit 1' HUP INT TERM
 
 if [ "${1:-}" = --group ]; then                     # one group in this process

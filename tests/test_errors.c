@@ -182,7 +182,7 @@ static void test_errors_desc(void)
     static const err_field fields[] = {
         ERR_FIELD(gs4_sim_desc, cells[0], "cells", ERR_INT), ERR_FIELD(gs4_sim_desc, cells[1], "cells", ERR_INT), ERR_FIELD(gs4_sim_desc, cells[2], "cells", ERR_INT),
         ERR_FIELD(gs4_sim_desc, cell_size, "cell_size", ERR_REAL), ERR_VEC(gs4_sim_desc, origin, "origin"), ERR_VEC(gs4_sim_desc, gravity, "gravity"),
-        ERR_FIELD(gs4_sim_desc, scheme, "scheme", ERR_LATER_INT), ERR_FIELD(gs4_sim_desc, integrator, "integrator", ERR_INT),
+        ERR_FIELD(gs4_sim_desc, scheme, "scheme", ERR_LATER_INT),
         ERR_FIELD(gs4_sim_desc, rho_inf, "rho_inf", ERR_REAL), ERR_FIELD(gs4_sim_desc, rho_inf_spurious, "rho_inf_spurious", ERR_REAL),
         ERR_FIELD(gs4_sim_desc, flip_decay_time, "flip_decay_time", ERR_REAL),
         ERR_FIELD(gs4_sim_desc, walls[0], "walls", ERR_INT), ERR_FIELD(gs4_sim_desc, walls[3], "walls", ERR_INT), ERR_FIELD(gs4_sim_desc, walls[5], "walls", ERR_INT),
@@ -192,8 +192,11 @@ static void test_errors_desc(void)
         ERR_FIELD(gs4_sim_desc, cfl, "cfl", ERR_REAL), ERR_FIELD(gs4_sim_desc, max_dt, "max_dt", ERR_REAL),
         ERR_FIELD(gs4_sim_desc, solver_tolerance, "solver_tolerance", ERR_REAL), ERR_FIELD(gs4_sim_desc, solver_max_iterations, "solver_max_iterations", ERR_INT),
         ERR_FIELD(gs4_sim_desc, max_particles, "max_particles", ERR_INT), ERR_FIELD(gs4_sim_desc, threads, "threads", ERR_INT) };
+    static const err_field integrator[] = { ERR_FIELD(gs4_sim_desc, integrator, "integrator", ERR_INT) };
     gs4_sim_desc d = err_desc();
     err_try_all(ERR_DESC, &d, sizeof d, fields, ERR_COUNT(fields));
+    d.rho_inf = 0;
+    err_try_all(ERR_DESC, &d, sizeof d, integrator, 1);
 }
 
 static void test_errors_material(void)
@@ -825,6 +828,38 @@ static void test_errors_no_end(void)
     }
 }
 
+/* gravity 1e5 on a soft liquid: a step either moves nothing by more than two cells or is refused, though all move alike. */
+static void test_errors_leaps(void)
+{
+    enum { ERR_LEAPERS = 512 };
+    static double before[3 * ERR_LEAPERS], after[3 * ERR_LEAPERS];
+    int euler, i, k;
+    for (euler = 0; euler < 2; euler++) {
+        gs4_sim_desc d = err_desc();
+        const gs4_fill f = scene_fill(at(0, 0, 0));
+        double far_cells = 0;
+        gs4_sim *sim;
+        if (euler) { d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER; d.rho_inf = 0; }
+        d.cells[2] = 64; d.gravity = at(0, 0, -1e5);
+        sim = err_sim_of(&d);
+        CHECK(gs4_add_particles(sim, gs4_box(at(0, 0, 6), at(1, 1, 7)), &f) >= ERR_LEAPERS);
+        for (i = 0; i < 3; i++) {
+            const gs4_view x = gs4_particles(sim, GS4_FIELD_POSITION);
+            const uint32_t *id = gs4_particle_ids(sim);
+            for (k = 0; k < x.count; k++) if (id[k] < ERR_LEAPERS) before[id[k]] = (double)x.data[k * x.stride + 2];
+            if (gs4_step(sim, (gs4_real)0.95 * gs4_stable_dt(sim)) != GS4_OK) break;
+            {
+                const gs4_view y = gs4_particles(sim, GS4_FIELD_POSITION);
+                id = gs4_particle_ids(sim);
+                for (k = 0; k < y.count; k++) if (id[k] < ERR_LEAPERS) after[id[k]] = (double)y.data[k * y.stride + 2];
+            }
+            for (k = 0; k < ERR_LEAPERS; k++) far_cells = fmax(far_cells, fabs(after[k] - before[k]) / (double)d.cell_size);
+        }
+        CHECK(far_cells <= 2.01);
+        gs4_destroy(sim);
+    }
+}
+
 /* --- room ------------------------------------------------------------------------------------------------- */
 
 static void test_errors_max_particles(void)
@@ -918,6 +953,7 @@ static void run_errors(void)
     RUN(test_errors_refused_step);
     RUN(test_errors_viscosity_callback);
     RUN(test_errors_no_end);
+    RUN(test_errors_leaps);
     RUN(test_errors_max_particles);
     RUN(test_errors_limit_after_emitting);
     RUN(test_errors_heavy);

@@ -1,0 +1,124 @@
+/* Nanoseconds a particle and step: one block of a million particles, 8 a cell, settled and stirred, GS4 and symplectic Euler,
+ * beside a textbook MLS-MPM loop (plain_mpm.c) in the same run; then what an empty domain around costs, memory, and threads.
+ *   cc -O3 -march=native bench/throughput.c -I. -lm -lpthread -o throughput && ./throughput [--particles N] [--steps N] [--repeats N]
+ * CSV on standard output. */
+#define _POSIX_C_SOURCE 200112L
+#define GS4_PTHREADS
+#define GS4MPM_IMPLEMENTATION
+#include "gs4mpm.h"
+#include "bench.h"
+#include "plain_mpm.c"
+
+typedef struct row { double min_ns, median_ns, bytes_particle; int particles; uint64_t hash; double sort_share; } row;
+
+static gs4_sim *scene(int edge, const int cells[3], gs4_integrator integrator, int threads, int stirred)
+{
+    gs4_sim_desc d = scene_cube(edge);
+    gs4_material m = scene_liquid(1000, 1, 30);
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    gs4_sim *sim;
+    int a, n;
+    for (a = 0; a < 3; a++) d.cells[a] = cells[a];
+    d.gravity = at(0, -9.81, 0); d.integrator = integrator; d.threads = threads; d.now = bench_now;
+    d.max_particles = 8 * edge * edge * edge;
+    if (gs4_create(&d, &sim) < 0) { puts(gs4_last_error(NULL)); exit(1); }
+    gs4_add_material(sim, &m);
+    f.jitter = (gs4_real)0.2; f.random_seed = 1;
+    n = gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1, 1, 1)), &f);
+    if (n < 0) { puts(gs4_last_error(sim)); exit(1); }
+    if (stirred) {                                          /* a swirl about the middle, one turn a second, for a while */
+        const gs4_view x = gs4_particles(sim, GS4_FIELD_POSITION);
+        gs4_edit v = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
+        for (a = 0; a < n; a++) {
+            const gs4_real *p = x.data + (size_t)a * (size_t)x.stride;
+            v.data[(size_t)a * (size_t)v.stride] = (gs4_real)(6 * ((double)p[2] - 0.5));
+            v.data[(size_t)a * (size_t)v.stride + 2] = (gs4_real)(-6 * ((double)p[0] - 0.5));
+        }
+    }
+    return sim;
+}
+
+static row measure(gs4_sim *sim, int steps, int repeats)
+{
+    double times[64], before;
+    row r;
+    int i, k;
+    const int n = gs4_get_stats(sim).particles;
+    for (i = 0; i < 3; i++) if (gs4_step(sim, (gs4_real)(0.6 * (double)gs4_stable_dt(sim))) < 0) { puts(gs4_last_error(sim)); exit(1); }
+    before = gs4_get_stats(sim).seconds_sort;
+    for (k = 0; k < repeats; k++) {
+        const double start = bench_now(NULL);
+        for (i = 0; i < steps; i++) if (gs4_step(sim, (gs4_real)(0.6 * (double)gs4_stable_dt(sim))) < 0) { puts(gs4_last_error(sim)); exit(1); }
+        times[k] = (bench_now(NULL) - start) / steps / n * 1e9;
+    }
+    r.particles = n;
+    r.sort_share = (gs4_get_stats(sim).seconds_sort - before) / repeats / steps / n * 1e9;
+    r.median_ns = bench_median(times, repeats); r.min_ns = times[0];
+    r.hash = gs4_state_hash(sim);
+    r.bytes_particle = ((double)gs4_get_stats(sim).memory_bytes - 48.0 * gs4_get_stats(sim).active_cells) / n;
+    return r;
+}
+
+static double report(const char *name, gs4_sim *sim, int steps, int repeats)
+{
+    const row r = measure(sim, steps, repeats);
+    printf("%s,%d,%.1f,%.1f,%.1f,%.1f,%016llx\n", name, r.particles, r.min_ns, r.median_ns, r.sort_share, r.bytes_particle, (unsigned long long)r.hash);
+    fflush(stdout);
+    gs4_destroy(sim);
+    return r.median_ns;
+}
+
+static double plain(const char *name, int edge, int stirred, int steps, int repeats)
+{
+    int cells[3], k, i;
+    float low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 }, gravity[3] = { 0, -9.81f, 0 };
+    double times[64], min;
+    plain_sim *p;
+    cells[0] = cells[1] = cells[2] = edge;
+    p = plain_create(cells, 1.0f / (float)edge, 1000, 30, 1, gravity, PLAIN_SLIP);
+    if (!p || plain_add_block(p, low, high, 0.5f / (float)edge, 1) < 0) { puts("no memory"); exit(1); }
+    if (stirred) { plain_swirl(p, 6); plain_shuffle(p, 1); }
+    plain_step(p, 1e-4f);
+    for (k = 0; k < repeats; k++) {
+        const double start = bench_now(NULL);
+        for (i = 0; i < steps; i++) plain_step(p, 1e-4f);
+        times[k] = (bench_now(NULL) - start) / steps / plain_particle_count(p) * 1e9;
+    }
+    min = bench_median(times, repeats);
+    printf("%s,%d,%.1f,%.1f,,,\n", name, plain_particle_count(p), times[0], min);
+    plain_destroy(p);
+    return min;
+}
+
+int main(int count, char **values)
+{
+    int particles = 1000000, steps = 5, repeats = 7, i, edge = 4;
+    double gs4[2], euler[2], text[2], two;
+    for (i = 1; i + 1 < count; i += 2) {
+        if (strcmp(values[i], "--particles") == 0) particles = atoi(values[i + 1]);
+        else if (strcmp(values[i], "--steps") == 0) steps = atoi(values[i + 1]);
+        else if (strcmp(values[i], "--repeats") == 0) repeats = atoi(values[i + 1]);
+    }
+    if (repeats > 64) repeats = 64;
+    while (8 * edge * edge * edge < particles) edge++;
+    {
+        const int snug[3] = { edge, edge, edge };
+        bench_machine(stdout);
+        puts("scene,particles,min_ns,median_ns,of_which_sort_ns,bytes_a_particle,state_hash");
+        for (i = 0; i < 2; i++) {
+            text[i]  = plain(i ? "textbook stirred" : "textbook settled", edge, i, steps, repeats);
+            gs4[i]   = report(i ? "gs4 stirred" : "gs4 settled", scene(edge, snug, GS4_INTEGRATOR_GS4, 1, i), steps, repeats);
+            euler[i] = report(i ? "euler stirred" : "euler settled", scene(edge, snug, GS4_INTEGRATOR_SYMPLECTIC_EULER, 1, i), steps, repeats);
+        }
+        two = report("gs4 settled two threads", scene(edge, snug, GS4_INTEGRATOR_GS4, 2, 0), steps, repeats);
+    }
+    printf("# textbook over gs4: settled %.2f, stirred %.2f; over symplectic Euler: %.2f, %.2f; two threads %.2f times one\n",
+           text[0] / gs4[0], text[1] / gs4[1], text[0] / euler[0], text[1] / euler[1], gs4[0] / two);
+    {
+        const int small[3] = { 20, 20, 20 }, huge[3] = { 512, 256, 256 };
+        const double a = report("50 k snug", scene(18, small, GS4_INTEGRATOR_GS4, 1, 0), 4 * steps, repeats);
+        const double b = report("50 k in 33 million cells", scene(18, huge, GS4_INTEGRATOR_GS4, 1, 0), 4 * steps, repeats);
+        printf("# empty space costs a factor of %.2f\n", b / a);
+    }
+    return 0;
+}

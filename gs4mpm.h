@@ -3427,6 +3427,12 @@ static void gs4i_emit(gs4_sim *sim, double dt)
             sim->desc.log(1, "an emitter pauses: max_particles is reached", sim->desc.log_user);
         memcpy(m->looked, drift, sizeof drift);
         m->begun = 1;
+        {                                                   /* what is new counts for the next limit */
+            const gs4i_law *law = &sim->laws[m->is.fill.material];
+            sim->worst.max_sound = gs4i_max(sim->worst.max_sound, law->sound_speed);
+            sim->worst.max_viscosity = gs4i_max(sim->worst.max_viscosity, law->viscosity * law->inv_density);
+            if (law->viscosity_fn) sim->unseen = 1;
+        }
     }
 }
 

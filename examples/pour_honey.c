@@ -1,55 +1,57 @@
 /* pour_honey.c - honey is poured on a plate and coils.
  *     cc -O3 -march=native examples/pour_honey.c -Iexamples -I. -lm -lpthread -o pour_honey
  *     ./pour_honey                        pictures and particles in out/
- *     ./pour_honey --cells 96             finer and prettier; 128 takes hours */
+ *     ./pour_honey --cells 80             finer; the time grows with the fifth power of the cells
+ *
+ * A rope of 9 mm leaves the mouth at 0.12 m/s, grows thinner as it falls, buckles 0.25 s after it has met the plate,
+ * and goes round about three times a second from then on. */
 #include "example.h"
 
-static double num(const char *n, double d) { const char *s = getenv(n); return s ? atof(s) : d; }
 int main(int argc, char **argv)
 {
-    double width = num("W", 0.08), mouth = num("A", 0.0045), height = num("H", 0.06), speed = num("U", 0.12);
+    const double width = 0.08, height = 0.06, plate_radius = 0.036, plate_thickness = 0.006;
+    const float amber[1][3] = {{0.93f, 0.60f, 0.10f}};
     example e = {0};
-    gs4_sim_desc d = {0};
+    gs4_sim_desc desc = {0};
     gs4_material honey;
     gs4_collider plate = {0};
-    gs4_emitter nozzle = {0};
+    gs4_emitter mouth = {0};
+    preview_solid things[2] = {{0}};
     gs4_sim *sim;
-    e.name = "pour_honey"; e.frames = 60; e.cells = 48;
+    e.name = "pour_honey"; e.frames = 40; e.cells = 48;
     example_options(&e, argc, argv);
 
-    d.cell_size = real(width / e.cells);
-    d.cells[0] = d.cells[2] = e.cells;
-    d.cells[1] = e.cells * 10 / 8;
-    d.origin = vec(-width / 2, -0.01, -width / 2);
-    d.gravity = vec(0, -9.81, 0);
-    d.cfl = real(num("CFL", 0.5));
-    if (getenv("EULER")) d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER;
-    for (int i = 0; i < 6; ++i) d.walls[i] = GS4_WALL_OPEN;
-    sim = example_create(&e, &d);
+    desc.cell_size = real(width / e.cells);
+    desc.cells[0] = desc.cells[2] = e.cells; desc.cells[1] = e.cells;
+    desc.origin = vec(-width / 2, -0.01, -width / 2);
+    desc.gravity = vec(0, -9.81, 0);
+    desc.cfl = real(0.8);
+    for (int i = 0; i < 6; ++i) desc.walls[i] = GS4_WALL_OPEN;
+    sim = example_create(&e, &desc);
 
-    gs4_material_preset("honey", &honey);
-    honey.viscosity = real(num("MU", 10));
-    honey.sound_speed = real(num("C", 8));
+    gs4_material_preset("honey", &honey);       /* 1420 kg/m^3, 10 Pa s */
+    honey.sound_speed = real(6);                /* nothing here moves faster than 0.6 m/s */
     example_need(sim, gs4_add_material(sim, &honey));
 
-    plate.shape = gs4_cylinder(vec(0, -0.006, 0), vec(0, 0, 0), real(0.036));
+    plate.shape = gs4_cylinder(vec(0, -plate_thickness, 0), vec(0, 0, 0), real(plate_radius));
     plate.contact = GS4_WALL_STICK;
     example_need(sim, gs4_add_collider(sim, &plate));
 
-    nozzle.shape = gs4_cylinder(vec(0, height, 0), vec(0, height + 0.006, 0), real(mouth));
-    nozzle.fill.velocity = vec(0, -speed, 0);
-    nozzle.fill.jitter = real(0.5);
-    example_need(sim, gs4_add_emitter(sim, &nozzle));
+    mouth.shape = gs4_cylinder(vec(0, height, 0), vec(0, height + 0.006, 0), real(0.0045));
+    mouth.fill.velocity = vec(0, -0.12, 0);
+    mouth.fill.jitter = real(0.5);              /* what is symmetric has no side to fall to */
+    example_need(sim, gs4_add_emitter(sim, &mouth));
 
-    preview_solid things[2] = {{0}};
-    things[0].kind = PREVIEW_CYLINDER; things[0].a[1] = -0.006f; things[0].radius = 0.036f;
+    things[0].kind = PREVIEW_CYLINDER; things[0].a[1] = (float)-plate_thickness; things[0].radius = (float)plate_radius;
     things[0].colour[0] = 0.93f; things[0].colour[1] = 0.94f; things[0].colour[2] = 0.96f;
-    things[1].kind = PREVIEW_FLOOR; things[1].a[1] = -0.006f;
+    things[1].kind = PREVIEW_FLOOR; things[1].a[1] = (float)-plate_thickness;
     e.look.solids = things; e.look.solid_count = 2;
-    e.look.eye[0] = 0.03f; e.look.eye[1] = 0.07f; e.look.eye[2] = 0.15f;
-    e.look.target[1] = 0.025f;
-    e.look.width = (int)num("PW", 720); e.look.height = (int)num("PH", 720);
-    while (example_frame(&e, sim)) { gs4_stats s = gs4_get_stats(sim); fprintf(stderr, "   J %.4f %.4f vol %.4f vmax %.3f steps %d\n", s.min_volume_ratio, s.max_volume_ratio, s.volume/s.mass*1420, s.max_speed, (int)s.steps); }
+    e.look.eye[0] = 0.03f; e.look.eye[1] = 0.07f; e.look.eye[2] = 0.14f;
+    e.look.target[1] = 0.027f;
+    e.look.width = 540; e.look.height = 600;
+    e.look.palette = amber; e.look.palette_count = 1; e.look.clarity = 0.006f;
+    e.look.radius = 0.29f * (float)desc.cell_size;      /* a little more than half the spacing: a smoother surface */
+    while (example_frame(&e, sim)) { }
     gs4_destroy(sim);
     return 0;
 }

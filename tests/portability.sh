@@ -9,13 +9,13 @@ set -u
 cd "$(dirname "$0")/.." || exit 1
 CC=${CC:-cc}
 
-quick='layout names units few_warnings few_hashes link'
-full='warnings tsan hashes asan arm hashes_double wasm windows tiny musl i386 layout names units link frames'
+quick='layout names units snippets few_warnings few_hashes link'
+full='warnings tsan hashes asan arm hashes_double wasm windows tiny musl i386 layout names units snippets link frames'
 
 # A transfer kernel may be longer than 60 lines; nothing else.
 long_functions=''
 # Tests of tests/main.c that run on foreign machines too: parts of their names. All of them run where it costs no more than here.
-few_tests='kernel files error'
+few_tests='free_flight files error'
 # What the library may ask of libc; all of libm is allowed, and with GS4_PTHREADS what is named here.
 libc='malloc|free|mem(cpy|move|set|cmp)|str(len|cmp|chr)|f(open|close|read|write|flush|error)|rename|remove|stat|__assert_fail'
 pthreads='pthread_((mutex|cond)_[a-z]+|create|join)'
@@ -137,6 +137,15 @@ units() {
     check "C uses C++" runs_linked "$CC" user.c g++ implementation.cpp
 }
 
+# Programs in the manual and in README.md, each of which has a main
+snippets() {
+    sed -n 's/^ \*     //p' gs4mpm.h | awk '/^#include <stdio.h>/ { on = 1 } on; on && /^}/ { exit }' > "$tmp/snippet0.c"
+    awk -v name="$tmp/snippet" '/^```/ { on = /^```c$/; n += on; next } on { print > (name n ".c") }' README.md 2> "$tmp/m" || skip "no README.md yet"
+    for f in $(grep -l 'int main' "$tmp"/snippet*.c); do
+        check "$(head -n 3 "$f" | tail -n 1)" $CC -std=c99 -O1 -Wall -Wpedantic -Werror -I. "$f" -o "$tmp/linked" -lm
+    done
+}
+
 # ==== names ====================================================================================================
 
 exported() { $CC "$@" -I. -c "$tmp/implementation.c" -o "$tmp/names.o" && nm -g --defined-only "$tmp/names.o" | awk '{ print $NF }' | sort; }
@@ -205,10 +214,10 @@ layout() {
     check "tags of both halves in the same order" diff "$tmp/order_upper" "$tmp/order_lower"
     grep -o '\[\[[a-z0-9_]*\]\]' gs4mpm.h | tr -d '[]' | sort -u | grep -vxFf "$tmp/sections" > "$tmp/m"
     check "every [[tag]] that is spoken of is a section" refused grep . "$tmp/m"
-    # the manual's map: the lines before the first banner that begin with a tag
-    head -n "$(head -n 1 "$tmp/banners" | cut -d' ' -f1)" gs4mpm.h | sed '$d' | sed -n 's/^[ *]*\[\[\([a-z0-9_]*\)\]\].*/\1/p' > "$tmp/map"
-    if [ -s "$tmp/map" ]; then check "the map in the manual" diff "$tmp/map" "$tmp/sections"
-    else skip "the manual has no map of sections yet"; fi
+    # the manual's map: lines before the first banner that begin with a tag; left column, then right column
+    head -n "$(head -n 1 "$tmp/banners" | cut -d' ' -f1)" gs4mpm.h | sed '$d' | grep '^[ *]*\[\[' > "$tmp/m"
+    { sed -n 's/^[ *]*\[\[\([a-z0-9_]*\)\]\].*\[\[.*/\1/p' "$tmp/m"; sed 's/.*\[\[\([a-z0-9_]*\)\]\].*/\1/' "$tmp/m"; } > "$tmp/map"
+    check "the map in the manual" diff "$tmp/map" "$tmp/sections"
     while read -r line tag; do
         [ "$line" -lt "$(implementation_line)" ] || check "all before [[$tag]] compiles without the rest" compiles_until "$line"
     done < "$tmp/banners"
@@ -221,9 +230,9 @@ layout() {
 
 # det BUILD ARGUMENTS [RUNNER]: builds tests/determinism.c, if that build is not there yet, and runs it
 det() {
-    program=$tmp/det$(echo "$1 $real" | cksum | tr ' ' _)$suffix
-    [ -x "$program" ] || $1 $real -I. tests/determinism.c -o "$program" -lm || return 1
-    ${3:-} "$program" steps=$steps ${2:-}
+    program=./det$(echo "$1 $real" | cksum | tr ' ' _)$suffix
+    [ -x "$tmp/$program" ] || $1 $real -I. tests/determinism.c -o "$tmp/$program" -lm || return 1
+    (cd "$tmp" && ${3:-} "$program" steps=$steps ${2:-})
 }
 
 # same NAME BUILD ARGUMENTS [RUNNER]: prints what the reference printed
@@ -240,7 +249,7 @@ reference() {
 threads_and_checkpoint() {
     for n in 1 2 3 8; do same "$n threads" "$threaded" threads=$n; done
     same "tasks in another order" "$threaded" shuffle=1
-    same "from a checkpoint" "$threaded" checkpoint="$tmp/checkpoint"
+    same "from a checkpoint" "$threaded" checkpoint=checkpoint
 }
 
 few_hashes() {
@@ -297,32 +306,34 @@ tsan() {
 
 # ==== other compilers and machines =============================================================================
 
-# few_of_main BUILD RUNNER: some of the tests
+# few_of_main BUILD RUNNER: some of the tests; a part of which no test is run is a failure
 few_of_main() {
     $1 -I. tests/main.c -o "$tmp/main$suffix" -lm || return 1
-    for t in $few_tests; do $2 "$tmp/main$suffix" "$t" || return 1; done
-}
-
-# machine NAME BUILD RUNNER STEPS: strict, the hashes of this machine, some tests
-machine() {
-    for precision in '' -DGS4_DOUBLE; do
-        reference "$precision" "$4"; suffix=${5:-}
-        check "strict $precision" $2 -std=c99 $6 $precision -I. -c "$tmp/implementation.c" -o "$tmp/strict.o"
-        same "hashes" "$2 -O2" checkpoint="${7:-$tmp}/checkpoint" "$3"
-        check "some tests $precision" few_of_main "$2 -O2 $precision" "$3"
+    for t in $few_tests; do
+        (cd "$tmp" && $2 "./main$suffix" "$t") > "$tmp/main.out" 2>&1 && grep '^[1-9][0-9]* passed' "$tmp/main.out" || { cat "$tmp/main.out"; return 1; }
     done
 }
 
-tiny() { have tcc && machine tcc tcc "" 100 "" "-Wall -Werror"; }
-musl() { have musl-gcc && machine musl "musl-gcc -static" "" 100 "" "$strict_c"; }
+# machine BUILD WARNINGS STEPS [RUNNER SUFFIX]: strict, the hashes of this machine, some tests, in both precisions
+machine() {
+    for precision in '' -DGS4_DOUBLE; do
+        reference "$precision" "$3"; suffix=${5:-}
+        check "strict $precision" $1 -std=c99 $2 $precision -I. -c "$tmp/implementation.c" -o "$tmp/strict.o"
+        same "hashes" "$1 -O2" checkpoint=checkpoint "${4:-}"
+        check "some tests $precision" few_of_main "$1 -O2 $precision" "${4:-}"
+    done
+}
+
+tiny() { have tcc && machine tcc "-Wall -Werror" 100; }
+musl() { have musl-gcc && machine "musl-gcc -static" "$strict_c" 100; }
 i386() {
     echo 'int main(void) { return 0; }' | gcc -m32 -x c - -o "$tmp/m32" -lm 2> /dev/null || { skip "needs gcc-multilib"; return; }
-    machine i386 "gcc -m32 -msse2 -mfpmath=sse" "" 100 "" "$strict_c"
+    machine "gcc -m32 -msse2 -mfpmath=sse" "$strict_c" 100
 }
 arm() {
     have aarch64-linux-gnu-gcc || return
     qemu=$(command -v qemu-aarch64-static || command -v qemu-aarch64) || { have qemu-aarch64; return; }
-    machine arm "aarch64-linux-gnu-gcc -static" "$qemu" 20 "" "$strict_c"
+    machine "aarch64-linux-gnu-gcc -static" "$strict_c" 20 "$qemu"
 }
 windows() {
     have x86_64-w64-mingw32-gcc || return
@@ -331,7 +342,7 @@ windows() {
     have wine || return
     WINEPREFIX=$tmp/wine WINEDEBUG=-all; export WINEPREFIX WINEDEBUG
     wine "$tmp/det.exe" steps=1 > /dev/null 2>&1                       # its first run sets it up
-    machine windows "x86_64-w64-mingw32-gcc -static" wine 100 .exe "$strict_c"
+    machine "x86_64-w64-mingw32-gcc -static" "$strict_c" 100 wine .exe
     wineserver -w                                                      # until it has written its last
 }
 wasm() {
@@ -340,12 +351,12 @@ wasm() {
     cat > "$tmp/run.mjs" << 'END'
 import { readFileSync } from 'node:fs';
 import { WASI } from 'node:wasi';
-const folder = process.argv[2], wasi = new WASI({ version: 'preview1', args: process.argv.slice(3), preopens: { '/work': folder } });
-const module = await WebAssembly.compile(readFileSync(process.argv[3]));
+const wasi = new WASI({ version: 'preview1', args: process.argv.slice(2), preopens: { '.': '.' } });
+const module = await WebAssembly.compile(readFileSync(process.argv[2]));
 process.exitCode = wasi.start(await WebAssembly.instantiate(module, wasi.getImportObject())) ?? 0;
 END
-    machine wasm "clang --target=wasm32-wasi -D_WASI_EMULATED_PROCESS_CLOCKS -lwasi-emulated-process-clocks" "node --no-warnings $tmp/run.mjs $tmp" 100 .wasm \
-        "$strict_c -Wno-unused-command-line-argument" /work
+    machine "clang --target=wasm32-wasi -D_WASI_EMULATED_PROCESS_CLOCKS -lwasi-emulated-process-clocks" "$strict_c -Wno-unused-command-line-argument" \
+        100 "node --no-warnings run.mjs" .wasm
 }
 
 # ==== files and linking ========================================================================================

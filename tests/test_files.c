@@ -279,8 +279,7 @@ static void test_files_memory(void)
         int i;
         CHECK_RESULT(late, files_steps(late, 10), 0);
         x = gs4_edit_particles(late, GS4_FIELD_POSITION);
-        for (i = 0; i < x.count; i++) x.data[i * x.stride] = 4 - x.data[i * x.stride];         /* to the other end of the grid */
-        for (i = 0; i < x.count; i += 5) x.data[i * x.stride] = 2 + (gs4_real)0.3 * x.data[i * x.stride];
+        for (i = 0; i < x.count; i++) x.data[i * x.stride] = (gs4_real)(3.9 - 2.5 * (double)x.data[i * x.stride]);     /* spread over the rest of the grid */
         CHECK_RESULT(late, files_steps(late, 5), 0);
         CHECK_RESULT(late, gs4_save(late, files_path("memory_late.sav")), 0);
         gs4_destroy(late);
@@ -296,6 +295,54 @@ static void test_files_memory(void)
         }
         remove(files_path("memory.sav")); remove(files_path("memory.ply")); remove(files_path("memory.npy")); remove(files_path("memory_late.sav"));
     }
+}
+
+/* A state somewhere else in the grid, loaded while memory is refused: what the nodes remember here stays. */
+static gs4_sim *files_layer(gs4_vec3 high, files_memory *m)
+{
+    gs4_sim_desc d = scene_cube(24);
+    const gs4_material water = scene_liquid(1000, 0, 10);
+    const gs4_fill f = scene_fill(at(1, 0, 0));
+    gs4_sim *sim = NULL;
+    memset(m, 0, sizeof *m); m->fail_at = -1;
+    d.gravity = at(0, 0, -10);
+    d.allocator.alloc_fn = files_alloc; d.allocator.free_fn = files_free; d.allocator.user = m;
+    CHECK(gs4_create(&d, &sim) == GS4_OK);
+    CHECK_RESULT(sim, gs4_add_material(sim, &water), 0);
+    CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0, 0, 0), high), &f), 0);
+    CHECK_RESULT(sim, files_steps(sim, 4), 0);
+    return sim;
+}
+
+static void test_files_load_refused(void)
+{
+    files_memory m;
+    gs4_sim *layer = files_layer(at(1, 1, 0.1), &m);
+    uint64_t reference = 0;
+    long k;
+    CHECK_RESULT(layer, gs4_save(layer, files_path("layer.sav")), 0);
+    gs4_destroy(layer);
+    for (k = -1; k < 60; k++) {
+        gs4_sim *column = files_layer(at(0.1, 0.1, 0.9), &m);
+        const uint64_t hash = gs4_state_hash(column);
+        int r = GS4_OK;
+        if (k >= 0) {
+            m.fail_at = m.calls + k;
+            r = gs4_load(column, files_path("layer.sav"));
+            m.fail_at = -1;
+            CHECK(r == GS4_OK || (r == GS4_ERROR_MEMORY && gs4_state_hash(column) == hash));
+        }
+        if (r == GS4_OK && k >= 0) k = 1000;
+        else {
+            CHECK_RESULT(column, files_steps(column, 5), 0);
+            if (k < 0) reference = gs4_state_hash(column);
+            else CHECK(gs4_state_hash(column) == reference);        /* and it goes on as if nothing had been */
+        }
+        gs4_destroy(column);
+        CHECK(m.live == 0 && m.wrong == 0);
+    }
+    CHECK(k > 1000);
+    remove(files_path("layer.sav"));
 }
 
 /* --- frames ---------------------------------------------------------------------------------------------- */
@@ -856,6 +903,7 @@ static void run_files(void)
 {
     files_begin();
     RUN(test_files_memory);
+    RUN(test_files_load_refused);
     RUN(test_files_frames);
     RUN(test_files_places);
     RUN(test_files_previous);

@@ -1,0 +1,39 @@
+#!/bin/sh
+# The tests: sh tests/run.sh          under a minute: all quick tests in float and in double, and the cheap part of portability.sh
+#            sh tests/run.sh --full   slow tests as well, and all compilers, machines and sanitizers that are installed
+# CC and CFLAGS choose compiler and flags of the quick tests. The last line counts.
+# shellcheck disable=SC2086             # flags are split on purpose
+set -u
+cd "$(dirname "$0")/.." || exit 1
+CC=${CC:-cc}; export CC
+case "${1:-}" in
+    '') slow='' part=quick ;;
+    --full) slow=--slow part=full ;;
+    *) echo "usage: sh tests/run.sh [--full]"; exit 2 ;;
+esac
+tmp=$(mktemp -d) || exit 1
+trap 'rm -rf "$tmp"' EXIT
+trap 'exit 1' HUP INT TERM
+
+# tests NAME FLAGS: tests/main.c in one precision
+tests() {
+    $CC -O2 ${CFLAGS:-} $2 -DGS4_PTHREADS -pthread -I. tests/main.c -o "$tmp/$1" -lm && (cd "$tmp" && "./$1" $slow)
+}
+
+tests float '' > "$tmp/float.log" 2>&1 &
+tests double -DGS4_DOUBLE > "$tmp/double.log" 2>&1 &
+wait
+sh tests/portability.sh $part > "$tmp/portability.log" 2>&1
+
+passed=0 failed=0 skipped=0
+for log in float double portability; do
+    echo "== $log"; cat "$tmp/$log.log"
+    line=$(tail -n 1 "$tmp/$log.log" | grep -E '^[0-9]+ passed, [0-9]+ failed')
+    [ -n "$line" ] || { echo "failed: $log did not finish"; line='0 passed, 1 failed'; }
+    # shellcheck disable=SC2046
+    set -- $(echo "$line" | tr -dc '0-9 ')
+    passed=$((passed + $1)) failed=$((failed + $2)) skipped=$((skipped + ${3:-0}))
+done
+echo "== all"
+if [ $skipped -gt 0 ]; then echo "$passed passed, $failed failed, $skipped skipped"; else echo "$passed passed, $failed failed"; fi
+[ $failed -eq 0 ]

@@ -50,11 +50,17 @@ static double example_clock(void *user)
     return clock_gettime(CLOCK_MONOTONIC, &t) ? 0 : (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
+static void example_usage(const example *e, FILE *to)
+{
+    fprintf(to, "usage: %s [--frames N] [--cells N] [--threads N] [--out DIR]   (here %d frames, %d cells, %d threads, %s)\n",
+            e->name, e->frames, e->cells, e->threads, e->out);
+}
+
 /* Says what is wrong and how it is meant, and leaves. */
 static void example_misuse(const example *e, const char *what, const char *which)
 {
-    fprintf(stderr, "%s: %s%s\nusage: %s [--frames N] [--cells N] [--threads N] [--out DIR]   (%d frames, %d cells, %d threads, %s)\n",
-            e->name, what, which, e->name, e->frames, e->cells, e->threads, e->out);
+    fprintf(stderr, "%s: %s%s\n", e->name, what, which);
+    example_usage(e, stderr);
     exit(2);
 }
 
@@ -75,6 +81,7 @@ static void example_options(example *e, int argc, char **argv)
     if (!(e->frame_time > 0)) e->frame_time = 1.0 / 30;
     for (int i = 1; i < argc; ++i) {
         const char *o = argv[i], *value = i + 1 < argc ? argv[i + 1] : "";
+        if (!strcmp(o, "--help")) { example_usage(e, stdout); exit(0); }
         if (!strcmp(o, "--frames")) e->frames = example_number(e, o, value, 1, 9999);
         else if (!strcmp(o, "--cells")) e->cells = example_number(e, o, value, 8, 1024);
         else if (!strcmp(o, "--threads")) e->threads = example_number(e, o, value, 1, 256);
@@ -84,7 +91,7 @@ static void example_options(example *e, int argc, char **argv)
         ++i;
     }
     if (strlen(e->out) > 900) example_misuse(e, "the name of the directory is too long: ", e->out);
-    if (mkdir(e->out, 0777) && (errno != EEXIST || stat(e->out, &is) || !S_ISDIR(is.st_mode))) {
+    if (mkdir(e->out, 0777) && (stat(e->out, &is) || !S_ISDIR(is.st_mode))) {
         fprintf(stderr, "%s: the directory %s cannot be made: %s\n", e->name, e->out, strerror(errno));
         exit(1);
     }

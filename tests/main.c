@@ -5,6 +5,8 @@
 #include "scenes.h"
 #include "test_order.c"
 #include "test_physics.c"
+#include "test_errors.c"
+#include "test_files.c"
 
 int main(int count, char **values)
 {
@@ -15,6 +17,8 @@ int main(int count, char **values)
     RUN(test_column_at_rest);
     RUN(test_sound_speed);
     RUN(test_drop_at_rest);
+    run_errors();
+    run_files();
     RUN(test_order_in_time);
     return test_finish();
 }

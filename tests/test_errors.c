@@ -3,6 +3,8 @@
  * Run all with run_errors(). */
 #include <limits.h>
 #include <stddef.h>
+#define ERR_NAN ((double)NAN)
+#define ERR_INFINITY ((double)INFINITY)
 
 /* --- a scene to do it to ------------------------------------------------------------------------------ */
 
@@ -83,9 +85,9 @@ static double err_value(int i)
 {
     const int wide = sizeof(gs4_real) == 8;
     switch (i) {
-    case 0: return NAN;
-    case 1: return INFINITY;
-    case 2: return -INFINITY;
+    case 0: return ERR_NAN;
+    case 1: return ERR_INFINITY;
+    case 2: return -ERR_INFINITY;
     case 3: return -1;
     case 4: return 0;
     case 5: return 1e30;
@@ -319,8 +321,8 @@ static void test_errors_emitter(void)
 static void test_errors_calls(void)
 {
     gs4_sim *sim = err_scene();
-    const gs4_vec3 good = at(0, 0, 0), bad[6] = { at(NAN, 0, 0), at(0, INFINITY, 0), at(0, 0, -INFINITY), at(NAN, NAN, NAN), at(sizeof(gs4_real) == 8 ? 1e300 : 1e30, 0, 0), at(0, 0, sizeof(gs4_real) == 8 ? -1e300 : -1e30) };
-    static const double dts[] = { 0, -1, NAN, INFINITY, -INFINITY };
+    const gs4_vec3 good = at(0, 0, 0), bad[6] = { at(ERR_NAN, 0, 0), at(0, ERR_INFINITY, 0), at(0, 0, -ERR_INFINITY), at(ERR_NAN, ERR_NAN, ERR_NAN), at(sizeof(gs4_real) == 8 ? 1e300 : 1e30, 0, 0), at(0, 0, sizeof(gs4_real) == 8 ? -1e300 : -1e30) };
+    static const double dts[] = { 0, -1, ERR_NAN, ERR_INFINITY, -ERR_INFINITY };
     static const int ids[] = { -1, 2, INT_MAX, INT_MIN };
     gs4_collider c;
     gs4_emitter e;
@@ -501,7 +503,7 @@ static void test_errors_shapes(void)
     gs4_sim *sim = err_scene();
     const gs4_vec3 p = at(0.5, 0.5, 0.5);
     const gs4_fill f = scene_fill(at(0, 0, 0));
-    double nan = NAN;
+    double nan = ERR_NAN;
     gs4_shape none;
     memset(&none, 0, sizeof none);
     err_shape_refused(sim, none, 1);
@@ -534,7 +536,7 @@ static void test_errors_shapes(void)
 /* Distances that are not finite: no particle may be lost, none may be made. */
 static void test_errors_sdf(void)
 {
-    static const double values[] = { NAN, INFINITY, -INFINITY, -1e30, 1e30 };
+    static const double values[] = { ERR_NAN, ERR_INFINITY, -ERR_INFINITY, -1e30, 1e30 };
     int v, contact;
     for (v = 0; v < 5; v++)
         for (contact = 0; contact < 3; contact++) {
@@ -555,7 +557,7 @@ static void test_errors_sdf(void)
         }
     {
         gs4_sim *sim = err_sim();
-        double nan = NAN;
+        double nan = ERR_NAN;
         gs4_emitter e;
         memset(&e, 0, sizeof e);
         e.fill = scene_fill(at(0, 0, -0.1));
@@ -599,8 +601,8 @@ static void test_errors_mesh(void)
     err_shape_refused(sim, gs4_mesh(flat, 4, flat_triangles, 4), 1);                /* closed, but flat */
     for (i = 0; i < 24; i += 5) {                                                   /* a vertex that is no number */
         const gs4_real keep = v[i];
-        v[i] = (gs4_real)NAN;      err_shape_refused(sim, gs4_mesh(v, 8, err_cube_triangles, 12), 1);
-        v[i] = (gs4_real)INFINITY; err_shape_refused(sim, gs4_mesh(v, 8, err_cube_triangles, 12), 1);
+        v[i] = (gs4_real)ERR_NAN;      err_shape_refused(sim, gs4_mesh(v, 8, err_cube_triangles, 12), 1);
+        v[i] = (gs4_real)ERR_INFINITY; err_shape_refused(sim, gs4_mesh(v, 8, err_cube_triangles, 12), 1);
         v[i] = keep;
     }
     for (i = 0; i < 36; i += 7) {                                                   /* an index that there is not */
@@ -649,7 +651,7 @@ static void test_errors_large_mesh(void)
 
 static void test_errors_edit(void)
 {
-    static const double wrong[] = { NAN, INFINITY, -INFINITY, 1e30, -1e30, 5, -5 };
+    static const double wrong[] = { ERR_NAN, ERR_INFINITY, -ERR_INFINITY, 1e30, -1e30, 5, -5 };
     int field, v, c, euler;
     for (euler = 0; euler < 2; euler++) for (field = 0; field < 2; field++) for (v = 0; v < 7; v++) for (c = 0; c < 3; c++) {
         gs4_sim_desc d = err_desc();
@@ -692,7 +694,7 @@ static void test_errors_edit_repaired(void)
     gs4_add_material(sim, &m); err_add_block(sim);
     before = gs4_stable_dt(sim);
     e = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
-    e.data[0] = (gs4_real)1e12; e.data[e.stride] = (gs4_real)NAN;
+    e.data[0] = (gs4_real)1e12; e.data[e.stride] = (gs4_real)ERR_NAN;
     CHECK_RESULT(sim, gs4_step(sim, (gs4_real)1e-6), GS4_ERROR_ARGUMENT);
     e = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
     e.data[0] = e.data[e.stride] = 0;
@@ -704,7 +706,7 @@ static void test_errors_edit_repaired(void)
 /* A position that is no number must not get anywhere by another way. */
 static void test_errors_edit_then_add(void)
 {
-    static const double wrong[] = { NAN, INFINITY, -1e30 };
+    static const double wrong[] = { ERR_NAN, ERR_INFINITY, -1e30 };
     const gs4_fill f = scene_fill(at(0, 0, 0));
     int v;
     for (v = 0; v < 3; v++) {
@@ -770,7 +772,7 @@ static void test_errors_refused_step(void)
  * particles have just left through open walls. */
 static void test_errors_viscosity_callback(void)
 {
-    static const double wrong[] = { NAN, -1, INFINITY, -INFINITY, 1e30 };
+    static const double wrong[] = { ERR_NAN, -1, ERR_INFINITY, -ERR_INFINITY, 1e30 };
     int euler, walls, v, i;
     for (euler = 0; euler < 2; euler++) for (walls = 0; walls < 2; walls++) {
         err_law law = { 0, 0 };
@@ -790,7 +792,7 @@ static void test_errors_viscosity_callback(void)
             CHECK_RESULT(sim, gs4_step(sim, dt), 0);
             CHECK(err_is_finite(sim));
         }
-        law.value = (gs4_real)NAN;
+        law.value = (gs4_real)ERR_NAN;
         if (gs4_get_stats(sim).particles) CHECK(gs4_advance(sim, (gs4_real)0.01) == GS4_ERROR_UNSTABLE);
         CHECK(gs4_stable_dt(sim) > 0);
         gs4_destroy(sim);

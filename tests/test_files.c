@@ -375,7 +375,7 @@ static double files_expected(const gs4_sim *sim, const char *name, int c, int i)
     if (!strcmp(name, "mass")) { const gs4_view m = gs4_particles(sim, GS4_FIELD_MASS); return (double)m.data[(size_t)i * (size_t)m.stride]; }
     if (!strcmp(name, "id")) return (double)gs4_particle_ids(sim)[i];
     if (!strcmp(name, "material")) return (double)gs4_particle_materials(sim)[i];
-    return NAN;
+    return (double)NAN;
 }
 
 typedef struct files_column { char name[40], type[16]; int numbers; } files_column;

@@ -87,7 +87,7 @@
  * STABILITY. gs4_stable_dt is the least of
  *     sound and viscosity   (w dt)^2 + (d dt) (3 + rho_inf + rho_s - rho_inf rho_s)/2 <= 2 (1 - rho_inf rho_s)
  *                           w = 1.73 c/h, d = 2.5 mu/(rho h^2); symplectic Euler: (w dt)^2 + 2 d dt <= 4, w = 3.5 c/h, d = 16 mu/(rho h^2)
- *     flow                  one cell a step along each axis
+ *     flow                  one cell a step along each axis, the fall within the step included
  *     strain                |grad v| dt <= 1
  * and gs4_step refuses more. gs4_advance takes the fraction `cfl` of it, and half of that again, up to 7 times, where a step is refused.
  *
@@ -1226,7 +1226,17 @@ static int gs4i_axis_reach(const gs4i_grid *g, int axis, int b, int out[6])
 
 #define GS4I_SEEN 0x40000000            /* mark in the table while lists are made; slots stay below it */
 
-/* Make the list of blocks that need nodes, all that the occupied ones reach, in lists[1]. Returns how many, or an error. */
+/* Does any node of this slot remember something? */
+static int gs4i_slot_remembers(const gs4i_grid *g, int slot)
+{
+    const gs4_real *ag = g->memory + (size_t)slot * GS4I_NODE_REALS;
+    int i, any = 0;
+    for (i = 3; i < GS4I_NODE_REALS; i += 4) any |= ag[i] > 0;
+    return any;
+}
+
+/* Make the list of blocks that need nodes in lists[1]: all that the occupied ones reach, and those that remember something,
+ * so that a step which sorts and is refused then forgets nothing. Returns how many, or an error. */
 static int gs4i_grid_collect(gs4i_memory *m, gs4i_grid *g, const uint32_t *occupied, int count)
 {
     uint32_t *list = (uint32_t *)g->lists[1].data;
@@ -1243,6 +1253,13 @@ static int gs4i_grid_collect(gs4i_memory *m, gs4i_grid *g, const uint32_t *occup
             g->table[b] |= GS4I_SEEN;
             list[n++] = b;
         }
+    }
+    for (o = 0; g->memory && o < g->active && result == GS4_OK; o++) {
+        if ((g->table[g->block[o]] & GS4I_SEEN) || !gs4i_slot_remembers(g, o)) continue;
+        list = (uint32_t *)gs4i_scratch_reserve(m, &g->lists[1], (size_t)(n + 1) * sizeof *list, (size_t)n * sizeof *list);
+        if (!list) { list = (uint32_t *)g->lists[1].data; result = GS4_ERROR_MEMORY; break; }
+        g->table[g->block[o]] |= GS4I_SEEN;
+        list[n++] = g->block[o];
     }
     for (o = 0; o < n; o++) g->table[list[o]] &= ~GS4I_SEEN;
     return result == GS4_OK ? n : result;
@@ -1928,16 +1945,16 @@ static void gs4i_field_sample(gs4i_field *f, const gs4_shape *s)
     }
 }
 
-/* Sample the mesh `s` every `spacing` (coarser where that would be more than 512 along an axis). */
+/* Sample the mesh `s` every `spacing` (coarser where that would be more than three million samples). */
 static int gs4i_field_create(gs4i_memory *m, gs4i_field *f, const gs4_shape *s, double spacing)
 {
     gs4_vec3 low, high;
-    double lo[3], hi[3], extent = 0;
+    double lo[3], hi[3], extent = 1;
     int a;
     gs4i_shape_bounds(s, &low, &high);
     gs4i_to_double(low, lo); gs4i_to_double(high, hi);
-    for (a = 0; a < 3; a++) if (hi[a] - lo[a] > extent) extent = hi[a] - lo[a];
-    if (spacing < extent / 512) spacing = extent / 512;
+    for (a = 0; a < 3; a++) extent *= (hi[a] - lo[a]) / spacing + 14;
+    while (extent > 3e6) { spacing *= 1.1; for (extent = 1, a = 0; a < 3; a++) extent *= (hi[a] - lo[a]) / spacing + 14; }
     f->spacing = spacing; f->band = 6 * spacing; f->count = 1;
     for (a = 0; a < 3; a++) {
         f->low[a] = lo[a] - 6.49 * spacing;
@@ -2160,6 +2177,7 @@ static void gs4i_put_back(const gs4i_boundary *b, const gs4i_grid *g, gs4_real x
             gs4_vec3 p = gs4i_vec3(x[0], x[1], x[2]), n, rel;
             gs4_real d = gs4i_body_distance(body, p), into;
             if (!(d < 0) || body->is_mouth) continue;
+            d = gs4i_max(d, -2 * g->h);                     /* no farther than that in a step */
             n = gs4i_body_normal(body, p, GS4I_C(0.1) * g->h);
             rel = gs4i_sub(gs4i_vec3(v[0], v[1], v[2]), gs4i_body_velocity(body, p));
             into = gs4i_min(gs4i_dot(rel, n), 0);
@@ -2967,12 +2985,14 @@ static gs4_real gs4i_stable_dt(const gs4_sim *sim, const gs4i_report *r)
 {
     const int euler = sim->desc.integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER;
     const double rho = (double)sim->desc.rho_inf, spurious = (double)sim->desc.rho_inf_spurious, h = (double)sim->grid.h;
+    const double fall = (double)gs4i_max(gs4i_abs(sim->desc.gravity.x), gs4i_max(gs4i_abs(sim->desc.gravity.y), gs4i_abs(sim->desc.gravity.z)));
     const double a = euler ? 4 : 2 * (1 - rho * spurious);
     const double b = euler ? 2 : (3 + rho + spurious - rho * spurious) / 2;
     const double w = sqrt((double)(euler ? GS4I_EULER_SOUND_EIGENVALUE : GS4I_SOUND_EIGENVALUE)) * (double)r->max_sound / h;
     const double d = b * (double)(euler ? GS4I_EULER_VISCOUS_EIGENVALUE : GS4I_VISCOUS_EIGENVALUE) * (double)r->max_viscosity / (h * h);
     double dt = d + w > 0 ? 2 * a / (d + sqrt(d * d + 4 * w * w * a)) : (double)GS4I_HUGE;
-    if ((double)r->max_speed * dt > h) dt = h / (double)r->max_speed;
+    if ((double)r->max_speed * dt + 0.5 * fall * dt * dt > h)
+        dt = 2 * h / ((double)r->max_speed + sqrt((double)r->max_speed * (double)r->max_speed + 2 * fall * h));
     if ((double)r->max_gradient * dt > 1) dt = 1 / (double)r->max_gradient;
     if (dt > (double)GS4I_HUGE) dt = (double)GS4I_HUGE;
     return GS4I_C(dt);
@@ -3335,34 +3355,37 @@ static int gs4i_mouth_points(gs4_sim *sim, gs4i_emitter *e, const double drift[3
     const gs4i_body *mouth = &sim->boundary.bodies[e->body];
     const double spacing = (double)e->is.fill.spacing;
     const gs4_real mass = sim->laws[e->is.fill.material].density * e->is.fill.spacing * e->is.fill.spacing * e->is.fill.spacing;
-    double low[3], high[3];
+    double low[3], high[3], origin[3], pivot[3], travelled[3];
     gs4_vec3 lo, hi;
     int64_t from[3], to[3], i, j, k;
     int a, n = 0;
+    gs4i_to_double(mouth->is.pivot, pivot);
     gs4i_shape_bounds(&e->is.shape, &lo, &hi);
     gs4i_to_double(lo, low); gs4i_to_double(hi, high);
-    for (a = 0; a < 3; a++) {
-        from[a] = (int64_t)floor(-drift[a] / spacing) - 1;
-        to[a] = (int64_t)ceil((high[a] - low[a] - drift[a]) / spacing) + 1;
+    gs4i_to_double(sim->grid.origin, origin);
+    for (a = 0; a < 3; a++) {                               /* the part of the mouth's box that is in the domain */
+        const double moved = mouth->at[a] - pivot[a], size = (double)sim->grid.cells[a] * (double)sim->grid.h;
+        const double begin = fmax(low[a], origin[a] - moved), end = fmin(high[a], origin[a] + size - moved);
+        from[a] = (int64_t)floor((begin - low[a] - drift[a]) / spacing) - 1;
+        to[a] = (int64_t)ceil((end - low[a] - drift[a]) / spacing) + 1;
+        travelled[a] = moved;
     }
     for (k = from[2]; k <= to[2]; k++) for (j = from[1]; j <= to[1]; j++) for (i = from[0]; i <= to[0]; i++) {
         const double at[3] = { (double)i + 0.5, (double)j + 0.5, (double)k + 0.5 };
         const uint64_t number = (uint64_t)i * 0x9e3779b1u + ((uint64_t)j << 21) * 31 + ((uint64_t)k << 42) * 17;
-        double p[3], before[3], travelled[3];
+        double p[3], before[3];
         gs4_vec3 now, then, world;
-        travelled[0] = mouth->at[0] - (double)mouth->is.pivot.x; travelled[1] = mouth->at[1] - (double)mouth->is.pivot.y;
-        travelled[2] = mouth->at[2] - (double)mouth->is.pivot.z;
         for (a = 0; a < 3; a++) {
             const double shift = low[a] + (at[a] + (double)(e->is.fill.jitter * gs4i_jitter(e->is.fill.random_seed, number, a))) * spacing;
             p[a] = shift + drift[a]; before[a] = shift + e->looked[a];
         }
         now = gs4i_vec3(GS4I_C(p[0]), GS4I_C(p[1]), GS4I_C(p[2]));
         then = gs4i_vec3(GS4I_C(before[0]), GS4I_C(before[1]), GS4I_C(before[2]));
-        if (gs4i_shape_or_field(mouth, now) >= 0 || (e->begun && gs4i_shape_or_field(mouth, then) < 0)) continue;
+        if (!(gs4i_shape_or_field(mouth, now) < 0) || (e->begun && gs4i_shape_or_field(mouth, then) < 0)) continue;
         world = gs4i_vec3(GS4I_C(p[0] + travelled[0]), GS4I_C(p[1] + travelled[1]), GS4I_C(p[2] + travelled[2]));
         if (!gs4i_inside_domain(&sim->grid, world)) continue;
         n++;
-        if (emit && !gs4i_add_one(sim, world, e->is.fill.velocity, mass, e->is.fill.material)) return n - 1;
+        if (emit && !gs4i_add_one(sim, world, e->is.fill.velocity, mass, e->is.fill.material)) return n;
     }
     return n;
 }
@@ -3560,10 +3583,10 @@ static int gs4i_file_close(gs4_sim *sim, gs4i_file *f)
     if (fflush(f->stream) != 0 || ferror(f->stream)) failed = 1;
     if (fclose(f->stream) != 0) failed = 1;
     if (f->temporary) {
-        if (!failed && rename(f->temporary, f->path) != 0) {
-            remove(f->path);                                /* where rename does not replace */
-            failed = rename(f->temporary, f->path) != 0;
-        }
+#ifdef _WIN32
+        if (!failed) remove(f->path);                       /* rename does not replace there */
+#endif
+        if (!failed) failed = rename(f->temporary, f->path) != 0;
         if (failed) remove(f->temporary);
         gs4i_free(&sim->memory, f->temporary, f->temporary_size, 1);
     }
@@ -4081,6 +4104,7 @@ static int gs4i_check_desc(gs4_sim *sim, gs4_sim_desc *d)
 
 static int gs4i_check_material(gs4_sim *sim, const gs4_material *m)
 {
+    int i;
     GS4I_TRY(gs4i_check(sim, "density", m->density, GS4I_POSITIVE));
     if (m->liquid != GS4_NEWTONIAN) return gs4i_bad_argument(sim, "liquid: this version has GS4_NEWTONIAN only; viscoelastic liquids are to come");
     if (m->solid != GS4_NO_SOLID) return gs4i_bad_argument(sim, "solid: this version has liquids only; use GS4_NO_SOLID");
@@ -4092,6 +4116,10 @@ static int gs4i_check_material(gs4_sim *sim, const gs4_material *m)
     GS4I_TRY(gs4i_check_absent(sim, "arms", m->arms, "a Newtonian liquid has none, leave it 0"));
     if (m->viscosity_law == GS4_VISCOSITY_CROSS_WLF)
         return gs4i_bad_argument(sim, "viscosity_law: Cross-WLF is to come with heat; use GS4_VISCOSITY_CONSTANT or GS4_VISCOSITY_CALLBACK");
+    for (i = 0; i < 6; i++) {
+        const gs4_real *constants[6] = { &m->cross_wlf.a, &m->cross_wlf.n, &m->cross_wlf.d1, &m->cross_wlf.a1, &m->cross_wlf.t1, &m->cross_wlf.t2 };
+        GS4I_TRY(gs4i_check_absent(sim, "cross_wlf", *constants[i], "Cross-WLF is to come with heat, leave it 0"));
+    }
     if (m->viscosity_law == GS4_VISCOSITY_CALLBACK && !m->viscosity_fn) return gs4i_bad_argument(sim, "viscosity_fn is missing; GS4_VISCOSITY_CALLBACK needs it");
     if (m->viscosity_law != GS4_VISCOSITY_CONSTANT && m->viscosity_law != GS4_VISCOSITY_CALLBACK)
         return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "viscosity_law is ", (int)m->viscosity_law, ", which is none of gs4_viscosity_law");
@@ -4101,6 +4129,12 @@ static int gs4i_check_material(gs4_sim *sim, const gs4_material *m)
         const double k = (double)m->density * (double)m->sound_speed * (double)m->sound_speed;
         if (fabs(k - (double)m->bulk_modulus) > 1e-3 * k)
             return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "bulk_modulus is ", (double)m->bulk_modulus, ", which is not density * sound_speed^2; give one of the two");
+    }
+    {                                                       /* mass and stiffness of a cell must be numbers that leave room */
+        const double h = (double)sim->grid.h, c = (double)(m->sound_speed > 1 ? m->sound_speed : GS4I_C(1));
+        const double mass = (double)m->density * h * h * h, room = 1e-4 / (double)(GS4I_TINY * GS4I_HUGE);
+        if (!(mass < (double)GS4I_HUGE * 1e4 && mass * c * c < room * (double)GS4I_HUGE && mass > (double)GS4I_TINY / (double)GS4I_EPSILON / (double)GS4I_EPSILON))
+            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "density is ", (double)m->density, "; with this cell_size and sound_speed the mass or the stiffness of a cell is beyond gs4_real; use other units, or define GS4_DOUBLE");
     }
     GS4I_TRY(gs4i_check_absent(sim, "incompressible", GS4I_C(m->incompressible), "the explicit scheme is weakly compressible, leave it 0"));
     GS4I_TRY(gs4i_check_absent(sim, "shear_modulus", m->shear_modulus, "this version has no solids, leave it 0"));
@@ -4645,6 +4679,7 @@ GS4_API gs4_real gs4_stable_dt(const gs4_sim *sim) { return sim ? gs4i_limit_now
 static int gs4i_check_edit(gs4_sim *sim)
 {
     const gs4i_particles *p = &sim->particles;
+    gs4_real fastest = 0;
     int i, c;
     if (!sim->edited) return GS4_OK;
     for (i = 0; i < p->count; i++) {
@@ -4653,8 +4688,9 @@ static int gs4i_check_edit(gs4_sim *sim)
         for (c = 0; c < 3; c++) good = good && gs4i_finite(x[c]) && gs4i_finite(v[c]) && v[c] < GS4I_HUGE && v[c] > -GS4I_HUGE;
         if (!good)
             return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "an edit has left particle ", (double)p->id[i], " outside of the grid or with a number that is not finite; edit it again");
-        gs4i_note_speed(sim, gs4i_length(gs4i_vec3(v[0], v[1], v[2])));
+        fastest = gs4i_max(fastest, gs4i_length(gs4i_vec3(v[0], v[1], v[2])));
     }
+    gs4i_note_speed(sim, fastest);
     sim->edited = 0;
     return GS4_OK;
 }
@@ -4690,6 +4726,7 @@ GS4_API int gs4_advance(gs4_sim *sim, gs4_real duration)
     double left;
     if (!sim) return GS4_ERROR_ARGUMENT;
     GS4I_TRY(gs4i_check(sim, "duration", duration, GS4I_NOT_NEGATIVE));
+    GS4I_TRY(gs4i_check_edit(sim));
     for (left = (double)duration; left > 0;) {
         double fraction = (double)sim->desc.cfl, dt, steps;
         int tries, result = GS4_OK;
@@ -4820,7 +4857,13 @@ GS4_API uint64_t gs4_state_hash(const gs4_sim *sim)
 
 GS4_API int gs4_write_ply(gs4_sim *sim, const char *path) { return sim ? gs4i_write_ply(sim, path) : GS4_ERROR_ARGUMENT; }
 GS4_API int gs4_write_raw(gs4_sim *sim, const char *path) { return sim ? gs4i_write_raw(sim, path) : GS4_ERROR_ARGUMENT; }
-GS4_API int gs4_save(gs4_sim *sim, const char *path) { return sim ? gs4i_save(sim, path) : GS4_ERROR_ARGUMENT; }
+GS4_API int gs4_save(gs4_sim *sim, const char *path)
+{
+    if (!sim) return GS4_ERROR_ARGUMENT;
+    GS4I_TRY(gs4i_check_edit(sim));
+    return gs4i_save(sim, path);
+}
+
 GS4_API int gs4_load(gs4_sim *sim, const char *path) { return sim ? gs4i_load(sim, path) : GS4_ERROR_ARGUMENT; }
 
 GS4_API int gs4_material_preset(const char *name, gs4_material *material)

@@ -316,7 +316,7 @@ few_of_main() {
 
 # machine BUILD WARNINGS STEPS [RUNNER SUFFIX]: strict, the hashes of this machine, some tests, in both precisions
 machine() {
-    for precision in '' -DGS4_DOUBLE; do
+    for precision in ${precisions:-'' -DGS4_DOUBLE}; do
         reference "$precision" "$3"; suffix=${5:-}
         check "strict $precision" $1 -std=c99 $2 $precision -I. -c "$tmp/implementation.c" -o "$tmp/strict.o"
         same "hashes" "$1 -O2" checkpoint=checkpoint "${4:-}"
@@ -324,7 +324,12 @@ machine() {
     done
 }
 
-tiny() { have tcc && machine tcc "-Wall -Werror" 100; }
+# In double only: tcc 0.9.27 stores a returned struct of three floats as four, over whatever lies behind it
+tiny() {
+    have tcc || return
+    check "compiles in float" tcc -Wall -Werror -I. -c "$tmp/implementation.c" -o "$tmp/strict.o"
+    precisions=-DGS4_DOUBLE; machine tcc "-Wall -Werror" 100
+}
 musl() { have musl-gcc && machine "musl-gcc -static" "$strict_c" 100; }
 i386() {
     echo 'int main(void) { return 0; }' | gcc -m32 -x c - -o "$tmp/m32" -lm 2> /dev/null || { skip "needs gcc-multilib"; return; }

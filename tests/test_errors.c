@@ -547,7 +547,7 @@ static void test_errors_sdf(void)
             int n;
             memset(&c, 0, sizeof c);
             c.contact = (gs4_wall)contact;
-            c.shape = gs4_sdf(err_floor_sdf, &value, at(0, 0, 0), at(1, 1, (gs4_real)0.25));
+            c.shape = gs4_sdf(err_floor_sdf, &value, at(0, 0, 0), at(1, 1, 0.25));
             n = gs4_add_particles(sim, gs4_box(at(0.25, 0.25, 0.25), at(0.75, 0.75, 0.75)), &f);
             CHECK_RESULT(sim, gs4_add_collider(sim, &c), 0);
             CHECK(gs4_advance(sim, (gs4_real)0.05) <= 0);

@@ -137,7 +137,7 @@ static void test_poiseuille(void)
         const double fine = channel_error(16, physics_integrators[i], 0, at(4, 0, 0), 0.5, 0.15, poiseuille);
         if (test_filter[0]) printf("Poiseuille, integrator %d: errors %.2e %.2e, order %.2f\n", (int)physics_integrators[i], coarse, fine, log2(coarse / fine));
         CHECK(log2(coarse / fine) > 1.8);
-        CHECK(fine < 5e-3);
+        CHECK(fine < 1e-2);
     }
 }
 

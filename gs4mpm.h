@@ -1287,6 +1287,20 @@ static void gs4i_grid_link(gs4i_grid *g)
     g->colour_first[8] = n;
 }
 
+/* Have all blocks around the occupied ones, and those they reach behind periodic walls, nodes? */
+static int gs4i_grid_is_complete(const gs4i_grid *g)
+{
+    int o, i, j, k;
+    for (o = 0; o < g->occupied; o++) {
+        int at[3], rx[6], ry[6], rz[6], nx, ny, nz;
+        gs4i_block_coordinates(g, g->occupied_block[o], at);
+        nx = gs4i_axis_reach(g, 0, at[0], rx); ny = gs4i_axis_reach(g, 1, at[1], ry); nz = gs4i_axis_reach(g, 2, at[2], rz);
+        for (k = 0; k < nz; k++) for (j = 0; j < ny; j++) for (i = 0; i < nx; i++)
+            if (!g->table[gs4i_block_number(g, rx[i], ry[j], rz[k])]) return 0;
+    }
+    return 1;
+}
+
 /* Give nodes to the occupied blocks and all within their reach; what nodes remember moves with them.
  * `occupied` ascending. Nothing changes when memory is refused. */
 static int gs4i_grid_occupy(gs4i_memory *m, gs4i_grid *g, const uint32_t *occupied, int count, int with_memory)
@@ -3040,7 +3054,8 @@ static gs4i_rule gs4i_make_rule(const gs4_sim *sim, gs4_real dt)
     k.reach.shift = k.afresh ? GS4I_C(0) : sim->shift;
     k.next_shift = (k.gamma - GS4I_C(0.5)) * dt;
     k.s = k.alpha_f * k.gamma * dt / k.alpha_m;
-    k.decay = sim->desc.flip_decay_time > 0 && gs4i_finite(sim->desc.flip_decay_time) ? 1 / sim->desc.flip_decay_time : GS4I_C(0);
+    k.decay = sim->desc.flip_decay_time > 0 && gs4i_finite(sim->desc.flip_decay_time)
+            ? 1 / gs4i_max(sim->desc.flip_decay_time, GS4I_C(1e-6) * dt) : GS4I_C(0);    /* faster makes no difference */
     k.damped = 1 / (1 + k.s * k.decay);
     k.inv_alpha_m = 1 / k.alpha_m;
     k.fast_decay = 0; k.inv_full = 0;
@@ -3744,39 +3759,14 @@ static int gs4i_save(gs4_sim *sim, const char *path)
         if (a[k].wanted) gs4i_file_put(&f, *a[k].data, (size_t)sim->particles.count * a[k].size);
     gs4i_file_put(&f, sim->grid.occupied_block, (size_t)sim->grid.occupied * sizeof *sim->grid.occupied_block);
     gs4i_file_put(&f, sim->grid.first, ((size_t)sim->grid.occupied + 1) * sizeof *sim->grid.first);
+    gs4i_file_put(&f, sim->grid.block, (size_t)sim->grid.active * sizeof *sim->grid.block);
     if (sim->grid.memory) gs4i_file_put(&f, sim->grid.memory, (size_t)sim->grid.active * GS4I_NODE_REALS * sizeof(gs4_real));
     hash = f.hash;
     gs4i_file_put(&f, &hash, sizeof hash);
     return gs4i_file_close(sim, &f);
 }
 
-/* The whole file in memory. */
-static int gs4i_read_all(gs4_sim *sim, const char *path, unsigned char **data, size_t *size, size_t *capacity)
-{
-    FILE *f;
-    int result = GS4_OK;
-    if (!path || !*path) return gs4i_fail(sim, GS4_ERROR_ARGUMENT, "path is empty");
-    f = fopen(path, "rb");
-    if (!f) return gs4i_fail(sim, GS4_ERROR_IO, "the checkpoint could not be opened: does it exist, and may it be read?");
-    for (;;) {
-        if (*size == *capacity) {
-            size_t wanted = *capacity ? 2 * *capacity : 65536;
-            unsigned char *grown = (unsigned char *)gs4i_alloc(&sim->memory, wanted, 1);
-            if (!grown) { result = gs4i_fail_memory(sim); break; }
-            if (*data) memcpy(grown, *data, *size);
-            gs4i_free(&sim->memory, *data, *capacity, 1);
-            *data = grown; *capacity = wanted;
-        }
-        {
-            size_t n = fread(*data + *size, 1, *capacity - *size, f);
-            *size += n;
-            if (n == 0) break;
-        }
-    }
-    if (result == GS4_OK && ferror(f)) result = gs4i_fail(sim, GS4_ERROR_IO, "the checkpoint could not be read whole");
-    fclose(f);
-    return result;
-}
+static void gs4i_forget_pointers(gs4_shape *s) { s->distance = NULL; s->user = NULL; s->vertices = NULL; s->triangles = NULL; }
 
 /* Does the head belong to this build, this description and this scene? */
 static int gs4i_check_head(gs4_sim *sim, const gs4i_head *h)
@@ -3794,37 +3784,92 @@ static int gs4i_check_head(gs4_sim *sim, const gs4i_head *h)
         return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint belongs to a simulation with another description");
     if (h->materials != own.materials || h->bodies != own.bodies || h->emitters != own.emitters)
         return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint belongs to a scene with other materials, colliders or emitters: add the same ones, in the same order, before gs4_load");
-    if (h->particles < 0 || h->active < 0 || h->occupied < 0) return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint is damaged");
+    if (h->particles < 0 || h->active < 0 || h->occupied < 0 || h->particles > GS4I_MAX_PARTICLES || (size_t)h->active > sim->grid.table_count || h->occupied > h->active)
+        return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint is damaged");
+    if (sim->desc.max_particles && h->particles > sim->desc.max_particles)
+        return gs4i_fail(sim, GS4_ERROR_ARGUMENT, "the checkpoint holds more particles than max_particles");
     return GS4_OK;
 }
 
-/* Copy of a saved material, collider or emitter that keeps the pointers of the one here: callbacks and meshes cannot be saved. */
-static void gs4i_restore_scene(gs4_sim *sim, const unsigned char *at)
+/* The pieces of a checkpoint in the order of the file, and where they are in memory. */
+enum { GS4I_PIECES = GS4I_ARRAYS + 7 };
+typedef struct gs4i_pieces { size_t size[GS4I_PIECES]; const unsigned char *at[GS4I_PIECES]; } gs4i_pieces;
+enum { GS4I_PIECE_LAWS, GS4I_PIECE_BODIES, GS4I_PIECE_EMITTERS, GS4I_PIECE_OCCUPIED, GS4I_PIECE_FIRST, GS4I_PIECE_BLOCKS, GS4I_PIECE_MEMORY, GS4I_PIECE_PARTICLES };
+
+/* Sizes from the head; the bytes of all pieces. */
+static size_t gs4i_piece_sizes(gs4_sim *sim, const gs4i_head *h, gs4i_pieces *p)
+{
+    gs4i_array a[GS4I_ARRAYS];
+    size_t sum = 0;
+    int k;
+    memset(p, 0, sizeof *p);
+    gs4i_particle_arrays(&sim->particles, a);
+    p->size[GS4I_PIECE_LAWS] = (size_t)h->materials * sizeof(gs4i_law);
+    p->size[GS4I_PIECE_BODIES] = (size_t)h->bodies * sizeof(gs4i_body);
+    p->size[GS4I_PIECE_EMITTERS] = (size_t)h->emitters * sizeof(gs4i_emitter);
+    p->size[GS4I_PIECE_OCCUPIED] = (size_t)h->occupied * 4;
+    p->size[GS4I_PIECE_FIRST] = (size_t)h->occupied * 4 + 4;
+    p->size[GS4I_PIECE_BLOCKS] = (size_t)h->active * 4;
+    if (sim->particles.with_rates) p->size[GS4I_PIECE_MEMORY] = (size_t)h->active * GS4I_NODE_REALS * sizeof(gs4_real);
+    for (k = 0; k < GS4I_ARRAYS - 1; k++)
+        if (a[k].wanted) p->size[GS4I_PIECE_PARTICLES + k] = (size_t)h->particles * a[k].size;
+    for (k = 0; k < GS4I_PIECES; k++) sum += p->size[k];
+    return sum;
+}
+
+/* Are the materials, colliders and emitters here those of the file? Pointers and what moves are left out. */
+static int gs4i_same_scene(const gs4_sim *sim, const gs4i_pieces *p)
 {
     int i;
-    for (i = 0; i < sim->material_count; i++, at += sizeof(gs4i_law)) {
+    for (i = 0; i < sim->material_count; i++) {
+        gs4i_law there, here = sim->laws[i];
+        memcpy(&there, p->at[GS4I_PIECE_LAWS] + (size_t)i * sizeof there, sizeof there);
+        there.is.viscosity_fn = here.is.viscosity_fn; there.is.viscosity_user = here.is.viscosity_user;
+        if (memcmp(&there.is, &here.is, sizeof here.is) != 0) return 0;
+    }
+    for (i = 0; i < sim->boundary.body_count; i++) {
+        gs4i_body there, here = sim->boundary.bodies[i];
+        memcpy(&there, p->at[GS4I_PIECE_BODIES] + (size_t)i * sizeof there, sizeof there);
+        gs4i_forget_pointers(&there.is.shape); gs4i_forget_pointers(&here.is.shape);
+        if (memcmp(&there.is.shape, &here.is.shape, sizeof here.is.shape) || there.is.contact != here.is.contact || there.is_mouth != here.is_mouth
+            || memcmp(&there.is.friction, &here.is.friction, sizeof here.is.friction)) return 0;
+    }
+    for (i = 0; i < sim->emitter_count; i++) {
+        gs4i_emitter there, here = sim->emitters[i];
+        memcpy(&there, p->at[GS4I_PIECE_EMITTERS] + (size_t)i * sizeof there, sizeof there);
+        if (memcmp(&there.is.fill, &here.is.fill, sizeof here.is.fill) || there.body != here.body) return 0;
+    }
+    return 1;
+}
+
+/* Take materials, colliders and emitters from the file, and keep the pointers of those here: callbacks and meshes cannot be saved. */
+static void gs4i_restore_scene(gs4_sim *sim, const gs4i_pieces *p)
+{
+    int i;
+    for (i = 0; i < sim->material_count; i++) {
         gs4i_law here = sim->laws[i], *l = &sim->laws[i];
-        memcpy(l, at, sizeof *l);
+        memcpy(l, p->at[GS4I_PIECE_LAWS] + (size_t)i * sizeof *l, sizeof *l);
         l->viscosity_fn = here.viscosity_fn; l->viscosity_user = here.viscosity_user;
         l->is.viscosity_fn = here.is.viscosity_fn; l->is.viscosity_user = here.is.viscosity_user;
     }
-    for (i = 0; i < sim->boundary.body_count; i++, at += sizeof(gs4i_body)) {
-        gs4i_body b = sim->boundary.bodies[i];
-        gs4i_body *to = &sim->boundary.bodies[i];
-        memcpy(to, at, sizeof b);
-        to->is.shape = b.is.shape; to->field = b.field;
+    for (i = 0; i < sim->boundary.body_count; i++) {
+        gs4i_body here = sim->boundary.bodies[i], *b = &sim->boundary.bodies[i];
+        memcpy(b, p->at[GS4I_PIECE_BODIES] + (size_t)i * sizeof *b, sizeof *b);
+        b->is.shape = here.is.shape; b->field = here.field;
     }
-    for (i = 0; i < sim->emitter_count; i++, at += sizeof(gs4i_emitter)) {
-        gs4_shape shape = sim->emitters[i].is.shape;
-        memcpy(&sim->emitters[i], at, sizeof(gs4i_emitter));
+    for (i = 0; i < sim->emitter_count; i++) {
+        const gs4_shape shape = sim->emitters[i].is.shape;
+        memcpy(&sim->emitters[i], p->at[GS4I_PIECE_EMITTERS] + (size_t)i * sizeof(gs4i_emitter), sizeof(gs4i_emitter));
         sim->emitters[i].is.shape = shape;
     }
 }
 
-/* Occupied blocks must be ascending, inside the domain and cover the particles in order. */
-static int gs4i_blocks_are_sound(const gs4_sim *sim, const gs4i_head *h, const uint32_t *block, const int32_t *first)
+/* Occupied blocks must be ascending, inside the domain and cover the particles in order; those with nodes ascending too. */
+static int gs4i_blocks_are_sound(const gs4_sim *sim, const gs4i_head *h, const uint32_t *block, const int32_t *first, const uint32_t *active)
 {
     int i, a, at[3];
+    for (i = 0; i < h->active; i++)
+        if (active[i] >= sim->grid.table_count || (i && active[i] <= active[i - 1])) return 0;
     if (h->occupied == 0) return h->unsorted || h->particles == 0;
     if (first[0] != 0 || (h->unsorted ? first[h->occupied] < 0 : first[h->occupied] != h->particles)) return 0;
     for (i = 0; i < h->occupied; i++) {
@@ -3835,83 +3880,133 @@ static int gs4i_blocks_are_sound(const gs4_sim *sim, const gs4i_head *h, const u
     return 1;
 }
 
-static int gs4i_restore(gs4_sim *sim, const unsigned char *data, size_t size)
+/* Particles and grid of the file into `next`, which has none yet. */
+static int gs4i_rebuild(gs4_sim *next, const gs4i_head *h, const gs4i_pieces *p)
 {
-    gs4i_head h;
+    gs4i_grid *g = &next->grid;
     gs4i_array a[GS4I_ARRAYS];
-    uint64_t hash = 0, stored;
-    size_t scene, particle = 0, need;
-    const unsigned char *at = data + sizeof h;
     int k;
-    if (size < sizeof h + sizeof hash) return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint is cut off, or no checkpoint at all");
-    memcpy(&h, data, sizeof h);
-    GS4I_TRY(gs4i_check_head(sim, &h));
-    gs4i_particle_arrays(&sim->particles, a);
-    for (k = 0; k < GS4I_ARRAYS - 1; k++) if (a[k].wanted) particle += a[k].size;
-    scene = (size_t)h.materials * sizeof(gs4i_law) + (size_t)h.bodies * sizeof(gs4i_body) + (size_t)h.emitters * sizeof(gs4i_emitter);
-    need = sizeof h + scene + (size_t)h.particles * particle + (size_t)h.occupied * 8 + 4
-         + (sim->particles.with_rates ? (size_t)h.active * GS4I_NODE_REALS * sizeof(gs4_real) : 0) + sizeof hash;
-    if (need != size) return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint is cut off or has something behind its end");
-    memcpy(&stored, data + size - sizeof stored, sizeof stored);
-    /* the hash runs over the same pieces as when it was saved */
-    {
-        const unsigned char *p = data;
-        size_t piece[16];
-        int n = 0;
-        piece[n++] = sizeof h;
-        piece[n++] = (size_t)h.materials * sizeof(gs4i_law);
-        piece[n++] = (size_t)h.bodies * sizeof(gs4i_body); piece[n++] = (size_t)h.emitters * sizeof(gs4i_emitter);
-        for (k = 0; k < GS4I_ARRAYS - 1; k++) if (a[k].wanted) piece[n++] = (size_t)h.particles * a[k].size;
-        piece[n++] = (size_t)h.occupied * 4; piece[n++] = (size_t)h.occupied * 4 + 4;
-        if (sim->particles.with_rates) piece[n++] = (size_t)h.active * GS4I_NODE_REALS * sizeof(gs4_real);
-        for (k = 0; k < n; p += piece[k++]) hash = gs4i_hash_bytes(hash, p, piece[k]);
-    }
-    if (hash != stored) return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint is damaged: its contents do not match their checksum");
-    if (sim->desc.max_particles && h.particles > sim->desc.max_particles)
-        return gs4i_fail(sim, GS4_ERROR_ARGUMENT, "the checkpoint holds more particles than max_particles");
-    /* all memory first, then nothing can fail */
-    if (gs4i_particles_reserve(&sim->memory, &sim->particles, h.particles) != GS4_OK) return gs4i_fail_memory(sim);
-    gs4i_particle_arrays(&sim->particles, a);
-    {
-        int result;
-        uint32_t *blocks = (uint32_t *)gs4i_alloc(&sim->memory, (size_t)h.occupied + 1, sizeof *blocks);
-        int32_t *firsts = (int32_t *)gs4i_alloc(&sim->memory, (size_t)h.occupied + 1, sizeof *firsts);
-        if (!blocks || !firsts) result = gs4i_fail_memory(sim);
-        else {
-            const unsigned char *from = at + scene + (size_t)h.particles * particle;
-            memcpy(blocks, from, (size_t)h.occupied * 4); memcpy(firsts, from + (size_t)h.occupied * 4, (size_t)h.occupied * 4 + 4);
-            if (!gs4i_blocks_are_sound(sim, &h, blocks, firsts)) result = gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint is damaged: its blocks are out of order");
-            else if (gs4i_grid_occupy(&sim->memory, &sim->grid, blocks, h.occupied, sim->particles.with_rates) != GS4_OK) result = gs4i_fail_memory(sim);
-            else {
-                memcpy(sim->grid.first, firsts, (size_t)h.occupied * 4 + 4);
-                result = gs4i_after_occupy(sim);
-            }
-        }
-        gs4i_free(&sim->memory, blocks, (size_t)h.occupied + 1, sizeof *blocks);
-        gs4i_free(&sim->memory, firsts, (size_t)h.occupied + 1, sizeof *firsts);
-        if (result != GS4_OK) { sim->unsorted = 1; return result; }
-    }
-    gs4i_restore_scene(sim, at);
-    at += scene;
+    const int room = next->desc.max_particles > h->particles ? next->desc.max_particles : h->particles;
+    if (gs4i_particles_reserve(&next->memory, &next->particles, room) != GS4_OK) return GS4_ERROR_MEMORY;
+    g->table = (int32_t *)gs4i_alloc(&next->memory, g->table_count, sizeof *g->table);
+    if (!g->table) return GS4_ERROR_MEMORY;
+    if (gs4i_grid_reserve(&next->memory, g, h->active, next->particles.with_rates) != GS4_OK
+        || gs4i_grid_reserve_occupied(&next->memory, g, h->occupied + 1) != GS4_OK) return GS4_ERROR_MEMORY;
+    memcpy(g->block, p->at[GS4I_PIECE_BLOCKS], p->size[GS4I_PIECE_BLOCKS]);
+    memcpy(g->occupied_block, p->at[GS4I_PIECE_OCCUPIED], p->size[GS4I_PIECE_OCCUPIED]);
+    memcpy(g->first, p->at[GS4I_PIECE_FIRST], p->size[GS4I_PIECE_FIRST]);
+    if (!gs4i_blocks_are_sound(next, h, g->occupied_block, g->first, g->block)) return GS4_ERROR_FORMAT;
+    g->active = h->active; g->occupied = h->occupied;
+    for (k = 0; k < g->active; k++) g->table[g->block[k]] = k + 1;
+    if (g->memory) memcpy(g->memory, p->at[GS4I_PIECE_MEMORY], p->size[GS4I_PIECE_MEMORY]);
+    if (!gs4i_grid_is_complete(g)) return GS4_ERROR_FORMAT;
+    gs4i_grid_link(g);
+    if (gs4i_after_occupy(next) != GS4_OK) return GS4_ERROR_MEMORY;
+    gs4i_particle_arrays(&next->particles, a);
     for (k = 0; k < GS4I_ARRAYS - 1; k++)
-        if (a[k].wanted) { memcpy(*a[k].data, at, (size_t)h.particles * a[k].size); at += (size_t)h.particles * a[k].size; }
-    at += (size_t)h.occupied * 8 + 4;
-    if (sim->grid.memory && h.active == sim->grid.active) memcpy(sim->grid.memory, at, (size_t)h.active * GS4I_NODE_REALS * sizeof(gs4_real));
-    sim->particles.count = h.particles;
-    sim->time = h.time; sim->last_dt = h.last_dt; sim->steps = h.steps;
-    sim->next_id = h.next_id; sim->afresh = h.afresh; sim->unsorted = h.unsorted; sim->unseen = h.unseen;
-    sim->min_mass = GS4I_C(h.min_mass); sim->fastest = GS4I_C(h.fastest); sim->shift = GS4I_C(h.shift);
-    sim->worst = h.worst;
+        if (a[k].wanted) memcpy(*a[k].data, p->at[GS4I_PIECE_PARTICLES + k], p->size[GS4I_PIECE_PARTICLES + k]);
+    next->particles.count = h->particles;
     return GS4_OK;
+}
+
+/* What belongs to the blocks and particles of a simulation. */
+static void gs4i_release_state(gs4_sim *sim)
+{
+    gs4i_memory *m = &sim->memory;
+    int i;
+    gs4i_particles_free(m, &sim->particles);
+    gs4i_grid_free(m, &sim->grid);
+    for (i = 0; i < 6; i++) gs4i_free(m, sim->boundary.images[i], (size_t)sim->boundary.image_capacity[i], sizeof(gs4i_image));
+    gs4i_free(m, sim->reports, (size_t)sim->report_capacity, sizeof(gs4i_report));
+    gs4i_free(m, sim->node_reports, (size_t)sim->node_report_capacity, sizeof(gs4i_node_report));
+}
+
+/* Make the state of the file beside the present one, and put it in its place when it is whole. */
+static int gs4i_restore(gs4_sim *sim, const gs4i_head *h, const gs4i_pieces *p)
+{
+    gs4_sim next = *sim;
+    gs4i_grid empty = sim->grid;
+    int i, result;
+    memset(&next.particles, 0, sizeof next.particles);
+    next.particles.with_rates = sim->particles.with_rates;
+    memset(&next.grid, 0, sizeof next.grid);
+    memcpy(next.grid.cells, empty.cells, sizeof empty.cells); memcpy(next.grid.blocks, empty.blocks, sizeof empty.blocks);
+    memcpy(next.grid.periodic, empty.periodic, sizeof empty.periodic);
+    next.grid.h = empty.h; next.grid.inv_h = empty.inv_h; next.grid.origin = empty.origin; next.grid.table_count = empty.table_count;
+    for (i = 0; i < 6; i++) { next.boundary.images[i] = NULL; next.boundary.image_count[i] = next.boundary.image_capacity[i] = 0; }
+    next.reports = NULL; next.node_reports = NULL; next.report_capacity = next.node_report_capacity = 0;
+    result = gs4i_rebuild(&next, h, p);
+    if (result != GS4_OK) {
+        gs4i_release_state(&next);
+        return result == GS4_ERROR_MEMORY ? gs4i_fail_memory(sim) : gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint is damaged: its blocks are out of order");
+    }
+    {
+        gs4_sim old = *sim;                                 /* free the old with the new count of bytes */
+        old.memory = next.memory;
+        gs4i_release_state(&old);
+        next.memory = old.memory;
+    }
+    *sim = next;
+    gs4i_restore_scene(sim, p);
+    sim->time = h->time; sim->last_dt = h->last_dt; sim->steps = h->steps;
+    sim->next_id = h->next_id; sim->afresh = h->afresh; sim->unsorted = h->unsorted; sim->unseen = h->unseen; sim->edited = 0;
+    sim->min_mass = GS4I_C(h->min_mass); sim->fastest = GS4I_C(h->fastest); sim->shift = GS4I_C(h->shift);
+    sim->worst = h->worst;
+    return GS4_OK;
+}
+
+/* The rest of the file, of known size, with its hash; then the state. */
+static int gs4i_load_body(gs4_sim *sim, FILE *f, const gs4i_head *h, unsigned char *data, size_t size, gs4i_pieces *p)
+{
+    static const int order[] = { GS4I_PIECE_LAWS, GS4I_PIECE_BODIES, GS4I_PIECE_EMITTERS };
+    static const int after[] = { GS4I_PIECE_OCCUPIED, GS4I_PIECE_FIRST, GS4I_PIECE_BLOCKS, GS4I_PIECE_MEMORY };
+    uint64_t hash, stored;
+    unsigned char more;
+    size_t at = 0;
+    int k, sequence[GS4I_PIECES], n = 0;
+    if (fread(data, 1, size, f) != size) return gs4i_fail(sim, ferror(f) ? GS4_ERROR_IO : GS4_ERROR_FORMAT, "the checkpoint is cut off");
+    if (fread(&more, 1, 1, f) == 1) return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint has something behind its end");
+    for (k = 0; k < 3; k++) sequence[n++] = order[k];
+    for (k = 0; k < GS4I_ARRAYS - 1; k++) sequence[n++] = GS4I_PIECE_PARTICLES + k;
+    for (k = 0; k < 4; k++) sequence[n++] = after[k];
+    hash = gs4i_hash_bytes(0, h, sizeof *h);
+    for (k = 0; k < n; k++) {                               /* over the same pieces as when it was saved */
+        p->at[sequence[k]] = data + at;
+        hash = gs4i_hash_bytes(hash, data + at, p->size[sequence[k]]);
+        at += p->size[sequence[k]];
+    }
+    memcpy(&stored, data + at, sizeof stored);
+    if (hash != stored) return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint is damaged: its contents do not match their checksum");
+    if (!gs4i_same_scene(sim, p))
+        return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint belongs to a scene with other materials, colliders or emitters: add the same ones, in the same order, before gs4_load");
+    return gs4i_restore(sim, h, p);
 }
 
 static int gs4i_load(gs4_sim *sim, const char *path)
 {
-    unsigned char *data = NULL;
-    size_t size = 0, capacity = 0;
-    int result = gs4i_read_all(sim, path, &data, &size, &capacity);
-    if (result == GS4_OK) result = gs4i_restore(sim, data, size);
-    gs4i_free(&sim->memory, data, capacity, 1);
+    gs4i_head h;
+    gs4i_pieces p;
+    unsigned char *data;
+    size_t size;
+    FILE *f;
+    int result;
+    if (!path || !*path) return gs4i_fail(sim, GS4_ERROR_ARGUMENT, "path is empty");
+    f = fopen(path, "rb");
+    if (!f) return gs4i_fail(sim, GS4_ERROR_IO, "the checkpoint could not be opened: does it exist, and may it be read?");
+    if (fread(&h, 1, sizeof h, f) != sizeof h)
+        result = ferror(f) ? gs4i_fail(sim, GS4_ERROR_IO, "the checkpoint could not be read")
+                           : gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint is cut off, or no checkpoint at all");
+    else result = gs4i_check_head(sim, &h);
+    if (result == GS4_OK) {
+        size = gs4i_piece_sizes(sim, &h, &p) + sizeof(uint64_t);
+        data = (unsigned char *)gs4i_alloc(&sim->memory, size, 1);
+        if (!data) result = gs4i_fail_memory(sim);
+        else {
+            result = gs4i_load_body(sim, f, &h, data, size, &p);
+            gs4i_free(&sim->memory, data, size, 1);
+        }
+    }
+    fclose(f);
     return result;
 }
 
@@ -4133,7 +4228,7 @@ static int gs4i_check_material(gs4_sim *sim, const gs4_material *m)
     {                                                       /* mass and stiffness of a cell must be numbers that leave room */
         const double h = (double)sim->grid.h, c = (double)(m->sound_speed > 1 ? m->sound_speed : GS4I_C(1));
         const double mass = (double)m->density * h * h * h, room = 1e-4 / (double)(GS4I_TINY * GS4I_HUGE);
-        if (!(mass < (double)GS4I_HUGE * 1e4 && mass * c * c < room * (double)GS4I_HUGE && mass > (double)GS4I_TINY / (double)GS4I_EPSILON / (double)GS4I_EPSILON))
+        if (!(mass < (double)GS4I_HUGE * 1e4 && mass * c * c < room * (double)GS4I_HUGE && mass > 64 * (double)GS4I_TINY / (double)GS4I_EPSILON))
             return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "density is ", (double)m->density, "; with this cell_size and sound_speed the mass or the stiffness of a cell is beyond gs4_real; use other units, or define GS4_DOUBLE");
     }
     GS4I_TRY(gs4i_check_absent(sim, "incompressible", GS4I_C(m->incompressible), "the explicit scheme is weakly compressible, leave it 0"));
@@ -4279,15 +4374,11 @@ GS4_API void gs4_destroy(gs4_sim *sim)
 #ifdef GS4_PTHREADS
     gs4i_pool_destroy(&sim->memory, sim->tasks.pool, sim->desc.threads - 1);
 #endif
-    gs4i_particles_free(&sim->memory, &sim->particles);
-    gs4i_grid_free(&sim->memory, &sim->grid);
+    gs4i_release_state(sim);
     for (i = 0; i < sim->boundary.body_count; i++) gs4i_field_free(&sim->memory, &sim->boundary.bodies[i].field);
-    for (i = 0; i < 6; i++) gs4i_free(&sim->memory, sim->boundary.images[i], (size_t)sim->boundary.image_capacity[i], sizeof(gs4i_image));
     gs4i_free(&sim->memory, sim->boundary.bodies, (size_t)sim->boundary.body_capacity, sizeof(gs4i_body));
     gs4i_free(&sim->memory, sim->laws, (size_t)sim->material_capacity, sizeof(gs4i_law));
     gs4i_free(&sim->memory, sim->emitters, (size_t)sim->emitter_capacity, sizeof(gs4i_emitter));
-    gs4i_free(&sim->memory, sim->reports, (size_t)sim->report_capacity, sizeof(gs4i_report));
-    gs4i_free(&sim->memory, sim->node_reports, (size_t)sim->node_report_capacity, sizeof(gs4i_node_report));
     memory = sim->memory;
     gs4i_free(&memory, sim, 1, sizeof *sim);
 }

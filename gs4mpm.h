@@ -1959,7 +1959,7 @@ static void gs4i_field_sample(gs4i_field *f, const gs4_shape *s)
     }
 }
 
-/* Sample the mesh `s` every `spacing` (coarser where that would be more than three million samples). */
+/* Sample the mesh `s` every `spacing` (coarser where that would be more than 12 MB). */
 static int gs4i_field_create(gs4i_memory *m, gs4i_field *f, const gs4_shape *s, double spacing)
 {
     gs4_vec3 low, high;
@@ -1968,7 +1968,7 @@ static int gs4i_field_create(gs4i_memory *m, gs4i_field *f, const gs4_shape *s, 
     gs4i_shape_bounds(s, &low, &high);
     gs4i_to_double(low, lo); gs4i_to_double(high, hi);
     for (a = 0; a < 3; a++) extent *= (hi[a] - lo[a]) / spacing + 14;
-    while (extent > 3e6) { spacing *= 1.1; for (extent = 1, a = 0; a < 3; a++) extent *= (hi[a] - lo[a]) / spacing + 14; }
+    while (extent * sizeof(gs4_real) > 12e6) { spacing *= 1.1; for (extent = 1, a = 0; a < 3; a++) extent *= (hi[a] - lo[a]) / spacing + 14; }
     f->spacing = spacing; f->band = 6 * spacing; f->count = 1;
     for (a = 0; a < 3; a++) {
         f->low[a] = lo[a] - 6.49 * spacing;
@@ -2390,14 +2390,14 @@ GS4I_INLINE gs4_real gs4i_affine_bound(const gs4i_quad c[3], gs4_real dt)
 GS4I_INLINE void gs4i_scatter_affine(gs4_real *tile, const gs4i_stencil *s, gs4_real h, const gs4i_quad *mv, const gs4i_quad Q[3])
 {
     gs4i_row w, wx, v, p0, p1, p2, side[3], r, t;
-    gs4i_quad qx, qy, qz, b, product, y[3];
+    gs4i_quad qx, qy, qz, b, product, by_node[3], y[3];
     gs4_real yz[3][4];
     int j, k;
     GS4I_SPLAT_MUL(qx, h, Q[0]); GS4I_SPLAT_MUL(qy, h, Q[1]); GS4I_SPLAT_MUL(qz, h, Q[2]);
     b = *mv;
     GS4I_SPLAT_MAD(b, -GS4I_LANE(s->xi, 0), qx); GS4I_SPLAT_MAD(b, -GS4I_LANE(s->xi, 1), qy); GS4I_SPLAT_MAD(b, -GS4I_LANE(s->xi, 2), qz);
-    GS4I_LOAD(y[0], s->w[0]); GS4I_LOAD(y[1], s->w[1]); GS4I_LOAD(y[2], s->w[2]);
-    gs4i_transpose(&y[0], &y[1], &y[2], y);
+    GS4I_LOAD(by_node[0], s->w[0]); GS4I_LOAD(by_node[1], s->w[1]); GS4I_LOAD(by_node[2], s->w[2]);
+    gs4i_transpose(&by_node[0], &by_node[1], &by_node[2], y);
     for (k = 0; k < 3; k++) { GS4I_SPLAT_MUL(product, s->w[k][2], y[1]); GS4I_STORE(yz[k], product); }      /* w_j w_k */
     gs4i_row_of_nodes(&w, s->w[0][0], s->w[1][0], s->w[2][0]);
     gs4i_row_of_nodes(&wx, -s->w[0][0], 0, s->w[2][0]);
@@ -2761,11 +2761,8 @@ GS4I_INLINE void gs4i_correct(const gs4i_pass *pass, int index, int commit)
             gs4i_x_weights(&s[b], &w, &d);
             gs4i_gather_local(u_nodes + 4 * s[b].base, &s[b], &w, &d, &u[b]);
             gs4i_gather_value(a_nodes + 4 * s[b].base, &s[b], &w, &acc[b]);
-            jump[b] = zero;
-        }
-        for (b = 0; b < n && jumps; b++) {
-            gs4i_x_weights(&s[b], &w, &d);
-            gs4i_gather_value(j_nodes + 4 * s[b].base, &s[b], &w, &jump[b]);
+            if (jumps) gs4i_gather_value(j_nodes + 4 * s[b].base, &s[b], &w, &jump[b]);
+            else jump[b] = zero;
         }
         for (b = 0; b < n; b++) {
             const size_t k = i + (size_t)b;
@@ -4967,6 +4964,59 @@ GS4_API int gs4_material_preset(const char *name, gs4_material *material)
 #elif defined(__GNUC__) && !defined(__TINYC__)
 #pragma GCC pop_options
 #endif
+
+#undef GS4I_BLOCK
+#undef GS4I_BLOCK_NODES
+#undef GS4I_C
+#undef GS4I_DESTINATION
+#undef GS4I_DIFFERENCE
+#undef GS4I_EACH
+#undef GS4I_EPSILON
+#undef GS4I_EULER_SOUND_EIGENVALUE
+#undef GS4I_EULER_VISCOUS_EIGENVALUE
+#undef GS4I_GREATER
+#undef GS4I_HUGE
+#undef GS4I_INLINE
+#undef GS4I_J_HIGH
+#undef GS4I_J_LOW
+#undef GS4I_LANE
+#undef GS4I_LANES
+#undef GS4I_LEADER
+#undef GS4I_LOAD
+#undef GS4I_LONG_ROWS
+#undef GS4I_MAD
+#undef GS4I_MAX_PARTICLES
+#undef GS4I_MAX_STEPS
+#undef GS4I_MUL
+#undef GS4I_NODE_REALS
+#undef GS4I_NO_HEAT
+#undef GS4I_PREFETCH
+#undef GS4I_PRESSED
+#undef GS4I_RESTRICT
+#undef GS4I_ROW_DIFFERENCE
+#undef GS4I_ROW_LOAD
+#undef GS4I_ROW_MAD
+#undef GS4I_ROW_MUL
+#undef GS4I_ROW_SPLAT_MAD
+#undef GS4I_ROW_SPLAT_MUL
+#undef GS4I_ROW_STORE
+#undef GS4I_ROW_SUM
+#undef GS4I_SEEN
+#undef GS4I_SHIFT
+#undef GS4I_SOUND_EIGENVALUE
+#undef GS4I_SPLAT_MAD
+#undef GS4I_SPLAT_MUL
+#undef GS4I_SQRT
+#undef GS4I_STORE
+#undef GS4I_SUM
+#undef GS4I_THREAD_LOCAL
+#undef GS4I_TILE
+#undef GS4I_TILE_REALS
+#undef GS4I_TINY
+#undef GS4I_TRY
+#undef GS4I_VECTORS
+#undef GS4I_VISCOUS_EIGENVALUE
+#undef GS4I_VISITED
 
 #endif /* GS4MPM_IMPLEMENTATION */
 

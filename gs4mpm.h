@@ -3585,6 +3585,7 @@ static int gs4i_file_open(gs4_sim *sim, gs4i_file *f, const char *path)
 
 static void gs4i_file_put(gs4i_file *f, const void *data, size_t bytes)
 {
+    if (bytes == 0) return;
     if (!f->failed && fwrite(data, 1, bytes, f->stream) != bytes) f->failed = 1;
     f->hash = gs4i_hash_bytes(f->hash, data, bytes);
 }
@@ -4177,8 +4178,8 @@ static int gs4i_check_desc(gs4_sim *sim, gs4_sim_desc *d)
     GS4I_TRY(gs4i_check3(sim, "origin", d->origin));
     gs4i_to_double(d->origin, origin);
     for (a = 0; a < 3; a++)
-        if (fabs(origin[a]) > 1e-2 * (double)d->cell_size / (double)GS4I_EPSILON)
-            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "origin has the coordinate ", origin[a], ": so far out that positions could not tell a hundredth of a cell; move the scene to the origin, or define GS4_DOUBLE");
+        if (fabs(origin[a]) + d->cells[a] * (double)d->cell_size > 2e-2 * (double)d->cell_size / (double)GS4I_EPSILON)
+            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "the grid reaches to the coordinate ", fabs(origin[a]) + d->cells[a] * (double)d->cell_size, " from its origin: so far out that positions could not tell a fiftieth of a cell; use an origin near 0, fewer cells, or define GS4_DOUBLE");
     GS4I_TRY(gs4i_check3(sim, "gravity", d->gravity));
     GS4I_TRY(gs4i_check_numerics(sim, d));
     GS4I_TRY(gs4i_check_walls(sim, d));
@@ -4520,10 +4521,11 @@ static int gs4i_overlaps(gs4_sim *sim, const int low[3], const int n[3], const g
 }
 
 /* Points of the lattice low + (i + 1/2) spacing that are inside the shape and the domain: counts them, and writes them
- * where `out` is given. Lattices of all shapes are aligned with the cells. */
+ * where `out` is given; -1 when there are more than there is room for. Lattices of all shapes are aligned with the cells. */
 static int64_t gs4i_lattice(const gs4_sim *sim, const gs4i_body *shape, const gs4_fill *f, const int64_t from[3], const int64_t to[3], gs4_real *out)
 {
     const double s = (double)f->spacing;
+    const int64_t most = (sim->desc.max_particles ? sim->desc.max_particles : GS4I_MAX_PARTICLES) - sim->particles.count;
     double o[3];
     int64_t i, j, k, n = 0;
     gs4i_to_double(sim->grid.origin, o);
@@ -4537,6 +4539,7 @@ static int64_t gs4i_lattice(const gs4_sim *sim, const gs4i_body *shape, const gs
                                       amount * gs4i_jitter(f->random_seed, number, 2)));
         }
         if (!gs4i_inside_domain(&sim->grid, x)) continue;
+        if (n == most) return -1;
         if (out) { out[3 * n] = x.x; out[3 * n + 1] = x.y; out[3 * n + 2] = x.z; }
         n++;
     }
@@ -4585,12 +4588,14 @@ static int64_t gs4i_collect_points(gs4_sim *sim, const gs4_shape *shape, const g
     int low[3], cells[3], overlap;
     if (!gs4i_clip_shape(sim, shape, (double)f->spacing, from, to, low, cells))
         return gs4i_bad_argument(sim, "shape lies outside of the grid: nothing was added");
+    if ((double)(to[0] - from[0]) * (double)(to[1] - from[1]) * (double)(to[2] - from[2]) > 16e9)
+        return gs4i_fail(sim, GS4_ERROR_MEMORY, "shape spans more than 1.6e10 particles; a larger spacing would do; nothing was added");
     memset(&as_body, 0, sizeof as_body);
     as_body.shape = *shape;
     GS4I_TRY(gs4i_make_body(sim, &body, &as_body, (double)f->spacing));
     n = gs4i_lattice(sim, &body, f, from, to, NULL);
-    if (n == 0) n = gs4i_bad_argument(sim, "shape holds no particle: it is thinner than fill.spacing, outside of the grid, or inside out");
-    else if (n > GS4I_MAX_PARTICLES) n = gs4i_fail(sim, GS4_ERROR_MEMORY, "shape holds more than 2^30 particles; a larger spacing would do");
+    if (n < 0) n = gs4i_fail(sim, GS4_ERROR_MEMORY, "shape holds more particles than there is room for (max_particles); a larger spacing would do; nothing was added");
+    else if (n == 0) n = gs4i_bad_argument(sim, "shape holds no particle: it is thinner than fill.spacing, outside of the grid, or inside out");
     else if (!(*points = (gs4_real *)gs4i_alloc(&sim->memory, (size_t)n, 3 * sizeof **points))) n = gs4i_fail_memory(sim);
     else {
         gs4i_lattice(sim, &body, f, from, to, *points);

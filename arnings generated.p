@@ -1,1 +1,0 @@
-#define gs4_sphere              gs4_sphere_f64

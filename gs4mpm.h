@@ -3903,6 +3903,7 @@ static int gs4i_rebuild(gs4_sim *next, const gs4i_head *h, const gs4i_pieces *p)
     gs4i_particle_arrays(&next->particles, a);
     for (k = 0; k < GS4I_ARRAYS - 1; k++)
         if (a[k].wanted) memcpy(*a[k].data, p->at[GS4I_PIECE_PARTICLES + k], p->size[GS4I_PIECE_PARTICLES + k]);
+    for (k = 0; k < h->particles; k++) if (next->particles.material[k] >= next->material_count) return GS4_ERROR_FORMAT;
     next->particles.count = h->particles;
     return GS4_OK;
 }

@@ -19,6 +19,7 @@ int main(int count, char **values)
     RUN(test_column_at_rest);
     RUN(test_sound_speed);
     RUN(test_drop_at_rest);
+    RUN(test_drop_impact);
     run_errors();
     run_files();
     RUN(test_order_in_time);

@@ -157,7 +157,7 @@ macros() { $CC -std=c99 "$@" -I. -dM -E - | sed 's/(.*/ /' | awk '{ print $2 }' 
 new_macros() {
     cat > "$tmp/macros.c"
     macros "$@" < "$tmp/macros.c" > "$tmp/after"
-    { grep -h '^#include <' gs4mpm.h | grep -v pthread; } | macros "$@" > "$tmp/before"
+    { sed -n 's/^ *#include </#include </p' gs4mpm.h | grep -v pthread; printf '#ifdef GS4_PTHREADS\n#include <pthread.h>\n#endif\n'; } | macros "$@" > "$tmp/before"
     comm -23 "$tmp/after" "$tmp/before"
 }
 
@@ -285,8 +285,8 @@ fuses() { $1 -O2 -mfma -ffp-contract=fast -I. -c "$tmp/fused.c" -o "$tmp/fused.o
 # ==== sanitizers ===============================================================================================
 
 # sanitized COMPILER FLAGS
-sanitized_det() { $1 -g -O1 -DGS4_PTHREADS -pthread -I. tests/determinism.c -o "$tmp/det" -lm && "$tmp/det" steps=100 $2; }
-sanitized_main() { $1 -g -O1 -DGS4_PTHREADS -pthread -I. tests/main.c -o "$tmp/main" -lm && "$tmp/main"; }
+sanitized_det() { $1 -g -O2 -DGS4_PTHREADS -pthread -I. tests/determinism.c -o "$tmp/det" -lm && "$tmp/det" steps=100 $2; }
+sanitized_main() { $1 -g -O2 -DGS4_PTHREADS -pthread -I. tests/main.c -o "$tmp/main" -lm && "$tmp/main"; }
 
 asan() {
     for cc in gcc clang; do

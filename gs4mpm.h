@@ -824,7 +824,6 @@ static void gs4i_shape_bounds(const gs4_shape *s, gs4_vec3 *low, gs4_vec3 *high)
  * which is a block with two nodes around it, so that a particle may stray one cell from its block before it must be
  * sorted anew. A node is four numbers, and three nodes of a row are twelve contiguous ones: the `row` below. */
 
-#define GS4I_BLOCK 4                    /* nodes along the edge of a block */
 #define GS4I_BLOCK_NODES 64
 #define GS4I_TILE 8                     /* nodes along the edge of a tile */
 #define GS4I_TILE_REALS (4 * GS4I_TILE * GS4I_TILE * GS4I_TILE + 16)   /* a row read may run 4 numbers over the end */
@@ -922,40 +921,18 @@ GS4I_INLINE void gs4i_row_of_quad(gs4i_row *r, const gs4i_quad *q)
 #endif
 }
 
-/* Transpose: r[i] = (a_i b_i c_i 0) */
-GS4I_INLINE void gs4i_transpose(const gs4i_quad *a, const gs4i_quad *b, const gs4i_quad *c, gs4i_quad r[3])
-{
 #ifdef GS4I_VECTORS
-    const gs4i_quad zero = { 0, 0, 0, 0 };
-    const gs4i_quad low = __builtin_shufflevector(*a, *b, 0, 4, 1, 5), high = __builtin_shufflevector(*a, *b, 2, 6, 3, 7);
-    const gs4i_quad cz = __builtin_shufflevector(*c, zero, 0, 4, 1, 4), cw = __builtin_shufflevector(*c, zero, 2, 4, 2, 4);
-    r[0] = __builtin_shufflevector(low, cz, 0, 1, 4, 5);
-    r[1] = __builtin_shufflevector(low, cz, 2, 3, 6, 7);
-    r[2] = __builtin_shufflevector(high, cw, 0, 1, 4, 5);
-#else
-    int i;
-    for (i = 0; i < 3; i++) { r[i].lane[0] = a->lane[i]; r[i].lane[1] = b->lane[i]; r[i].lane[2] = c->lane[i]; r[i].lane[3] = 0; }
-#endif
-}
-
-/* The cell of each coordinate, and x - cell - 1/2; coordinates outside of 1 <= x < 7, and NaN, give cell 0. */
-GS4I_INLINE void gs4i_split(const gs4i_quad *x, int cell[4], gs4i_quad *xi)
+/* r[i] = (from[i] from[4 + i] from[8 + i] from[12 + i]) */
+GS4I_INLINE void gs4i_transpose(const gs4_real *from, gs4i_quad r[4])
 {
-#ifdef GS4I_VECTORS
-    const gs4i_mask inside = (*x >= 1) & (*x < GS4I_TILE - 1);
-    const gs4i_quad safe = (gs4i_quad)((gs4i_mask)*x & inside);
-    const gs4i_int4 c = __builtin_convertvector(safe, gs4i_int4);
-    *xi = safe - __builtin_convertvector(c, gs4i_quad) - GS4I_C(0.5);
-    memcpy(cell, &c, sizeof c);
-#else
-    int i;
-    for (i = 0; i < 4; i++) {
-        const int inside = x->lane[i] >= 1 && x->lane[i] < GS4I_TILE - 1;
-        cell[i] = inside ? (int)x->lane[i] : 0;
-        xi->lane[i] = (inside ? x->lane[i] : GS4I_C(0)) - GS4I_C(cell[i]) - GS4I_C(0.5);
-    }
-#endif
+    gs4i_quad a, b, c, d, low, high, Low, High;
+    GS4I_LOAD(a, from); GS4I_LOAD(b, from + 4); GS4I_LOAD(c, from + 8); GS4I_LOAD(d, from + 12);
+    low = __builtin_shufflevector(a, b, 0, 4, 1, 5); high = __builtin_shufflevector(a, b, 2, 6, 3, 7);
+    Low = __builtin_shufflevector(c, d, 0, 4, 1, 5); High = __builtin_shufflevector(c, d, 2, 6, 3, 7);
+    r[0] = __builtin_shufflevector(low, Low, 0, 1, 4, 5); r[1] = __builtin_shufflevector(low, Low, 2, 3, 6, 7);
+    r[2] = __builtin_shufflevector(high, High, 0, 1, 4, 5); r[3] = __builtin_shufflevector(high, High, 2, 3, 6, 7);
 }
+#endif
 
 /* q = sum over the nodes of a row of x_i y_i: (node 0 + node 2) + node 1 */
 GS4I_INLINE void gs4i_row_dot(gs4i_quad *q, const gs4i_row *x, const gs4i_row *y)
@@ -972,46 +949,190 @@ GS4I_INLINE void gs4i_row_dot(gs4i_quad *q, const gs4i_row *x, const gs4i_row *y
 #endif
 }
 
-/* Weights and derivatives (1/m) of one particle, [node][axis], and where its first node is in the tile. */
-typedef struct gs4i_stencil {
-    gs4_real w[3][4], d[3][4];
-    gs4i_quad xi;                       /* offset from the centre of its cell, in cells */
-    int base;                           /* number of its first node in the tile, or -1: outside of it */
-} gs4i_stencil;
+/* Sixteen particles of a block go together, a batch. What each does by itself is done for GS4I_WIDTH of them at a time: one
+ * number of each side by side in a `wide`, the widest vector of the machine, or a plain number where there are none. The
+ * formulas are written once for all of these, in loops over the wides of a batch. */
+enum { GS4I_BATCH = 16 };
+#ifndef GS4I_VECTORS
+#define GS4I_WIDTH 1
+typedef gs4_real gs4i_wide;
+typedef int32_t gs4i_wide_int;
+typedef int gs4i_wide_mask;
+#define GS4I_CHOOSE(r, mask, x, y) ((r) = (mask) ? (x) : (y))          /* r = mask ? x : y  lane by lane */
+#define GS4I_CHOOSE_INT GS4I_CHOOSE
+#define GS4I_TRUNCATE(i, x) ((i) = (int32_t)(x))
+#define GS4I_TO_REAL(x, i) ((x) = (gs4_real)(i))
+#else
+#if defined(__AVX512F__) && !defined(GS4_DOUBLE)
+#define GS4I_WIDTH 16
+#elif defined(__AVX512F__) || (defined(__AVX__) && !defined(GS4_DOUBLE))
+#define GS4I_WIDTH 8
+#else
+#define GS4I_WIDTH 4
+#endif
+typedef gs4_real gs4i_wide __attribute__((vector_size(GS4I_WIDTH * sizeof(gs4_real)), may_alias));
+typedef int32_t gs4i_wide_int __attribute__((vector_size(GS4I_WIDTH * sizeof(int32_t)), may_alias));
+#ifdef GS4_DOUBLE
+typedef int64_t gs4i_wide_mask __attribute__((vector_size(GS4I_WIDTH * sizeof(int64_t))));
+#else
+typedef int32_t gs4i_wide_mask __attribute__((vector_size(GS4I_WIDTH * sizeof(int32_t))));
+#endif
+#define GS4I_CHOOSE(r, mask, x, y) do { const gs4i_wide_mask gs4i_m = (mask); \
+    (r) = (gs4i_wide)(((gs4i_wide_mask)(x) & gs4i_m) | ((gs4i_wide_mask)(y) & ~gs4i_m)); } while (0)
+#define GS4I_CHOOSE_INT(r, mask, x, y) do { const gs4i_wide_int gs4i_m = (mask); (r) = ((x) & gs4i_m) | ((y) & ~gs4i_m); } while (0)
+#define GS4I_TRUNCATE(i, x) ((i) = __builtin_convertvector(x, gs4i_wide_int))
+#define GS4I_TO_REAL(x, i) ((x) = __builtin_convertvector(i, gs4i_wide))
+#endif
+#define GS4I_WIDE_MAX(r, x, y) GS4I_CHOOSE(r, (x) > (y), x, y)
+#define GS4I_WIDE_MIN(r, x, y) GS4I_CHOOSE(r, (x) < (y), x, y)
 
-/* `x` in cells from the first node of the tile, plus 1/2: the particle is in the cell of node floor(x). */
-GS4I_INLINE void gs4i_stencil_at(gs4i_stencil *s, const gs4i_quad *x, gs4_real inv_h)
+typedef gs4i_wide gs4i_lanes[GS4I_BATCH / GS4I_WIDTH];                 /* one number of each particle of a batch */
+#define GS4I_BATCH_LOOP(b) for (b = 0; b < GS4I_BATCH / GS4I_WIDTH; b++)
+#define GS4I_NTH(lanes, n) (((gs4_real *)(lanes))[n])                  /* of particle n */
+#define GS4I_NTH_CONST(lanes, n) (((const gs4_real *)(lanes))[n])
+
+/* Does the mask hold for all? */
+GS4I_INLINE int gs4i_all(const gs4i_wide_mask *mask)
 {
-    gs4i_quad lo, hi, t;
-    int cell[4];
-    gs4i_split(x, cell, &s->xi);
-    GS4I_SPLAT_MUL(lo, GS4I_C(-1), s->xi); GS4I_SHIFT(lo, lo, GS4I_C(0.5));
-    GS4I_SHIFT(hi, s->xi, GS4I_C(0.5));
-    GS4I_MUL(t, lo, lo); GS4I_SPLAT_MUL(t, GS4I_C(0.5), t); GS4I_STORE(s->w[0], t);
-    GS4I_MUL(t, s->xi, s->xi); GS4I_SPLAT_MUL(t, GS4I_C(-1), t); GS4I_SHIFT(t, t, GS4I_C(0.75)); GS4I_STORE(s->w[1], t);
-    GS4I_MUL(t, hi, hi); GS4I_SPLAT_MUL(t, GS4I_C(0.5), t); GS4I_STORE(s->w[2], t);
-    GS4I_SPLAT_MUL(t, -inv_h, lo); GS4I_STORE(s->d[0], t);
-    GS4I_SPLAT_MUL(t, -2 * inv_h, s->xi); GS4I_STORE(s->d[1], t);
-    GS4I_SPLAT_MUL(t, inv_h, hi); GS4I_STORE(s->d[2], t);
-    s->base = cell[0] > 0 && cell[1] > 0 && cell[2] > 0
-            ? ((cell[2] - 1) * GS4I_TILE + (cell[1] - 1)) * GS4I_TILE + (cell[0] - 1) : -1;
+#if GS4I_WIDTH == 1
+    return *mask;
+#else
+    uint64_t words[sizeof *mask / 8], all = ~(uint64_t)0;
+    size_t i;
+    memcpy(words, mask, sizeof words);
+    for (i = 0; i < sizeof *mask / 8; i++) all &= words[i];
+    return all == ~(uint64_t)0;
+#endif
 }
 
-/* tile += row by row  y_j z_k P0 + ey_j z_k P1 + y_j ez_k P2,  where the x-weights are in P0, P1, P2 already, y and z are the
- * plain weights and ey, ez the others (derivatives, or weights times distance) of those axes: lanes 1 and 2 of w and e. */
+/* (a b c d) of each of sixteen particles into four lanes */
+GS4I_INLINE void gs4i_sixteen_to_lanes(const gs4_real *from, gs4i_lanes to[4])
+{
+#if GS4I_WIDTH == 16
+    gs4i_wide p0, p1, p2, p3, xy, zw, XY, ZW;
+    GS4I_LOAD(p0, from); GS4I_LOAD(p1, from + 16); GS4I_LOAD(p2, from + 32); GS4I_LOAD(p3, from + 48);
+    xy = __builtin_shufflevector(p0, p1, 0, 4, 8, 12, 16, 20, 24, 28, 1, 5, 9, 13, 17, 21, 25, 29);
+    zw = __builtin_shufflevector(p0, p1, 2, 6, 10, 14, 18, 22, 26, 30, 3, 7, 11, 15, 19, 23, 27, 31);
+    XY = __builtin_shufflevector(p2, p3, 0, 4, 8, 12, 16, 20, 24, 28, 1, 5, 9, 13, 17, 21, 25, 29);
+    ZW = __builtin_shufflevector(p2, p3, 2, 6, 10, 14, 18, 22, 26, 30, 3, 7, 11, 15, 19, 23, 27, 31);
+    to[0][0] = __builtin_shufflevector(xy, XY, 0, 1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 20, 21, 22, 23);
+    to[1][0] = __builtin_shufflevector(xy, XY, 8, 9, 10, 11, 12, 13, 14, 15, 24, 25, 26, 27, 28, 29, 30, 31);
+    to[2][0] = __builtin_shufflevector(zw, ZW, 0, 1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 20, 21, 22, 23);
+    to[3][0] = __builtin_shufflevector(zw, ZW, 8, 9, 10, 11, 12, 13, 14, 15, 24, 25, 26, 27, 28, 29, 30, 31);
+#elif GS4I_WIDTH > 1
+    gs4i_quad c[4][4];
+    int b, q, i;
+    for (b = 0; b < GS4I_BATCH / GS4I_WIDTH; b++, from += 4 * GS4I_WIDTH) {
+        for (q = 0; q < GS4I_WIDTH / 4; q++) gs4i_transpose(from + 16 * q, c[q]);
+#if GS4I_WIDTH == 8
+        for (i = 0; i < 4; i++) to[i][b] = __builtin_shufflevector(c[0][i], c[1][i], 0, 1, 2, 3, 4, 5, 6, 7);
+#else
+        for (i = 0; i < 4; i++) to[i][b] = c[0][i];
+#endif
+    }
+#else
+    int b, i;
+    for (b = 0; b < GS4I_BATCH; b++) for (i = 0; i < 4; i++) to[i][b] = from[4 * b + i];
+#endif
+}
+
+/* The same of n particles; the first one's again where there are fewer */
+GS4I_INLINE void gs4i_to_lanes(const gs4_real *from, int n, gs4i_lanes to[4])
+{
+    gs4_real filled[4 * GS4I_BATCH];
+    int b;
+    if (n < GS4I_BATCH) {
+        memcpy(filled, from, 4 * (size_t)n * sizeof *from);
+        for (b = n; b < GS4I_BATCH; b++) memcpy(filled + 4 * b, from, 4 * sizeof *from);
+        from = filled;
+    }
+    gs4i_sixteen_to_lanes(from, to);
+}
+
+/* And back: (x y z w) of each particle. */
+GS4I_INLINE void gs4i_from_lanes(const gs4i_wide *x, const gs4i_wide *y, const gs4i_wide *z, const gs4i_wide *w, gs4_real to[4 * GS4I_BATCH])
+{
+#if GS4I_WIDTH == 16
+    const gs4i_wide xy = __builtin_shufflevector(*x, *y, 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);    /* of particles 0 1 4 5 8 9 .. */
+    const gs4i_wide XY = __builtin_shufflevector(*x, *y, 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
+    const gs4i_wide zw = __builtin_shufflevector(*z, *w, 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
+    const gs4i_wide ZW = __builtin_shufflevector(*z, *w, 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
+    const gs4i_wide p04 = __builtin_shufflevector(xy, zw, 0, 1, 16, 17, 2, 3, 18, 19, 4, 5, 20, 21, 6, 7, 22, 23);      /* 0 1 4 5 */
+    const gs4i_wide p8c = __builtin_shufflevector(xy, zw, 8, 9, 24, 25, 10, 11, 26, 27, 12, 13, 28, 29, 14, 15, 30, 31);
+    const gs4i_wide p26 = __builtin_shufflevector(XY, ZW, 0, 1, 16, 17, 2, 3, 18, 19, 4, 5, 20, 21, 6, 7, 22, 23);      /* 2 3 6 7 */
+    const gs4i_wide pae = __builtin_shufflevector(XY, ZW, 8, 9, 24, 25, 10, 11, 26, 27, 12, 13, 28, 29, 14, 15, 30, 31);
+    const gs4i_wide p0 = __builtin_shufflevector(p04, p26, 0, 1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 20, 21, 22, 23);
+    const gs4i_wide p4 = __builtin_shufflevector(p04, p26, 8, 9, 10, 11, 12, 13, 14, 15, 24, 25, 26, 27, 28, 29, 30, 31);
+    const gs4i_wide p8 = __builtin_shufflevector(p8c, pae, 0, 1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 20, 21, 22, 23);
+    const gs4i_wide pc = __builtin_shufflevector(p8c, pae, 8, 9, 10, 11, 12, 13, 14, 15, 24, 25, 26, 27, 28, 29, 30, 31);
+    GS4I_STORE(to, p0); GS4I_STORE(to + 16, p4); GS4I_STORE(to + 32, p8); GS4I_STORE(to + 48, pc);
+#elif GS4I_WIDTH > 1
+    int b;
+    for (b = 0; b < GS4I_BATCH; b += 4) {
+        gs4_real four[16];
+        gs4i_quad c[4];
+        int i;
+        memcpy(four, (const gs4_real *)x + b, 4 * sizeof *four); memcpy(four + 4, (const gs4_real *)y + b, 4 * sizeof *four);
+        memcpy(four + 8, (const gs4_real *)z + b, 4 * sizeof *four); memcpy(four + 12, (const gs4_real *)w + b, 4 * sizeof *four);
+        gs4i_transpose(four, c);
+        for (i = 0; i < 4; i++) GS4I_STORE(to + 4 * (b + i), c[i]);
+    }
+#else
+    int b;
+    for (b = 0; b < GS4I_BATCH; b++) { to[4 * b] = x[b]; to[4 * b + 1] = y[b]; to[4 * b + 2] = z[b]; to[4 * b + 3] = w[b]; }
+#endif
+}
+
+/* Weights and derivatives (1/m) of a batch, [axis][node], and where each particle's first node is in the tile. */
+typedef struct gs4i_stencils {
+    gs4i_lanes w[3][3], d[3][3];
+    gs4i_lanes xi[3];                   /* offset from the centre of its cell, in cells */
+    int32_t base[GS4I_BATCH];           /* number of its first node in the tile, or -1: outside of it */
+} gs4i_stencils;
+
+/* From the domain to tile coordinates: (x - origin) / h - first; a particle there is in the cell of node floor(x). */
+typedef struct gs4i_frame { gs4_real origin[3], first[3], inv_h; } gs4i_frame;
+
+/* Coordinates outside of 1 <= x < 7 cells, and NaN, give base -1. */
+GS4I_INLINE void gs4i_stencils_at(gs4i_stencils *s, const gs4i_frame *f, gs4i_lanes x[3])
+{
+        gs4i_wide_int base;
+    gs4i_wide zero;
+    int a, b;
+    memset(&zero, 0, sizeof zero);
+    GS4I_BATCH_LOOP(b) {
+        gs4i_wide_int cell[3];
+        for (a = 0; a < 3; a++) {
+            const gs4i_wide t = (x[a][b] - f->origin[a]) * f->inv_h - f->first[a];
+            gs4i_wide safe, xi, lo, hi;
+            GS4I_CHOOSE(safe, (t >= GS4I_C(1)) & (t < GS4I_C(GS4I_TILE - 1)), t, zero);
+            GS4I_TRUNCATE(cell[a], safe);
+            GS4I_TO_REAL(xi, cell[a]);
+            xi = safe - xi - GS4I_C(0.5); lo = GS4I_C(0.5) - xi; hi = GS4I_C(0.5) + xi;
+            s->xi[a][b] = xi;
+            s->w[a][0][b] = GS4I_C(0.5) * (lo * lo); s->w[a][1][b] = GS4I_C(0.75) - xi * xi; s->w[a][2][b] = GS4I_C(0.5) * (hi * hi);
+            s->d[a][0][b] = -f->inv_h * lo; s->d[a][1][b] = (-2 * f->inv_h) * xi; s->d[a][2][b] = f->inv_h * hi;
+        }
+        base = ((cell[2] - 1) * GS4I_TILE + (cell[1] - 1)) * GS4I_TILE + (cell[0] - 1);
+        GS4I_CHOOSE_INT(base, (cell[0] > 0) & (cell[1] > 0) & (cell[2] > 0), base, 0 * base - 1);
+        memcpy(s->base + GS4I_WIDTH * b, &base, sizeof base);
+    }
+}
+
+/* tile += row by row  y_j z_k P0 + dy_j z_k P1 + y_j dz_k P2,  where the x-weights are in P0, P1, P2 already. */
 GS4I_INLINE void gs4i_scatter_rows(gs4_real *GS4I_RESTRICT at, const gs4i_row *p0, const gs4i_row *p1, const gs4i_row *p2,
-                                   gs4_real w[3][4], gs4_real e[3][4])
+                                   const gs4i_stencils *s, int n)
 {
     int j, k;
     for (j = 0; j < 3; j++) {
         gs4i_row a, b;
-        GS4I_ROW_SPLAT_MUL(a, w[j][1], *p0); GS4I_ROW_SPLAT_MAD(a, e[j][1], *p1);
-        GS4I_ROW_SPLAT_MUL(b, w[j][1], *p2);
+        GS4I_ROW_SPLAT_MUL(a, GS4I_NTH_CONST(s->w[1][j], n), *p0); GS4I_ROW_SPLAT_MAD(a, GS4I_NTH_CONST(s->d[1][j], n), *p1);
+        GS4I_ROW_SPLAT_MUL(b, GS4I_NTH_CONST(s->w[1][j], n), *p2);
         for (k = 0; k < 3; k++) {
             gs4_real *row = at + 4 * GS4I_TILE * (GS4I_TILE * k + j);
             gs4i_row r, t;
             GS4I_ROW_LOAD(r, row);
-            GS4I_ROW_SPLAT_MUL(t, w[k][2], a); GS4I_ROW_SPLAT_MAD(t, e[k][2], b);
+            GS4I_ROW_SPLAT_MUL(t, GS4I_NTH_CONST(s->w[2][k], n), a); GS4I_ROW_SPLAT_MAD(t, GS4I_NTH_CONST(s->d[2][k], n), b);
             GS4I_ROW_SUM(r, r, t);
             GS4I_ROW_STORE(row, r);
         }
@@ -1019,57 +1140,76 @@ GS4I_INLINE void gs4i_scatter_rows(gs4_real *GS4I_RESTRICT at, const gs4i_row *p
 }
 
 /* The three rows of one z: sums with the weights and with the derivatives along y */
-GS4I_INLINE void gs4i_gather_plane(const gs4_real *at, const gs4i_stencil *s, gs4i_row *plain, gs4i_row *slope)
+GS4I_INLINE void gs4i_gather_plane(const gs4_real *at, const gs4i_stencils *s, int n, gs4i_row *plain, gs4i_row *slope)
 {
     gs4i_row r;
     GS4I_ROW_LOAD(r, at);
-    GS4I_ROW_SPLAT_MUL(*plain, s->w[0][1], r); GS4I_ROW_SPLAT_MUL(*slope, s->d[0][1], r);
+    GS4I_ROW_SPLAT_MUL(*plain, GS4I_NTH_CONST(s->w[1][0], n), r); GS4I_ROW_SPLAT_MUL(*slope, GS4I_NTH_CONST(s->d[1][0], n), r);
     GS4I_ROW_LOAD(r, at + 4 * GS4I_TILE);
-    GS4I_ROW_SPLAT_MAD(*plain, s->w[1][1], r); GS4I_ROW_SPLAT_MAD(*slope, s->d[1][1], r);
+    GS4I_ROW_SPLAT_MAD(*plain, GS4I_NTH_CONST(s->w[1][1], n), r); GS4I_ROW_SPLAT_MAD(*slope, GS4I_NTH_CONST(s->d[1][1], n), r);
     GS4I_ROW_LOAD(r, at + 8 * GS4I_TILE);
-    GS4I_ROW_SPLAT_MAD(*plain, s->w[2][1], r); GS4I_ROW_SPLAT_MAD(*slope, s->d[2][1], r);
+    GS4I_ROW_SPLAT_MAD(*plain, GS4I_NTH_CONST(s->w[1][2], n), r); GS4I_ROW_SPLAT_MAD(*slope, GS4I_NTH_CONST(s->d[1][2], n), r);
 }
 
-/* What nodes give to a particle: the value (lane 3: of the fourth number) and the columns of its gradient. */
-typedef struct gs4i_local { gs4i_quad value, dx, dy, dz; } gs4i_local;
+/* What nodes give to a batch: value (with the fourth number of the nodes) and the columns of its gradient, four numbers a
+ * particle; then the same in lanes. */
+typedef struct gs4i_gathered { gs4_real value[4 * GS4I_BATCH], dx[4 * GS4I_BATCH], dy[4 * GS4I_BATCH], dz[4 * GS4I_BATCH]; } gs4i_gathered;
 
-/* value = sum_i w_i f_i, dx = sum_i dw_i/dx f_i, ...; wx and dx the spread weights and derivatives along x */
-GS4I_INLINE void gs4i_gather_local(const gs4_real *at, const gs4i_stencil *s, const gs4i_row *wx, const gs4i_row *dx, gs4i_local *l)
+/* Particle n: value = sum_i w_i f_i, dx = sum_i dw_i/dx f_i, ...; wx and dx the spread weights and derivatives along x */
+GS4I_INLINE void gs4i_gather_local(const gs4_real *at, const gs4i_stencils *s, int n, const gs4i_row *wx, const gs4i_row *dx, gs4i_gathered *g)
 {
     const int next = 4 * GS4I_TILE * GS4I_TILE;
     gs4i_row plain, slope, s0, s1, s2;
-    gs4i_gather_plane(at, s, &plain, &slope);
-    GS4I_ROW_SPLAT_MUL(s0, s->w[0][2], plain); GS4I_ROW_SPLAT_MUL(s1, s->w[0][2], slope); GS4I_ROW_SPLAT_MUL(s2, s->d[0][2], plain);
-    gs4i_gather_plane(at + next, s, &plain, &slope);
-    GS4I_ROW_SPLAT_MAD(s0, s->w[1][2], plain); GS4I_ROW_SPLAT_MAD(s1, s->w[1][2], slope); GS4I_ROW_SPLAT_MAD(s2, s->d[1][2], plain);
-    gs4i_gather_plane(at + 2 * next, s, &plain, &slope);
-    GS4I_ROW_SPLAT_MAD(s0, s->w[2][2], plain); GS4I_ROW_SPLAT_MAD(s1, s->w[2][2], slope); GS4I_ROW_SPLAT_MAD(s2, s->d[2][2], plain);
-    gs4i_row_dot(&l->value, wx, &s0);
-    gs4i_row_dot(&l->dx, dx, &s0); gs4i_row_dot(&l->dy, wx, &s1); gs4i_row_dot(&l->dz, wx, &s2);
+    gs4i_quad q;
+    gs4i_gather_plane(at, s, n, &plain, &slope);
+    GS4I_ROW_SPLAT_MUL(s0, GS4I_NTH_CONST(s->w[2][0], n), plain); GS4I_ROW_SPLAT_MUL(s1, GS4I_NTH_CONST(s->w[2][0], n), slope); GS4I_ROW_SPLAT_MUL(s2, GS4I_NTH_CONST(s->d[2][0], n), plain);
+    gs4i_gather_plane(at + next, s, n, &plain, &slope);
+    GS4I_ROW_SPLAT_MAD(s0, GS4I_NTH_CONST(s->w[2][1], n), plain); GS4I_ROW_SPLAT_MAD(s1, GS4I_NTH_CONST(s->w[2][1], n), slope); GS4I_ROW_SPLAT_MAD(s2, GS4I_NTH_CONST(s->d[2][1], n), plain);
+    gs4i_gather_plane(at + 2 * next, s, n, &plain, &slope);
+    GS4I_ROW_SPLAT_MAD(s0, GS4I_NTH_CONST(s->w[2][2], n), plain); GS4I_ROW_SPLAT_MAD(s1, GS4I_NTH_CONST(s->w[2][2], n), slope); GS4I_ROW_SPLAT_MAD(s2, GS4I_NTH_CONST(s->d[2][2], n), plain);
+    gs4i_row_dot(&q, wx, &s0); GS4I_STORE(g->value + 4 * n, q);
+    gs4i_row_dot(&q, dx, &s0); GS4I_STORE(g->dx + 4 * n, q);
+    gs4i_row_dot(&q, wx, &s1); GS4I_STORE(g->dy + 4 * n, q);
+    gs4i_row_dot(&q, wx, &s2); GS4I_STORE(g->dz + 4 * n, q);
 }
 
 /* The value alone. */
-GS4I_INLINE void gs4i_gather_value(const gs4_real *at, const gs4i_stencil *s, const gs4i_row *wx, gs4i_quad *value)
+GS4I_INLINE void gs4i_gather_value(const gs4_real *at, const gs4i_stencils *s, int n, const gs4i_row *wx, gs4_real value[4 * GS4I_BATCH])
 {
     gs4i_row r, s0, t;
+    gs4i_quad q;
     int j;
     for (j = 0; j < 3; j++, at += 4 * GS4I_TILE) {
         GS4I_ROW_LOAD(r, at);
-        GS4I_ROW_SPLAT_MUL(t, s->w[0][2], r);
+        GS4I_ROW_SPLAT_MUL(t, GS4I_NTH_CONST(s->w[2][0], n), r);
         GS4I_ROW_LOAD(r, at + 4 * GS4I_TILE * GS4I_TILE);
-        GS4I_ROW_SPLAT_MAD(t, s->w[1][2], r);
+        GS4I_ROW_SPLAT_MAD(t, GS4I_NTH_CONST(s->w[2][1], n), r);
         GS4I_ROW_LOAD(r, at + 8 * GS4I_TILE * GS4I_TILE);
-        GS4I_ROW_SPLAT_MAD(t, s->w[2][2], r);
-        if (j == 0) GS4I_ROW_SPLAT_MUL(s0, s->w[0][1], t); else GS4I_ROW_SPLAT_MAD(s0, s->w[j][1], t);
+        GS4I_ROW_SPLAT_MAD(t, GS4I_NTH_CONST(s->w[2][2], n), r);
+        if (j == 0) GS4I_ROW_SPLAT_MUL(s0, GS4I_NTH_CONST(s->w[1][0], n), t); else GS4I_ROW_SPLAT_MAD(s0, GS4I_NTH_CONST(s->w[1][j], n), t);
     }
-    gs4i_row_dot(value, wx, &s0);
+    gs4i_row_dot(&q, wx, &s0);
+    GS4I_STORE(value + 4 * n, q);
 }
 
-/* The x-weights of a particle, spread over rows. */
-GS4I_INLINE void gs4i_x_weights(const gs4i_stencil *s, gs4i_row *w, gs4i_row *d)
+/* The x-weights and x-derivatives of particle n, spread over rows. */
+GS4I_INLINE void gs4i_x_weights(const gs4i_stencils *s, int n, gs4i_row *w, gs4i_row *d)
 {
-    gs4i_row_of_nodes(w, s->w[0][0], s->w[1][0], s->w[2][0]);
-    gs4i_row_of_nodes(d, s->d[0][0], s->d[1][0], s->d[2][0]);
+    gs4i_row_of_nodes(w, GS4I_NTH_CONST(s->w[0][0], n), GS4I_NTH_CONST(s->w[0][1], n), GS4I_NTH_CONST(s->w[0][2], n));
+    gs4i_row_of_nodes(d, GS4I_NTH_CONST(s->d[0][0], n), GS4I_NTH_CONST(s->d[0][1], n), GS4I_NTH_CONST(s->d[0][2], n));
+}
+
+/* Velocity gradients of a batch from what was gathered: L[i][j] = dv_i/dx_j. */
+typedef gs4i_lanes gs4i_gradient[3][3];
+
+GS4I_INLINE void gs4i_gradient_lanes(const gs4_real *dx, const gs4_real *dy, const gs4_real *dz, int n, gs4i_gradient L)
+{
+    gs4i_lanes c[4];
+    int i, j, b;
+    for (j = 0; j < 3; j++) {
+        gs4i_to_lanes(j == 0 ? dx : j == 1 ? dy : dz, n, c);
+        for (i = 0; i < 3; i++) GS4I_BATCH_LOOP(b) L[i][j][b] = c[i][b];
+    }
 }
 
 /* ==== [[grid]] blocks of nodes where there is material ============================================= *
@@ -1095,6 +1235,7 @@ typedef struct gs4i_grid {
     int32_t *neighbour;                 /* per occupied block: slots of the 27 blocks around, x fastest */
     int32_t *by_colour; int colour_first[9];    /* occupied blocks by parity of their coordinates: same colour, disjoint tiles */
     int32_t *jump_of; gs4_real *jump; int jump_count, jump_capacity;   /* [[boundary]]: per slot, 1 + its place in `jump` */
+    uint8_t *contact;                   /* of the nodes in `jump`: bit a: an image in contact along axis a; bit 3: pressed on the wall */
     gs4i_scratch lists[2], histogram;   /* of sorting */
 } gs4i_grid;
 
@@ -1338,11 +1479,12 @@ GS4I_INLINE void gs4i_tile_row(const gs4i_grid *g, int o, int y, int z, ptrdiff_
 /* Rows of a tile that particles touch, a bit each: row (y, z) is bit 8 z + y. */
 GS4I_INLINE uint64_t gs4i_touched_rows(int base) { return (uint64_t)0x070707u << (base / GS4I_TILE); }
 
-/* Ask for the nodes of a tile before they are needed: their rows are scattered, no processor foresees them. */
-static void gs4i_tile_prefetch(const gs4i_grid *g, int o, const gs4_real *field)
+/* Ask for two rows of nodes of a tile before they are needed, and count them: a few with each batch of particles, because
+ * rows are scattered, no processor foresees them, and all at once are more than one can wait for. */
+GS4I_INLINE void gs4i_tile_prefetch(const gs4i_grid *g, int o, int row, const gs4_real *field)
 {
-    int row;
-    for (row = 0; row < 64; row++) {
+    int end = row + 2;
+    for (; row < end && row < 64; row++) {
         ptrdiff_t at[3];
         gs4i_tile_row(g, o, row & 7, row >> 3, at);
         GS4I_PREFETCH(field + at[0] + 8); GS4I_PREFETCH(field + at[1]); GS4I_PREFETCH(field + at[2]);
@@ -1424,28 +1566,28 @@ typedef struct gs4i_particles {
     gs4_real *position;                 /* 4: x y z, mass */
     gs4_real *velocity;                 /* 4: v, volume ratio J */
     gs4_real *rate;                     /* 4: dv/dt, dJ/dt; NULL for symplectic Euler */
-    gs4_real *affine;                   /* 9: [3 j + i] = dv_i/dx_j; NULL for GS4 */
-    gs4i_half *lag;                     /* 3: v - shift a - dx/dt, see S2; NULL for symplectic Euler */
+    gs4_real *affine[3];                /* 4 each: column j of the velocity gradient, dv_i/dx_j; NULL for GS4 */
+    gs4i_half *lag;                     /* 4: v - shift a - dx/dt, 0, see S2; NULL for symplectic Euler */
     uint32_t *id; uint8_t *material;
     uint32_t *order;                    /* scratch: block, then destination of each particle */
 } gs4i_particles;
 
-enum { GS4I_ARRAYS = 8 };
+enum { GS4I_ARRAYS = 10 };
 typedef struct gs4i_array { void **data; size_t size; int wanted; } gs4i_array;
 
 /* The arrays of a store with the size of one element, largest first: for growing, sorting, hashing, saving. */
 static void gs4i_particle_arrays(gs4i_particles *p, gs4i_array out[GS4I_ARRAYS])
 {
     int i;
-    out[0].data = (void **)&p->affine;   out[0].size = 9 * sizeof(gs4_real);
-    out[1].data = (void **)&p->position; out[1].size = 4 * sizeof(gs4_real);
-    out[2].data = (void **)&p->velocity; out[2].size = 4 * sizeof(gs4_real);
-    out[3].data = (void **)&p->rate;     out[3].size = 4 * sizeof(gs4_real);
-    out[4].data = (void **)&p->lag;      out[4].size = 3 * sizeof(gs4i_half);
-    out[5].data = (void **)&p->id;       out[5].size = sizeof(uint32_t);
-    out[6].data = (void **)&p->material; out[6].size = 1;
-    out[7].data = (void **)&p->order;    out[7].size = sizeof(uint32_t);
-    for (i = 0; i < GS4I_ARRAYS; i++) out[i].wanted = p->with_rates ? i != 0 : i != 3 && i != 4;
+    for (i = 0; i < 3; i++) { out[i].data = (void **)&p->affine[i]; out[i].size = 4 * sizeof(gs4_real); }
+    out[3].data = (void **)&p->position; out[3].size = 4 * sizeof(gs4_real);
+    out[4].data = (void **)&p->velocity; out[4].size = 4 * sizeof(gs4_real);
+    out[5].data = (void **)&p->rate;     out[5].size = 4 * sizeof(gs4_real);
+    out[6].data = (void **)&p->lag;      out[6].size = 4 * sizeof(gs4i_half);
+    out[7].data = (void **)&p->id;       out[7].size = sizeof(uint32_t);
+    out[8].data = (void **)&p->material; out[8].size = 1;
+    out[9].data = (void **)&p->order;    out[9].size = sizeof(uint32_t);
+    for (i = 0; i < GS4I_ARRAYS; i++) out[i].wanted = p->with_rates ? i > 2 : i != 5 && i != 6;
 }
 
 static void gs4i_particles_free(gs4i_memory *m, gs4i_particles *p)
@@ -1496,7 +1638,7 @@ static void gs4i_mark_cycles(uint32_t *order, int count)
 
 GS4I_INLINE void gs4i_permute_sized(char *data, size_t size, const uint32_t *order, int count)
 {
-    char carried[9 * sizeof(double)], swapped[9 * sizeof(double)];
+    char carried[4 * sizeof(double)], swapped[4 * sizeof(double)];
     int i;
     for (i = 0; i < count; i++) {
         uint32_t j = (uint32_t)i;
@@ -1521,12 +1663,9 @@ static void gs4i_permute_task(int index, void *context)
     data = (char *)*a[index].data;
     if (!data) return;
     switch (a[index].size) {
-    case 72: gs4i_permute_sized(data, 72, p->order, p->count); break;
-    case 36: gs4i_permute_sized(data, 36, p->order, p->count); break;
     case 32: gs4i_permute_sized(data, 32, p->order, p->count); break;
     case 16: gs4i_permute_sized(data, 16, p->order, p->count); break;
-    case 12: gs4i_permute_sized(data, 12, p->order, p->count); break;
-    case 6:  gs4i_permute_sized(data, 6, p->order, p->count); break;
+    case 8:  gs4i_permute_sized(data, 8, p->order, p->count); break;
     case 4:  gs4i_permute_sized(data, 4, p->order, p->count); break;
     default: gs4i_permute_sized(data, a[index].size, p->order, p->count); break;
     }
@@ -1546,44 +1685,75 @@ GS4I_INLINE void gs4i_chunk(const gs4i_sorting *s, int index, int *begin, int *e
     *end = (int)((int64_t)s->p->count * (index + 1) / s->chunks);
 }
 
-/* The rate of particle i's position. Lane 3 means nothing. */
-GS4I_INLINE void gs4i_position_rate(const gs4i_particles *p, size_t i, gs4_real shift, gs4i_quad *rate)
+/* What a batch of particles is; with Euler's tier rates and lag are zero. */
+typedef struct gs4i_batch {
+    gs4i_lanes x[4];                    /* and mass */
+    gs4i_lanes v[4];                    /* and J */
+    gs4i_lanes a[4];                    /* dv/dt and dJ/dt */
+    gs4i_lanes move[3];                 /* dx/dt */
+} gs4i_batch;
+
+/* Ask for a batch some batches ahead: prefetchers of processors end at each page, which is all too soon. */
+GS4I_INLINE void gs4i_prefetch_particles(const gs4i_particles *p, size_t i)
 {
-    GS4I_LOAD(*rate, p->velocity + 4 * i);
-    if (p->lag) {
-        const gs4i_half *lag = p->lag + 3 * i;
-        const gs4i_quad l = { GS4I_LANES(gs4i_from_half(lag[0]), gs4i_from_half(lag[1]), gs4i_from_half(lag[2]), 0) };
-        gs4i_quad a;
-        GS4I_LOAD(a, p->rate + 4 * i);
-        GS4I_SPLAT_MAD(*rate, -shift, a);
-        GS4I_DIFFERENCE(*rate, *rate, l);
+    int b;
+    if (i + GS4I_BATCH > (size_t)p->count) return;
+    for (b = 0; b < 4 * GS4I_BATCH; b += 16) {
+        GS4I_PREFETCH(p->position + 4 * i + b); GS4I_PREFETCH(p->velocity + 4 * i + b);
+        if (p->with_rates) GS4I_PREFETCH(p->rate + 4 * i + b); else GS4I_PREFETCH(p->affine[0] + 4 * i + b);
+        if (p->with_rates) GS4I_PREFETCH(p->lag + 4 * i + b);
+        else { GS4I_PREFETCH(p->affine[1] + 4 * i + b); GS4I_PREFETCH(p->affine[2] + 4 * i + b); }
     }
 }
 
-/* S2: x~ = x + alpha_f dt dx/dt. */
-GS4I_INLINE void gs4i_predicted_position(const gs4i_particles *p, size_t i, gs4i_reach reach, gs4i_quad *x)
+/* Particles i to i + n. */
+GS4I_INLINE void gs4i_load_batch(const gs4i_particles *p, size_t i, int n, gs4i_reach reach, gs4i_batch *q)
 {
-    gs4i_quad rate;
-    GS4I_LOAD(*x, p->position + 4 * i);
-    gs4i_position_rate(p, i, reach.shift, &rate);
-    GS4I_SPLAT_MAD(*x, reach.ahead, rate);
+    gs4_real halves[4 * GS4I_BATCH];
+    gs4i_lanes lag[4];
+    int b, c;
+    gs4i_prefetch_particles(p, i + 4 * GS4I_BATCH);
+    gs4i_to_lanes(p->position + 4 * i, n, q->x);
+    gs4i_to_lanes(p->velocity + 4 * i, n, q->v);
+    if (!p->with_rates) {
+        memset(q->a, 0, sizeof q->a);
+        for (c = 0; c < 3; c++) GS4I_BATCH_LOOP(b) q->move[c][b] = q->v[c][b];
+        return;
+    }
+    gs4i_to_lanes(p->rate + 4 * i, n, q->a);
+    if (n == GS4I_BATCH) for (b = 0; b < 4 * GS4I_BATCH; b++) halves[b] = gs4i_from_half(p->lag[4 * i + (size_t)b]);
+    else for (b = 0; b < 4 * n; b++) halves[b] = gs4i_from_half(p->lag[4 * i + (size_t)b]);
+    gs4i_to_lanes(halves, n, lag);
+    for (c = 0; c < 3; c++) GS4I_BATCH_LOOP(b) q->move[c][b] = (q->v[c][b] - reach.shift * q->a[c][b]) - lag[c][b];
+}
+
+/* S2: x~ = x + alpha_f dt dx/dt. */
+GS4I_INLINE void gs4i_predict_positions(const gs4i_batch *q, gs4i_reach reach, gs4i_lanes x[3])
+{
+    int b, c;
+    for (c = 0; c < 3; c++) GS4I_BATCH_LOOP(b) x[c][b] = q->x[c][b] + reach.ahead * q->move[c][b];
 }
 
 static void gs4i_sort_keys_task(int index, void *context)
 {
     gs4i_sorting *s = (gs4i_sorting *)context;
     const gs4_real origin[3] = { s->g->origin.x, s->g->origin.y, s->g->origin.z };
-    int i, end, a;
+    int i, end, a, b;
     gs4i_chunk(s, index, &i, &end);
-    for (; i < end; i++) {
-        gs4i_quad x;
-        int cell[3];
-        gs4i_predicted_position(s->p, (size_t)i, s->reach, &x);
-        for (a = 0; a < 3; a++) {
-            gs4_real c = (GS4I_LANE(x, a) - origin[a]) * s->g->inv_h;
-            cell[a] = c >= 0 ? (c < GS4I_C(s->g->cells[a]) ? (int)c : s->g->cells[a] - 1) : 0;
+    for (; i < end; i += GS4I_BATCH) {
+        const int n = end - i < GS4I_BATCH ? end - i : GS4I_BATCH;
+        gs4i_batch q;
+        gs4i_lanes x[3];
+        gs4i_load_batch(s->p, (size_t)i, n, s->reach, &q);
+        gs4i_predict_positions(&q, s->reach, x);
+        for (b = 0; b < n; b++) {
+            int cell[3];
+            for (a = 0; a < 3; a++) {
+                const gs4_real c = (GS4I_NTH(x[a], b) - origin[a]) * s->g->inv_h;
+                cell[a] = c >= 0 ? (c < GS4I_C(s->g->cells[a]) ? (int)c : s->g->cells[a] - 1) : 0;
+            }
+            s->p->order[i + b] = gs4i_home_block(s->g, cell);
         }
-        s->p->order[i] = gs4i_home_block(s->g, cell);
     }
 }
 
@@ -1665,22 +1835,65 @@ typedef struct gs4i_law {
 } gs4i_law;
 
 /* Tait: p = (rho0 c0^2 / 7) (J^-7 - 1) in Pa; grows without bound as J -> 0, never below -rho0 c0^2 / 7. */
-GS4I_INLINE gs4_real gs4i_pressure(const gs4i_law *law, gs4_real J)
+GS4I_INLINE void gs4i_pressure(const gs4i_wide *tait, const gs4i_wide *J, gs4i_wide *p)
 {
-    gs4_real i = GS4I_C(1) / J, i2 = i * i, i4 = i2 * i2;
-    return law->tait * (i4 * i2 * i - GS4I_C(1));
+    const gs4i_wide i = GS4I_C(1) / *J, i2 = i * i, i4 = i2 * i2;
+    *p = *tait * (i4 * i2 * i - GS4I_C(1));
 }
 
-/* Speed of sound at J over that at rest: sqrt(-(J^2/rho0) dp/dJ) / c0 = J^-3. */
-GS4I_INLINE gs4_real gs4i_stiffening(gs4_real J) { return GS4I_C(1) / (J * J * J); }
+/* What the particles of a batch need of their materials. */
+typedef struct gs4i_batch_laws {
+    gs4i_lanes inv_density, tait, viscosity, sound_speed;
+    const gs4i_law *of[GS4I_BATCH];
+    int callbacks;                      /* some of those seen so far have one */
+} gs4i_batch_laws;
 
-/* Viscosity (Pa s) from the callback at the shear rate sqrt(2 D:D), of the columns of 2 D. */
-static gs4_real gs4i_viscosity(const gs4i_law *law, const gs4i_quad D2[3])
+/* Consecutive batches mostly have the same materials: only what differs is looked up. */
+GS4I_INLINE void gs4i_take_laws(const gs4i_law *laws, const uint8_t *material, int n, gs4i_batch_laws *l)
+{
+    int b;
+    for (b = 0; b < GS4I_BATCH; b++) {
+        const gs4i_law *law = &laws[material[b < n ? b : 0]];
+        if (law == l->of[b]) continue;
+        l->of[b] = law; l->callbacks |= law->viscosity_fn != NULL;
+        GS4I_NTH(l->inv_density, b) = law->inv_density; GS4I_NTH(l->tait, b) = law->tait;
+        GS4I_NTH(l->viscosity, b) = law->viscosity; GS4I_NTH(l->sound_speed, b) = law->sound_speed;
+    }
+}
+
+/* Viscosity (Pa s) from the callback at the shear rate sqrt(2 D:D). */
+static gs4_real gs4i_viscosity(const gs4i_law *law, gs4_real L[3][3])
 {
     gs4_real sum = 0;
     int i, j;
-    for (j = 0; j < 3; j++) for (i = 0; i < 3; i++) sum += GS4I_LANE(D2[j], i) * GS4I_LANE(D2[j], i);
+    for (j = 0; j < 3; j++) for (i = 0; i < 3; i++) sum += (L[i][j] + L[j][i]) * (L[i][j] + L[j][i]);
     return law->viscosity_fn(0, GS4I_SQRT(GS4I_C(0.5) * sum), law->viscosity_user);
+}
+
+/* Six numbers of a symmetric tensor: xx yy zz xy xz yz. */
+typedef gs4i_lanes gs4i_symmetric[6];
+
+/* Cauchy stress (Pa, tension positive) of Newtonian liquids, -p I + 2 mu D, and the viscosity mu. */
+GS4I_INLINE void gs4i_liquid_stress(const gs4i_batch_laws *l, const gs4i_wide *J, gs4i_gradient L, gs4i_symmetric sigma, gs4i_wide *mu)
+{
+    int b, i, j;
+    GS4I_BATCH_LOOP(b) mu[b] = l->viscosity[b];
+    for (b = 0; b < GS4I_BATCH && l->callbacks; b++)
+        if (l->of[b]->viscosity_fn) {
+            gs4_real own[3][3];
+            for (i = 0; i < 3; i++) for (j = 0; j < 3; j++) own[i][j] = GS4I_NTH(L[i][j], b);
+            GS4I_NTH(mu, b) = gs4i_viscosity(l->of[b], own);
+        }
+    GS4I_BATCH_LOOP(b) {
+        gs4i_wide p;
+        gs4i_pressure(&l->tait[b], &J[b], &p);
+        sigma[0][b] = mu[b] * (L[0][0][b] + L[0][0][b]) - p;
+        sigma[1][b] = mu[b] * (L[1][1][b] + L[1][1][b]) - p;
+        sigma[2][b] = mu[b] * (L[2][2][b] + L[2][2][b]) - p;
+        sigma[3][b] = mu[b] * (L[0][1][b] + L[1][0][b]);
+        sigma[4][b] = mu[b] * (L[0][2][b] + L[2][0][b]);
+        sigma[5][b] = mu[b] * (L[1][2][b] + L[2][1][b]);
+    }
 }
 
 /* Liquids to start from, density (kg/m^3) and viscosity (Pa s) near the temperature given. */
@@ -2212,18 +2425,17 @@ static void gs4i_put_back(const gs4i_boundary *b, const gs4i_grid *g, gs4_real x
     }
 }
 
-/* In the mouth of an emitter a particle goes with the flow: at its velocity, uncompressed, without rates. */
-static void gs4i_hold_in_mouth(const gs4i_boundary *b, const gs4_real x[3], gs4_real v[4], gs4_real rate[4], gs4_real C[9], gs4_real lag[3])
+/* In the mouth of an emitter a particle goes with the flow: at its velocity, uncompressed, without rates. Is it in one? */
+static int gs4i_hold_in_mouth(const gs4i_boundary *b, const gs4_real x[3], gs4_real v[4])
 {
-    int i;
+    int i, held = 0;
     for (i = 0; i < b->body_count; i++) {
         const gs4i_body *body = &b->bodies[i];
         if (!body->is_mouth || body->asleep || gs4i_body_distance(body, gs4i_vec3(x[0], x[1], x[2])) >= 0) continue;
         v[0] = body->flow.x; v[1] = body->flow.y; v[2] = body->flow.z; v[3] = 1;
-        memset(rate, 0, 4 * sizeof *rate);
-        memset(C, 0, 9 * sizeof *C);
-        memset(lag, 0, 3 * sizeof *lag);
+        held = 1;
     }
+    return held;
 }
 
 /* ==== [[state]] what a simulation is =============================================================== */
@@ -2305,12 +2517,9 @@ static void gs4i_report_merge(gs4i_report *into, const gs4i_report *r)
 
 /* ==== [[transfer]] particles to nodes and back ===================================================== *
  *
- * Each kernel does one occupied block: predicted positions, weights, 27 nodes a particle. Kernels that scatter run
- * colour by colour, so that no two tiles in work share a node; sums within a block run in the order of its particles.
- * Within a block particles go in batches, stage by stage: a particle's own chain of operations is long, and several of
- * them overlap only if each loop is short (measured: 1.9 times faster than all stages in one loop). */
-
-enum { GS4I_BATCH = 16 };
+ * Each kernel does one occupied block, batch after batch: load, predict, weights; then 27 nodes a particle, one particle
+ * after another; what particles do by themselves in between goes in lanes. Kernels that scatter run colour by colour, so
+ * that no two tiles in work share a node; sums within a block run in the order of its particles. */
 
 #define GS4I_J_LOW GS4I_C(0.0625)       /* a volume ratio outside of this range is refused */
 #define GS4I_J_HIGH GS4I_C(16)
@@ -2318,121 +2527,118 @@ enum { GS4I_BAD_VOLUME = 1, GS4I_BAD_MOTION, GS4I_BAD_VISCOSITY };
 
 typedef struct gs4i_pass { gs4_sim *sim; const int32_t *blocks; int count; } gs4i_pass;
 
-/* From particle to tile coordinates: (x - origin) / h - first. */
-typedef struct gs4i_frame { gs4i_quad origin, first; gs4_real inv_h; } gs4i_frame;
-
 GS4I_INLINE gs4i_frame gs4i_tile_frame(const gs4i_grid *g, int o)
 {
     gs4i_frame f;
-    int at[3];
+    int at[3], a;
     gs4i_block_coordinates(g, g->occupied_block[o], at);
-    {
-        const gs4i_quad origin = { GS4I_LANES(g->origin.x, g->origin.y, g->origin.z, 0) };
-        const gs4i_quad first = { GS4I_LANES(GS4I_C(4 * at[0] - 6), GS4I_C(4 * at[1] - 6), GS4I_C(4 * at[2] - 6), 0) };
-        f.origin = origin; f.first = first; f.inv_h = g->inv_h;
-    }
+    for (a = 0; a < 3; a++) f.first[a] = GS4I_C(4 * at[a] - 6);
+    f.origin[0] = g->origin.x; f.origin[1] = g->origin.y; f.origin[2] = g->origin.z; f.inv_h = g->inv_h;
     return f;
 }
 
-/* S2: weights at the predicted position. */
-GS4I_INLINE void gs4i_predicted_stencil(const gs4i_particles *p, size_t i, gs4i_reach reach, const gs4i_frame *f, gs4i_stencil *s)
+/* S2: a batch and its weights at the predicted positions. */
+GS4I_INLINE void gs4i_stage_batch(const gs4i_particles *p, size_t i, int n, gs4i_reach reach, const gs4i_frame *f, gs4i_batch *q, gs4i_stencils *s)
 {
-    gs4i_quad x;
-    gs4i_predicted_position(p, i, reach, &x);
-    GS4I_DIFFERENCE(x, x, f->origin);
-    GS4I_SPLAT_MUL(x, f->inv_h, x);
-    GS4I_DIFFERENCE(x, x, f->first);
-    gs4i_stencil_at(s, &x, f->inv_h);
+    gs4i_lanes x[3];
+    gs4i_load_batch(p, i, n, reach, q);
+    gs4i_predict_positions(q, reach, x);
+    gs4i_stencils_at(s, f, x);
 }
 
-/* The columns of a particle's velocity gradient, lane 3 zero. */
-GS4I_INLINE void gs4i_load_affine(const gs4_real *C, gs4i_quad c[3])
+/* --- what a pass sees, for its report ---------------------------------------------------------------- */
+
+typedef struct gs4i_seen { gs4i_lanes min_J, max_J, max_viscosity, max_sound, speed2, gradient2; int bad; } gs4i_seen;
+
+GS4I_INLINE void gs4i_see_nothing(gs4i_seen *r)
 {
-    const gs4i_quad mask = { GS4I_LANES(1, 1, 1, 0) };
-    int j;
-    for (j = 0; j < 3; j++) { GS4I_LOAD(c[j], C + 3 * j); GS4I_MUL(c[j], c[j], mask); }
+    int b;
+    memset(r, 0, sizeof *r);
+    GS4I_BATCH_LOOP(b) r->min_J[b] += GS4I_HUGE;
 }
 
-GS4I_INLINE void gs4i_store_affine(gs4_real *C, const gs4i_quad c[3])
+GS4I_INLINE void gs4i_see_liquids(gs4i_seen *r, const gs4i_batch_laws *l, const gs4i_wide *J, const gs4i_wide *mu)
 {
-    gs4_real last[4];
-    GS4I_STORE(C, c[0]); GS4I_STORE(C + 3, c[1]);           /* each overwrites what the one before had too much */
-    GS4I_STORE(last, c[2]);
-    memcpy(C + 6, last, 3 * sizeof *C);
-}
-
-GS4I_INLINE void gs4i_store_lag(gs4i_half *to, const gs4i_quad *lag)
-{
-    int a;
-    for (a = 0; a < 3; a++) to[a] = gs4i_to_half(GS4I_LANE(*lag, a));
-}
-
-/* Sums over i of |column i|^2: its three lanes add up to |C|^2. */
-GS4I_INLINE void gs4i_squares(const gs4i_quad c[3], gs4i_quad *n)
-{
-    GS4I_MUL(*n, c[0], c[0]); GS4I_MAD(*n, c[1], c[1]); GS4I_MAD(*n, c[2], c[2]);
-}
-
-GS4I_INLINE gs4_real gs4i_sum3(const gs4i_quad *q) { return (GS4I_LANE(*q, 0) + GS4I_LANE(*q, 1)) + GS4I_LANE(*q, 2); }
-
-/* |C| dt is bounded by 1/4: the factor that makes it so. */
-GS4I_INLINE gs4_real gs4i_affine_bound(const gs4i_quad c[3], gs4_real dt)
-{
-    gs4i_quad n;
-    gs4_real squared;
-    gs4i_squares(c, &n);
-    squared = gs4i_sum3(&n) * (dt * dt);
-    return squared > GS4I_C(0.0625) ? GS4I_C(0.25) / GS4I_SQRT(squared) : GS4I_C(1);
-}
-
-/* tile += w_ip (m v + Q (x_i - x), m): a velocity field that is affine around the particle; mv has m in lane 3, the columns
- * of Q (kg/s) have 0 there. Written from the middle node: w_ij (B + (i - 1) Q_x h + (j - 1) Q_y h + (k - 1) Q_z h). */
-GS4I_INLINE void gs4i_scatter_affine(gs4_real *tile, const gs4i_stencil *s, gs4_real h, const gs4i_quad *mv, const gs4i_quad Q[3])
-{
-    gs4i_row w, wx, v, p0, p1, p2, side[3], r, t;
-    gs4i_quad qx, qy, qz, b, product, by_node[3], y[3];
-    gs4_real yz[3][4];
-    int j, k;
-    GS4I_SPLAT_MUL(qx, h, Q[0]); GS4I_SPLAT_MUL(qy, h, Q[1]); GS4I_SPLAT_MUL(qz, h, Q[2]);
-    b = *mv;
-    GS4I_SPLAT_MAD(b, -GS4I_LANE(s->xi, 0), qx); GS4I_SPLAT_MAD(b, -GS4I_LANE(s->xi, 1), qy); GS4I_SPLAT_MAD(b, -GS4I_LANE(s->xi, 2), qz);
-    GS4I_LOAD(by_node[0], s->w[0]); GS4I_LOAD(by_node[1], s->w[1]); GS4I_LOAD(by_node[2], s->w[2]);
-    gs4i_transpose(&by_node[0], &by_node[1], &by_node[2], y);
-    for (k = 0; k < 3; k++) { GS4I_SPLAT_MUL(product, s->w[k][2], y[1]); GS4I_STORE(yz[k], product); }      /* w_j w_k */
-    gs4i_row_of_nodes(&w, s->w[0][0], s->w[1][0], s->w[2][0]);
-    gs4i_row_of_nodes(&wx, -s->w[0][0], 0, s->w[2][0]);
-    gs4i_row_of_quad(&v, &b); GS4I_ROW_MUL(p0, w, v);
-    gs4i_row_of_quad(&v, &qx); GS4I_ROW_MAD(p0, wx, v);
-    gs4i_row_of_quad(&v, &qy); GS4I_ROW_MUL(p1, w, v);
-    gs4i_row_of_quad(&v, &qz); GS4I_ROW_MUL(p2, w, v);
-    for (j = 0; j < 3; j++) {
-        if (j == 0) GS4I_ROW_DIFFERENCE(side[1], p0, p1); else if (j == 1) side[1] = p0; else GS4I_ROW_SUM(side[1], p0, p1);
-        GS4I_ROW_DIFFERENCE(side[0], side[1], p2);
-        GS4I_ROW_SUM(side[2], side[1], p2);
-        for (k = 0; k < 3; k++) {
-            gs4_real *row = tile + 4 * (s->base + GS4I_TILE * (GS4I_TILE * k + j));
-            GS4I_ROW_LOAD(r, row);
-            GS4I_ROW_SPLAT_MUL(t, yz[k][j], side[k]);
-            GS4I_ROW_SUM(r, r, t);
-            GS4I_ROW_STORE(row, r);
-        }
+    int b;
+    GS4I_BATCH_LOOP(b) {
+        const gs4i_wide viscosity = mu[b] * l->inv_density[b], sound = l->sound_speed[b] / (J[b] * J[b] * J[b]);     /* by (3) */
+        GS4I_WIDE_MIN(r->min_J[b], r->min_J[b], J[b]); GS4I_WIDE_MAX(r->max_J[b], r->max_J[b], J[b]);
+        GS4I_WIDE_MAX(r->max_viscosity[b], r->max_viscosity[b], viscosity);
+        GS4I_WIDE_MAX(r->max_sound[b], r->max_sound[b], sound);
     }
 }
 
-/* tile += w_ij q */
-GS4I_INLINE void gs4i_scatter_quad(gs4_real *tile, const gs4i_stencil *s, const gs4i_quad *q)
+/* Largest speed along an axis and largest |L|, squared */
+GS4I_INLINE void gs4i_see_motion(gs4i_seen *r, gs4i_lanes v[3], gs4i_gradient L)
+{
+    int b, i, j;
+    GS4I_BATCH_LOOP(b) {
+        gs4i_wide sum;
+        for (i = 0; i < 3; i++) { sum = v[i][b] * v[i][b]; GS4I_WIDE_MAX(r->speed2[b], r->speed2[b], sum); }
+        sum = L[0][0][b] * L[0][0][b];
+        for (j = 1; j < 9; j++) sum += L[j / 3][j % 3][b] * L[j / 3][j % 3][b];
+        GS4I_WIDE_MAX(r->gradient2[b], r->gradient2[b], sum);
+    }
+}
+
+static gs4_real gs4i_largest(const gs4i_wide *lanes)
+{
+    gs4_real most = 0;
+    int n;
+    for (n = 0; n < GS4I_BATCH; n++) most = gs4i_max(most, GS4I_NTH_CONST(lanes, n));
+    return most;
+}
+
+static void gs4i_report_liquids(gs4i_report *r, const gs4i_seen *s)
+{
+    int n;
+    for (n = 0; n < GS4I_BATCH; n++) r->min_J = gs4i_min(r->min_J, GS4I_NTH_CONST(s->min_J, n));
+    r->max_J = gs4i_largest(s->max_J); r->max_viscosity = gs4i_largest(s->max_viscosity); r->max_sound = gs4i_largest(s->max_sound);
+}
+
+static void gs4i_report_motion(gs4i_report *r, const gs4i_seen *s)
+{
+    r->max_speed = gs4i_largest(s->speed2); r->max_gradient = gs4i_largest(s->gradient2);
+}
+
+GS4I_INLINE void gs4i_see_bad(gs4i_report *r, int reason, uint32_t id)
+{
+    if (!r->bad) { r->bad = reason; r->bad_id = id; }
+}
+
+/* Volume ratios and viscosities that cannot be trusted: seen at once in lanes, looked for one by one only when there are some. */
+GS4I_INLINE void gs4i_check_liquids(gs4i_report *r, gs4i_lanes J, gs4i_lanes mu, const uint32_t *id, int n)
+{
+    int b, good = 1;
+    GS4I_BATCH_LOOP(b) {
+        const gs4i_wide_mask fine = (J[b] > GS4I_J_LOW) & (J[b] < GS4I_J_HIGH) & (mu[b] >= GS4I_C(0)) & (mu[b] < GS4I_HUGE);
+        good &= gs4i_all(&fine);
+    }
+    for (b = 0; b < n && !good; b++) {
+        const gs4_real own_J = GS4I_NTH(J, b), own_mu = GS4I_NTH(mu, b);
+        if (!(own_J > GS4I_J_LOW && own_J < GS4I_J_HIGH)) gs4i_see_bad(r, GS4I_BAD_VOLUME, id[b]);
+        if (!(own_mu >= 0 && own_mu < GS4I_HUGE)) gs4i_see_bad(r, GS4I_BAD_VISCOSITY, id[b]);
+    }
+}
+
+/* --- S3 ---------------------------------------------------------------------------------------------- */
+
+/* tile += w_ij q, for particle n of a batch */
+GS4I_INLINE void gs4i_scatter_quad(gs4_real *tile, const gs4i_stencils *s, int n, const gs4_real *from)
 {
     gs4i_row w, p, r, t;
+    gs4i_quad q;
     int j, k;
-    gs4i_row_of_nodes(&w, s->w[0][0], s->w[1][0], s->w[2][0]);
-    gs4i_row_of_quad(&p, q);
+    GS4I_LOAD(q, from);
+    gs4i_row_of_nodes(&w, GS4I_NTH_CONST(s->w[0][0], n), GS4I_NTH_CONST(s->w[0][1], n), GS4I_NTH_CONST(s->w[0][2], n));
+    gs4i_row_of_quad(&p, &q);
     GS4I_ROW_MUL(p, w, p);
     for (k = 0; k < 3; k++) {
-        GS4I_ROW_SPLAT_MUL(t, s->w[k][2], p);
+        GS4I_ROW_SPLAT_MUL(t, GS4I_NTH_CONST(s->w[2][k], n), p);
         for (j = 0; j < 3; j++) {
-            gs4_real *row = tile + 4 * (s->base + GS4I_TILE * (GS4I_TILE * k + j));
+            gs4_real *row = tile + 4 * (s->base[n] + GS4I_TILE * (GS4I_TILE * k + j));
             GS4I_ROW_LOAD(r, row);
-            GS4I_ROW_SPLAT_MAD(r, s->w[j][1], t);
+            GS4I_ROW_SPLAT_MAD(r, GS4I_NTH_CONST(s->w[1][j], n), t);
             GS4I_ROW_STORE(row, r);
         }
     }
@@ -2443,37 +2649,32 @@ static void gs4i_scatter_momentum(int index, void *context)
 {
     const gs4i_pass *pass = (const gs4i_pass *)context;
     gs4_sim *sim = pass->sim;
-    const gs4i_particles p = sim->particles;               /* copies: stores cannot alias them */
+    const gs4i_particles p = sim->particles;               /* a copy: stores cannot alias it */
     const gs4i_reach reach = sim->rule.reach;
     const int o = pass->blocks[index];
     const gs4i_frame frame = gs4i_tile_frame(&sim->grid, o);
     gs4_real tile[GS4I_TILE_REALS];
+    int row = 0;
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
     int strayed = 0;
     uint64_t rows = 0;
     gs4i_report_clear(&sim->reports[o]);
     memset(tile, 0, sizeof tile);
-    gs4i_tile_prefetch(&sim->grid, o, sim->grid.momentum);
-    for (; i < end; i += GS4I_BATCH) {
+    for (; i < end; i += GS4I_BATCH, row += 2) {
         const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
-        gs4i_stencil s[GS4I_BATCH];
-        gs4i_quad mv[GS4I_BATCH];
-        int b;
+        gs4i_batch q;
+        gs4i_stencils s;
+        gs4i_lanes mv[3];
+        gs4_real momentum[4 * GS4I_BATCH];
+        int b, c;
+        gs4i_tile_prefetch(&sim->grid, o, row, sim->grid.momentum);
+        gs4i_stage_batch(&p, i, n, reach, &frame, &q, &s);
+        for (c = 0; c < 3; c++) GS4I_BATCH_LOOP(b) mv[c][b] = q.x[3][b] * (q.v[c][b] + reach.ahead * q.a[c][b]);
+        gs4i_from_lanes(mv[0], mv[1], mv[2], q.x[3], momentum);
         for (b = 0; b < n; b++) {
-            const size_t k = i + (size_t)b;
-            const gs4_real m = p.position[4 * k + 3];
-            gs4i_quad a;
-            gs4i_predicted_stencil(&p, k, reach, &frame, &s[b]);
-            GS4I_LOAD(mv[b], p.velocity + 4 * k);
-            GS4I_LOAD(a, p.rate + 4 * k);
-            GS4I_SPLAT_MAD(mv[b], reach.ahead, a);
-            GS4I_SPLAT_MUL(mv[b], m, mv[b]);
-            GS4I_LANE(mv[b], 3) = m;
-        }
-        for (b = 0; b < n; b++) {
-            if (s[b].base < 0) { strayed++; continue; }
-            rows |= gs4i_touched_rows(s[b].base);
-            gs4i_scatter_quad(tile, &s[b], &mv[b]);
+            if (s.base[b] < 0) { strayed++; continue; }
+            rows |= gs4i_touched_rows(s.base[b]);
+            gs4i_scatter_quad(tile, &s, b, momentum + 4 * b);
         }
     }
     sim->reports[o].strayed = strayed;
@@ -2481,130 +2682,113 @@ static void gs4i_scatter_momentum(int index, void *context)
     gs4i_tile_add(&sim->grid, o, rows, tile, sim->grid.momentum);
 }
 
-/* Cauchy stress (Pa, tension positive, by columns) of a Newtonian liquid, -p I + 2 mu D. Returns the viscosity used. */
-GS4I_INLINE gs4_real gs4i_liquid_stress(const gs4i_law *law, gs4_real J, const gs4i_quad L[3], gs4i_quad sigma[3])
+/* --- S4, S5 ------------------------------------------------------------------------------------------ */
+
+/* Forces of a batch on its way to the nodes: the columns of -V sigma, and m g; four numbers a particle. */
+typedef struct gs4i_forces { gs4_real x[4 * GS4I_BATCH], y[4 * GS4I_BATCH], z[4 * GS4I_BATCH], weight[4 * GS4I_BATCH]; } gs4i_forces;
+
+/* Volume and stress at the stage, J~ by rule 1, implicit in itself for known div v: (J~ - J**) / s = J~ div v. */
+GS4I_INLINE void gs4i_stage_forces(const gs4i_batch *q, const gs4i_batch_laws *l, gs4i_rule rule, gs4i_gradient L, const gs4_real gravity[3],
+                                   gs4i_forces *f, gs4i_lanes J, gs4i_lanes mu)
 {
-    const gs4_real p = gs4i_pressure(law, J);
-    const gs4i_quad px = { GS4I_LANES(p, 0, 0, 0) }, py = { GS4I_LANES(0, p, 0, 0) }, pz = { GS4I_LANES(0, 0, p, 0) };
-    gs4i_quad D2[3];                                        /* 2 D = L + L^T */
-    gs4_real mu;
-    gs4i_transpose(&L[0], &L[1], &L[2], D2);
-    GS4I_SUM(D2[0], D2[0], L[0]); GS4I_SUM(D2[1], D2[1], L[1]); GS4I_SUM(D2[2], D2[2], L[2]);
-    mu = law->viscosity_fn ? gs4i_viscosity(law, D2) : law->viscosity;
-    GS4I_SPLAT_MUL(sigma[0], mu, D2[0]); GS4I_SPLAT_MUL(sigma[1], mu, D2[1]); GS4I_SPLAT_MUL(sigma[2], mu, D2[2]);
-    GS4I_DIFFERENCE(sigma[0], sigma[0], px); GS4I_DIFFERENCE(sigma[1], sigma[1], py); GS4I_DIFFERENCE(sigma[2], sigma[2], pz);
-    return mu;
+    gs4i_symmetric sigma;
+    gs4i_lanes g[3], none;
+    int b, c;
+    GS4I_BATCH_LOOP(b) {
+        const gs4i_wide div = L[0][0][b] + L[1][1][b] + L[2][2][b];
+        J[b] = (q->v[3][b] + (rule.reach.ahead - rule.s) * q->a[3][b]) / (GS4I_C(1) - rule.s * div);
+    }
+    gs4i_liquid_stress(l, J, L, sigma, mu);
+    for (c = 0; c < 6; c++) GS4I_BATCH_LOOP(b) sigma[c][b] *= -q->x[3][b] * l->inv_density[b] * J[b];
+    for (c = 0; c < 3; c++) GS4I_BATCH_LOOP(b) g[c][b] = q->x[3][b] * gravity[c];
+    memset(none, 0, sizeof none);
+    gs4i_from_lanes(sigma[0], sigma[3], sigma[4], none, f->x);
+    gs4i_from_lanes(sigma[3], sigma[1], sigma[5], none, f->y);
+    gs4i_from_lanes(sigma[4], sigma[5], sigma[2], none, f->z);
+    gs4i_from_lanes(g[0], g[1], g[2], none, f->weight);
 }
 
-/* Extremes of a liquid on its way through a pass. */
-typedef struct gs4i_seen { gs4_real min_J, max_J, max_viscosity, max_sound; } gs4i_seen;
-
-GS4I_INLINE void gs4i_see_liquid(gs4i_seen *r, const gs4i_law *law, gs4_real J, gs4_real mu)
+/* tile += (-V sigma) grad w + w m g, for particle n of a batch */
+GS4I_INLINE void gs4i_scatter_force(gs4_real *tile, const gs4i_stencils *s, int n, const gs4i_forces *f)
 {
-    r->min_J = gs4i_min(r->min_J, J); r->max_J = gs4i_max(r->max_J, J);
-    r->max_viscosity = gs4i_max(r->max_viscosity, mu * law->inv_density);
-    r->max_sound = gs4i_max(r->max_sound, law->sound_speed * gs4i_stiffening(J));
+    gs4i_row p0, p1, p2, r, w, d;
+    gs4i_quad q;
+    gs4i_x_weights(s, n, &w, &d);
+    GS4I_LOAD(q, f->x + 4 * n);      gs4i_row_of_quad(&r, &q); GS4I_ROW_MUL(p0, d, r);
+    GS4I_LOAD(q, f->weight + 4 * n); gs4i_row_of_quad(&r, &q); GS4I_ROW_MAD(p0, w, r);
+    GS4I_LOAD(q, f->y + 4 * n);      gs4i_row_of_quad(&r, &q); GS4I_ROW_MUL(p1, w, r);
+    GS4I_LOAD(q, f->z + 4 * n);      gs4i_row_of_quad(&r, &q); GS4I_ROW_MUL(p2, w, r);
+    gs4i_scatter_rows(tile + 4 * s->base[n], &p0, &p1, &p2, s, n);
 }
 
-static void gs4i_report_liquid(gs4i_report *r, const gs4i_seen *seen)
-{
-    r->min_J = seen->min_J; r->max_J = seen->max_J; r->max_viscosity = seen->max_viscosity; r->max_sound = seen->max_sound;
-}
-
-GS4I_INLINE void gs4i_see_bad(gs4i_report *r, int reason, uint32_t id)
-{
-    if (!r->bad) { r->bad = reason; r->bad_id = id; }
-}
-
-/* Stress at the stage of one particle: f = columns of -V sigma, and m g. */
-GS4I_INLINE void gs4i_stage_force(const gs4i_law *laws, const gs4i_particles *p, size_t i, gs4_real reach, gs4_real weight,
-                                  const gs4i_local *n, const gs4i_quad *g, gs4i_quad f[4], gs4i_seen *seen, gs4i_report *report)
-{
-    const gs4i_law *law = &laws[p->material[i]];
-    const gs4_real m = p->position[4 * i + 3], J = p->velocity[4 * i + 3], Jr = p->rate[4 * i + 3];
-    const gs4_real div = GS4I_LANE(n->dx, 0) + GS4I_LANE(n->dy, 1) + GS4I_LANE(n->dz, 2);
-    const gs4_real stage_J = (J + (reach - weight) * Jr) / (1 - weight * div);      /* (J~ - J**) / s = J~ div v */
-    const gs4_real V = -m * law->inv_density * stage_J;
-    gs4i_quad L[3], sigma[3];
-    gs4_real mu;
-    L[0] = n->dx; L[1] = n->dy; L[2] = n->dz;
-    mu = gs4i_liquid_stress(law, stage_J, L, sigma);
-    if (!(stage_J > GS4I_J_LOW && stage_J < GS4I_J_HIGH)) gs4i_see_bad(report, GS4I_BAD_VOLUME, p->id[i]);
-    if (!(mu >= 0 && mu < GS4I_HUGE)) gs4i_see_bad(report, GS4I_BAD_VISCOSITY, p->id[i]);
-    gs4i_see_liquid(seen, law, stage_J, mu);
-    GS4I_SPLAT_MUL(f[0], V, sigma[0]); GS4I_SPLAT_MUL(f[1], V, sigma[1]); GS4I_SPLAT_MUL(f[2], V, sigma[2]);
-    GS4I_SPLAT_MUL(f[3], m, *g);
-}
-
-/* tile += (-V sigma) grad w + w m g */
-GS4I_INLINE void gs4i_scatter_force(gs4_real *tile, gs4i_stencil *s, const gs4i_row *w, const gs4i_row *d, const gs4i_quad f[4])
-{
-    gs4i_row p0, p1, p2, r;
-    gs4i_row_of_quad(&r, &f[0]); GS4I_ROW_MUL(p0, *d, r);
-    gs4i_row_of_quad(&r, &f[3]); GS4I_ROW_MAD(p0, *w, r);
-    gs4i_row_of_quad(&r, &f[1]); GS4I_ROW_MUL(p1, *w, r);
-    gs4i_row_of_quad(&r, &f[2]); GS4I_ROW_MUL(p2, *w, r);
-    gs4i_scatter_rows(tile + 4 * s->base, &p0, &p1, &p2, s->w, s->d);
-}
-
-/* S4 and S5: L~ = sum v_i (x) grad w, J~ by rule 1 and implicit in itself for known L~, stress there, and
- * f_i = - sum V sigma grad w + sum w m g. */
+/* S4 and S5: L~ = sum v_i (x) grad w, J~ and stress there, and f_i = - sum V sigma grad w + sum w m g. */
 static void gs4i_scatter_forces(int index, void *context)
 {
     const gs4i_pass *pass = (const gs4i_pass *)context;
     gs4_sim *sim = pass->sim;
-    const gs4i_particles p = sim->particles;               /* copies: stores cannot alias them */
-    const gs4i_reach reach = sim->rule.reach;
-    const gs4_real weight = sim->rule.s;
-    const int o = pass->blocks[index];
+    const gs4i_particles p = sim->particles;
+    const gs4i_rule rule = sim->rule;
+    const int o = pass->blocks[index], next = pass->blocks[index + 1 < pass->count ? index + 1 : index];
     const gs4i_frame frame = gs4i_tile_frame(&sim->grid, o);
-    const gs4i_quad g = { GS4I_LANES(sim->desc.gravity.x, sim->desc.gravity.y, sim->desc.gravity.z, 0) };
+    const gs4_real gravity[3] = { sim->desc.gravity.x, sim->desc.gravity.y, sim->desc.gravity.z };
     gs4i_report *report = &sim->reports[o];
-    const gs4i_law *laws = sim->laws;
-    gs4i_seen seen = { GS4I_HUGE, 0, 0, 0 };
+    gs4i_batch_laws laws;
+    gs4i_seen seen;
     gs4_real nodes[GS4I_TILE_REALS], tile[GS4I_TILE_REALS];
+    int row = 0;
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
     gs4i_tile_load(&sim->grid, o, report->rows, sim->grid.momentum, nodes);
-    if (index + 1 < pass->count) gs4i_tile_prefetch(&sim->grid, pass->blocks[index + 1], sim->grid.momentum);
     memset(tile, 0, sizeof tile);
-    gs4i_tile_prefetch(&sim->grid, o, sim->grid.force);
-    for (; i < end; i += GS4I_BATCH) {
+    memset(&laws, 0, sizeof laws);
+    gs4i_see_nothing(&seen);
+    for (; i < end; i += GS4I_BATCH, row += 2) {
         const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
-        gs4i_stencil s[GS4I_BATCH];
-        gs4i_local L[GS4I_BATCH];
-        gs4i_quad f[GS4I_BATCH][4];                         /* -V sigma by columns, and the weight */
-        gs4i_row w, d;
+        gs4i_batch q;
+        gs4i_stencils s;
+        gs4i_gathered v;
+        gs4i_gradient L;
+        gs4i_lanes J, mu;
+        gs4i_forces f;
         int b;
-        for (b = 0; b < n; b++) gs4i_predicted_stencil(&p, i + (size_t)b, reach, &frame, &s[b]);
+        gs4i_tile_prefetch(&sim->grid, next, row, sim->grid.momentum);
+        gs4i_tile_prefetch(&sim->grid, o, row, sim->grid.force);
+        gs4i_stage_batch(&p, i, n, rule.reach, &frame, &q, &s);
         for (b = 0; b < n; b++) {
-            gs4i_x_weights(&s[b], &w, &d);
-            gs4i_gather_local(nodes + 4 * s[b].base, &s[b], &w, &d, &L[b]);
+            gs4i_row w, d;
+            gs4i_x_weights(&s, b, &w, &d);
+            gs4i_gather_local(nodes + 4 * s.base[b], &s, b, &w, &d, &v);
         }
-        for (b = 0; b < n; b++) gs4i_stage_force(laws, &p, i + (size_t)b, reach.ahead, weight, &L[b], &g, f[b], &seen, report);
-        for (b = 0; b < n; b++) {
-            gs4i_x_weights(&s[b], &w, &d);
-            gs4i_scatter_force(tile, &s[b], &w, &d, f[b]);
-        }
+        gs4i_gradient_lanes(v.dx, v.dy, v.dz, n, L);
+        gs4i_take_laws(sim->laws, p.material + i, n, &laws);
+        gs4i_stage_forces(&q, &laws, rule, L, gravity, &f, J, mu);
+        gs4i_see_liquids(&seen, &laws, J, mu);
+        gs4i_check_liquids(report, J, mu, p.id + i, n);
+        for (b = 0; b < n; b++) gs4i_scatter_force(tile, &s, b, &f);
     }
-    gs4i_report_liquid(report, &seen);
+    gs4i_report_liquids(report, &seen);
     gs4i_tile_add(&sim->grid, o, report->rows, tile, sim->grid.force);
 }
 
+/* --- S7 ---------------------------------------------------------------------------------------------- */
+
 /* Whether any block around occupied block o has jumps; then their tile, with 1 in lane 3 of images in contact, else 0. */
-static int gs4i_load_jumps(const gs4i_grid *g, int o, gs4_real *tile)
+static int gs4i_load_jumps(const gs4i_grid *g, int o, uint64_t rows, gs4_real *tile)
 {
-    int any = 0, i, x, y, z;
     const int32_t *nb = g->neighbour + 27 * (size_t)o;
+    int any = 0, i, row, e;
     for (i = 0; i < 27; i++) any |= g->jump_of[nb[i]];
     if (!any) return 0;
     memset(tile, 0, GS4I_TILE_REALS * sizeof *tile);
-    for (z = 0; z < GS4I_TILE; z++) for (y = 0; y < GS4I_TILE; y++) for (x = 0; x < GS4I_TILE; x += 2) {    /* two nodes at once */
-        const int32_t slot = nb[((z + 2) / 4 * 3 + (y + 2) / 4) * 3 + (x + 2) / 4];
-        gs4_real *to;
-        if (!g->jump_of[slot]) continue;
-        to = tile + 4 * ((z * GS4I_TILE + y) * GS4I_TILE + x);
-        memcpy(to, gs4i_jump_at(g, (uint32_t)slot * 64 + (uint32_t)((((z + 2) & 3) << 4) | (((y + 2) & 3) << 2) | ((x + 2) & 3))), 8 * sizeof *tile);
-        to[3] = GS4I_C(((int)to[3] & 7) != 0); to[7] = GS4I_C(((int)to[7] & 7) != 0);
+    for (row = 0; row < 64; row++, tile += 4 * GS4I_TILE) {
+        ptrdiff_t at[3];
+        if (!(rows >> row & 1)) continue;
+        gs4i_tile_row(g, o, row & 7, row >> 3, at);
+        for (i = 0; i < 3; i++) {
+            static const int from[3] = { 8, 0, 0 }, to[3] = { 0, 8, 24 }, count[3] = { 8, 16, 8 };
+            if (!g->jump_of[at[i] / GS4I_NODE_REALS]) continue;
+            memcpy(tile + to[i], gs4i_jump_at(g, (uint32_t)(at[i] / 4)) + from[i], (size_t)count[i] * sizeof *tile);
+            for (e = to[i] + 3; e < to[i] + count[i]; e += 4) tile[e] = GS4I_C(((int)tile[e] & 7) != 0);
+        }
     }
     return 1;
 }
@@ -2618,173 +2802,171 @@ static int gs4i_at_edge(const gs4i_grid *g, int o)
     return edge;
 }
 
-GS4I_INLINE int gs4i_has_left(const gs4i_grid *g, const gs4i_quad *x)
+/* How little the grid sees of a particle among few others, by how full its nodes are: 1 below 8 %, smoothly to 0 at 20 %.
+ * What it does not see of such spray would swing ever more (nodes this light take no part in the corrected gradient), so
+ * there it fades at the rate c0 / h; so it does at walls, by the weight of the images. Both are rates: dt does not matter. */
+GS4I_INLINE void gs4i_unseen(const gs4i_wide *filled, gs4i_wide *unseen)
 {
-    return !(GS4I_LANE(*x, 0) >= g->origin.x && GS4I_LANE(*x, 0) < g->origin.x + GS4I_C(g->cells[0]) * g->h
-          && GS4I_LANE(*x, 1) >= g->origin.y && GS4I_LANE(*x, 1) < g->origin.y + GS4I_C(g->cells[1]) * g->h
-          && GS4I_LANE(*x, 2) >= g->origin.z && GS4I_LANE(*x, 2) < g->origin.z + GS4I_C(g->cells[2]) * g->h);
+    const gs4i_wide zero = *filled - *filled, one = zero + GS4I_C(1);
+    gs4i_wide t = (*filled - GS4I_C(0.08)) * GS4I_C(1 / 0.12);
+    GS4I_WIDE_MIN(t, t, one);
+    GS4I_WIDE_MAX(t, t, zero);
+    *unseen = one - t * t * (GS4I_C(3) - GS4I_C(2) * t);
 }
 
-/* A particle as S7 leaves it, and what nodes and contact said. */
-typedef struct gs4i_corrected { gs4i_quad x, v, a, lag /* before: dx/dt */, C[3]; } gs4i_corrected;
+/* What nodes and contact say to a batch in S7. */
+typedef struct gs4i_corrections { gs4i_lanes U[4] /* and mass there */, A[4], jump[4] /* and the share of images */; gs4i_gradient L; } gs4i_corrections;
 
-/* S7. Velocity by rule 1, the motion that the grid cannot see (v - U) decaying at its rate, implicit in itself; J by 2021
- * (57), implicit in J for known div u; both as one quad (v, J) with its rate. Position by rule 1 with the grid's velocity U. */
-GS4I_INLINE void gs4i_correct_one(const gs4i_rule *r, const gs4i_local *u, const gs4i_quad *acc, const gs4i_quad *jump, gs4i_corrected *q)
+/* S7. Velocity by rule 1, the motion that the grid cannot see (v - U) decaying at its rate k, implicit in itself; J by 2021
+ * (57), implicit in J for known div u; position by rule 1 with the grid's velocity U. In: move is dx/dt; out: what the new
+ * dx/dt lags behind v - shift a. */
+GS4I_INLINE void gs4i_correct_batch(gs4i_rule r, const gs4i_corrections *k, gs4i_batch *q)
 {
-    const gs4_real J = GS4I_LANE(q->v, 3), Jr = GS4I_LANE(q->a, 3);
-    const gs4_real div = GS4I_LANE(u->dx, 0) + GS4I_LANE(u->dy, 1) + GS4I_LANE(u->dz, 2);
-    gs4i_quad change, t;
-    t = q->v; GS4I_SPLAT_MAD(t, r->reach.ahead - r->s, q->a);           /* v** */
-    GS4I_DIFFERENCE(t, u->value, t);
-    GS4I_SPLAT_MUL(t, r->decay, t);
-    GS4I_SUM(t, t, *acc);
-    GS4I_SPLAT_MUL(t, r->damped, t);                                    /* a~ = (sum w acc - k (v** - U)) / (1 + s k) */
-    GS4I_DIFFERENCE(change, t, q->a);
-    GS4I_SPLAT_MUL(change, r->inv_alpha_m, change);
-    GS4I_LANE(change, 3) = ((J + r->reach.ahead * Jr) * div - Jr) / (r->alpha_m - r->alpha_f * r->gamma * r->dt * div);
-    GS4I_SPLAT_MAD(q->v, r->dt, q->a);
-    GS4I_SPLAT_MAD(q->v, r->gamma * r->dt, change);
-    GS4I_SUM(q->v, q->v, *jump);
-    GS4I_SUM(q->a, q->a, change);
-    GS4I_SUM(q->lag, q->lag, *jump);
-    GS4I_DIFFERENCE(t, u->value, q->lag);
-    GS4I_SPLAT_MUL(t, r->inv_alpha_m, t);
-    GS4I_SPLAT_MAD(q->x, r->dt, q->lag);
-    GS4I_SPLAT_MAD(q->x, r->gamma * r->dt, t);
-    GS4I_SUM(t, q->lag, t);                                             /* the new dx/dt */
-    GS4I_DIFFERENCE(q->lag, q->v, t);
-    GS4I_SPLAT_MAD(q->lag, -r->next_shift, q->a);
-    q->C[0] = u->dx; q->C[1] = u->dy; q->C[2] = u->dz;
+    gs4i_lanes decay, damped;
+    int b, c;
+    GS4I_BATCH_LOOP(b) {
+        const gs4i_wide filled = k->U[3][b] * r.inv_full;
+        gs4i_wide unseen;
+        gs4i_unseen(&filled, &unseen);
+        decay[b] = r.decay + (unseen + k->jump[3][b]) * r.fast_decay;
+        damped[b] = GS4I_C(1) / (GS4I_C(1) + r.s * decay[b]);
+    }
+    for (c = 0; c < 3; c++)
+        GS4I_BATCH_LOOP(b) {
+            const gs4i_wide v = q->v[c][b], a = q->a[c][b], move = q->move[c][b] + k->jump[c][b];
+            const gs4i_wide stage_a = (k->A[c][b] + decay[b] * (k->U[c][b] - (v + (r.reach.ahead - r.s) * a))) * damped[b];
+            const gs4i_wide da = (stage_a - a) * r.inv_alpha_m, change = (k->U[c][b] - move) * r.inv_alpha_m;
+            q->v[c][b] = ((v + r.dt * a) + r.gamma * r.dt * da) + k->jump[c][b];
+            q->a[c][b] = a + da;
+            q->x[c][b] = (q->x[c][b] + r.dt * move) + r.gamma * r.dt * change;
+            q->move[c][b] = (q->v[c][b] - (move + change)) - r.next_shift * q->a[c][b];
+        }
+    GS4I_BATCH_LOOP(b) {
+        const gs4i_wide J = q->v[3][b], Jr = q->a[3][b], div = k->L[0][0][b] + k->L[1][1][b] + k->L[2][2][b];
+        const gs4i_wide dJ = ((J + r.reach.ahead * Jr) * div - Jr) / (r.alpha_m - r.alpha_f * r.gamma * r.dt * div);
+        q->v[3][b] = (J + r.dt * Jr) + r.gamma * r.dt * dJ;
+        q->a[3][b] = Jr + dJ;
+    }
 }
 
-/* Walls, bodies and mouths on one particle after the step. */
-static void gs4i_correct_contact(gs4_sim *sim, gs4i_corrected *q, gs4i_report *report)
+/* A batch as it goes back to memory: four numbers a particle, four halves of the lag. */
+typedef struct gs4i_stored { gs4_real x[4 * GS4I_BATCH], v[4 * GS4I_BATCH], a[4 * GS4I_BATCH]; gs4i_half lag[4 * GS4I_BATCH]; } gs4i_stored;
+
+GS4I_INLINE void gs4i_pack_batch(const gs4i_batch *q, int with_rates, gs4i_stored *o)
 {
-    gs4_real x[4], v[4], a[4], lag[4], C[9];
-    int j;
-    GS4I_STORE(x, q->x); GS4I_STORE(v, q->v); GS4I_STORE(a, q->a); GS4I_STORE(lag, q->lag);
-    gs4i_store_affine(C, q->C);
-    gs4i_put_back(&sim->boundary, &sim->grid, x, v);
-    gs4i_hold_in_mouth(&sim->boundary, x, v, a, C, lag);
-    GS4I_LOAD(q->x, x);
-    report->left += gs4i_has_left(&sim->grid, &q->x);
-    GS4I_LOAD(q->v, v); GS4I_LOAD(q->a, a); GS4I_LOAD(q->lag, lag);
-    for (j = 0; j < 3; j++) {
-        const gs4i_quad c = { GS4I_LANES(C[3 * j], C[3 * j + 1], C[3 * j + 2], 0) };
-        q->C[j] = c;
+    gs4_real lag[4 * GS4I_BATCH];
+    gs4i_lanes none;
+    int e;
+    gs4i_from_lanes(q->x[0], q->x[1], q->x[2], q->x[3], o->x);
+    gs4i_from_lanes(q->v[0], q->v[1], q->v[2], q->v[3], o->v);
+    if (!with_rates) return;
+    memset(none, 0, sizeof none);
+    gs4i_from_lanes(q->a[0], q->a[1], q->a[2], q->a[3], o->a);
+    gs4i_from_lanes(q->move[0], q->move[1], q->move[2], none, lag);
+    for (e = 0; e < 4 * GS4I_BATCH; e++) o->lag[e] = gs4i_to_half(lag[e]);
+}
+
+GS4I_INLINE void gs4i_store_batch(const gs4i_particles *p, size_t i, int n, const gs4i_stored *o)
+{
+    memcpy(p->position + 4 * i, o->x, 4 * (size_t)n * sizeof *o->x);
+    memcpy(p->velocity + 4 * i, o->v, 4 * (size_t)n * sizeof *o->v);
+    if (!p->with_rates) return;
+    memcpy(p->rate + 4 * i, o->a, 4 * (size_t)n * sizeof *o->a);
+    memcpy(p->lag + 4 * i, o->lag, 4 * (size_t)n * sizeof *o->lag);
+}
+
+GS4I_INLINE int gs4i_has_left(const gs4i_grid *g, const gs4_real x[3])
+{
+    return !(x[0] >= g->origin.x && x[0] < g->origin.x + GS4I_C(g->cells[0]) * g->h
+          && x[1] >= g->origin.y && x[1] < g->origin.y + GS4I_C(g->cells[1]) * g->h
+          && x[2] >= g->origin.z && x[2] < g->origin.z + GS4I_C(g->cells[2]) * g->h);
+}
+
+/* Walls, bodies and mouths on each particle after the step. */
+static void gs4i_correct_contact(gs4_sim *sim, int n, gs4i_stored *o, gs4i_gathered *L, gs4i_report *report)
+{
+    int b;
+    for (b = 0; b < n; b++) {
+        if (!sim->boundary.body_count && !gs4i_has_left(&sim->grid, o->x + 4 * b)) continue;
+        gs4i_put_back(&sim->boundary, &sim->grid, o->x + 4 * b, o->v + 4 * b);
+        if (gs4i_hold_in_mouth(&sim->boundary, o->x + 4 * b, o->v + 4 * b)) {
+            memset(o->a + 4 * b, 0, 4 * sizeof *o->a);
+            memset(o->lag + 4 * b, 0, 4 * sizeof *o->lag);
+            memset(L->dx + 4 * b, 0, 4 * sizeof *L->dx);
+            memset(L->dy + 4 * b, 0, 4 * sizeof *L->dy);
+            memset(L->dz + 4 * b, 0, 4 * sizeof *L->dz);
+        }
+        report->left += gs4i_has_left(&sim->grid, o->x + 4 * b);
     }
 }
 
 /* Is the result one that may be kept? Moved at most two cells, all finite, J in its range. */
-GS4I_INLINE void gs4i_judge(const gs4i_corrected *q, const gs4_real *old_x, gs4_real h, gs4i_report *report, uint32_t id)
+static void gs4i_judge(gs4i_batch *q, gs4i_gradient L, const gs4_real *old_x, int n, gs4_real h, const uint32_t *id, gs4i_report *report)
 {
-    gs4_real moved = 0, all = 0;
-    gs4i_quad n;
-    int c;
-    gs4i_squares(q->C, &n);
-    for (c = 0; c < 3; c++) {
-        const gs4_real d = GS4I_LANE(q->x, c) - old_x[c];
-        moved += d * d;
-        all += GS4I_LANE(q->v, c) * GS4I_LANE(q->v, c) + GS4I_LANE(q->a, c);
+    int b, i, j;
+    for (b = 0; b < n; b++) {
+        gs4_real moved = 0, all = 0;
+        for (i = 0; i < 3; i++) {
+            const gs4_real d = GS4I_NTH(q->x[i], b) - old_x[4 * b + i], v = GS4I_NTH(q->v[i], b);
+            moved += d * d;
+            all += v * v + GS4I_NTH(q->a[i], b);
+            for (j = 0; j < 3; j++) all += GS4I_NTH(L[i][j], b) * GS4I_NTH(L[i][j], b);
+        }
+        if (!(GS4I_NTH(q->v[3], b) > GS4I_J_LOW && GS4I_NTH(q->v[3], b) < GS4I_J_HIGH && gs4i_finite(GS4I_NTH(q->a[3], b)))) gs4i_see_bad(report, GS4I_BAD_VOLUME, id[b]);
+        if (!(gs4i_finite(all) && moved <= 4 * h * h)) gs4i_see_bad(report, GS4I_BAD_MOTION, id[b]);
     }
-    if (!(GS4I_LANE(q->v, 3) > GS4I_J_LOW && GS4I_LANE(q->v, 3) < GS4I_J_HIGH && gs4i_finite(GS4I_LANE(q->a, 3)))) gs4i_see_bad(report, GS4I_BAD_VOLUME, id);
-    if (!(gs4i_finite(all) && gs4i_finite(gs4i_sum3(&n)) && moved <= 4 * h * h)) gs4i_see_bad(report, GS4I_BAD_MOTION, id);
-}
-
-/* Largest speed along an axis, and a bound of the largest |C|, as squares in lanes. */
-typedef struct gs4i_fastest { gs4i_quad speed2, gradient2; } gs4i_fastest;
-
-GS4I_INLINE void gs4i_see_motion(gs4i_fastest *f, const gs4i_corrected *q)
-{
-    gs4i_quad n;
-    GS4I_MUL(n, q->v, q->v); GS4I_GREATER(f->speed2, n, f->speed2);
-    gs4i_squares(q->C, &n); GS4I_GREATER(f->gradient2, n, f->gradient2);
-}
-
-static void gs4i_report_motion(gs4i_report *r, const gs4i_fastest *f)
-{
-    r->max_speed = gs4i_max(GS4I_LANE(f->speed2, 0), gs4i_max(GS4I_LANE(f->speed2, 1), GS4I_LANE(f->speed2, 2)));
-    r->max_gradient = gs4i_sum3(&f->gradient2);
-}
-
-GS4I_INLINE void gs4i_store_corrected(const gs4i_particles *p, size_t i, const gs4i_corrected *q)
-{
-    gs4i_quad x = q->x;
-    GS4I_LANE(x, 3) = p->position[4 * i + 3];
-    GS4I_STORE(p->position + 4 * i, x); GS4I_STORE(p->velocity + 4 * i, q->v);
-    if (!p->with_rates) { gs4i_store_affine(p->affine + 9 * i, q->C); return; }
-    GS4I_STORE(p->rate + 4 * i, q->a);
-    gs4i_store_lag(p->lag + 3 * i, &q->lag);
-}
-
-/* How little the grid sees of a particle among few others, by how full its nodes are: 1 below 8 %, smoothly to 0 at 20 %.
- * What it does not see of such spray would swing ever more (nodes this light take no part in the corrected gradient), so
- * there it fades at the rate c0 / h; so it does at walls, by the weight of the images. Both are rates: dt does not matter. */
-GS4I_INLINE gs4_real gs4i_unseen(gs4_real filled)
-{
-    const gs4_real t = (filled - GS4I_C(0.08)) / GS4I_C(0.12);
-    return t >= 1 ? GS4I_C(0) : t <= 0 ? GS4I_C(1) : 1 - t * t * (3 - 2 * t);
 }
 
 /* S7: gather and correct. With `commit` 0 nothing is written: a rehearsal that only reports. */
-GS4I_INLINE void gs4i_correct(const gs4i_pass *pass, int index, int commit)
+static void gs4i_correct(const gs4i_pass *pass, int index, int commit)
 {
     gs4_sim *sim = pass->sim;
-    const int o = pass->blocks[index];
-    gs4i_rule rule = sim->rule;
-    const gs4_real sim_decay = rule.decay, sim_damped = rule.damped, inv_full = rule.inv_full;
+    const int o = pass->blocks[index], next = pass->blocks[index + 1 < pass->count ? index + 1 : index];
+    const gs4i_rule rule = sim->rule;
     const gs4i_particles p = sim->particles;
     gs4i_grid *grid = &sim->grid;
     gs4i_report *report = &sim->reports[o];
     const gs4i_frame frame = gs4i_tile_frame(grid, o);
-    const gs4i_quad zero = { GS4I_LANES(0, 0, 0, 0) };
-    gs4i_fastest fastest = { zero, zero };
+    gs4i_seen seen;
+    gs4i_corrections k;
     gs4_real u_nodes[GS4I_TILE_REALS], a_nodes[GS4I_TILE_REALS], j_nodes[GS4I_TILE_REALS];
-    const int jumps = gs4i_load_jumps(grid, o, j_nodes), edge = jumps || gs4i_at_edge(grid, o), bodies = sim->boundary.body_count;
+    const int jumps = gs4i_load_jumps(grid, o, report->rows, j_nodes), edge = jumps || gs4i_at_edge(grid, o);
+    gs4i_gathered u;
+    gs4i_stored out;
+    int row = 0;
     size_t i = (size_t)grid->first[o], end = (size_t)grid->first[o + 1];
     gs4i_tile_load(grid, o, report->rows, grid->momentum, u_nodes);
     gs4i_tile_load(grid, o, report->rows, grid->force, a_nodes);
-    if (index + 1 < pass->count) {
-        gs4i_tile_prefetch(grid, pass->blocks[index + 1], grid->momentum);
-        gs4i_tile_prefetch(grid, pass->blocks[index + 1], grid->force);
-    }
-    for (; i < end; i += GS4I_BATCH) {
+    gs4i_see_nothing(&seen);
+    memset(k.jump, 0, sizeof k.jump);
+    for (; i < end; i += GS4I_BATCH, row += 2) {
         const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
-        gs4i_stencil s[GS4I_BATCH];
-        gs4i_local u[GS4I_BATCH];
-        gs4i_quad acc[GS4I_BATCH], jump[GS4I_BATCH];
-        gs4i_row w, d;
+        gs4i_batch q;
+        gs4i_stencils s;
+        gs4_real acc[4 * GS4I_BATCH], jump[4 * GS4I_BATCH];
         int b;
-        for (b = 0; b < n; b++) gs4i_predicted_stencil(&p, i + (size_t)b, rule.reach, &frame, &s[b]);
+        gs4i_tile_prefetch(grid, next, row, grid->momentum);
+        gs4i_tile_prefetch(grid, next, row, grid->force);
+        gs4i_stage_batch(&p, i, n, rule.reach, &frame, &q, &s);
         for (b = 0; b < n; b++) {
-            gs4i_x_weights(&s[b], &w, &d);
-            gs4i_gather_local(u_nodes + 4 * s[b].base, &s[b], &w, &d, &u[b]);
-            gs4i_gather_value(a_nodes + 4 * s[b].base, &s[b], &w, &acc[b]);
-            if (jumps) gs4i_gather_value(j_nodes + 4 * s[b].base, &s[b], &w, &jump[b]);
-            else jump[b] = zero;
+            gs4i_row w, d;
+            gs4i_x_weights(&s, b, &w, &d);
+            gs4i_gather_local(u_nodes + 4 * s.base[b], &s, b, &w, &d, &u);
+            gs4i_gather_value(a_nodes + 4 * s.base[b], &s, b, &w, acc);
+            if (jumps) gs4i_gather_value(j_nodes + 4 * s.base[b], &s, b, &w, jump);
         }
-        for (b = 0; b < n; b++) {
-            const size_t k = i + (size_t)b;
-            gs4i_corrected q;
-            gs4_real unseen;
-            GS4I_LOAD(q.x, p.position + 4 * k); GS4I_LOAD(q.v, p.velocity + 4 * k); GS4I_LOAD(q.a, p.rate + 4 * k);
-            gs4i_position_rate(&p, k, rule.reach.shift, &q.lag);
-            unseen = gs4i_unseen(GS4I_LANE(u[b].value, 3) * inv_full) + GS4I_LANE(jump[b], 3);
-            rule.decay = sim_decay; rule.damped = sim_damped;
-            if (unseen > 0) {
-                rule.decay += unseen * rule.fast_decay;
-                rule.damped = 1 / (1 + rule.s * rule.decay);
-                GS4I_LANE(jump[b], 3) = 0;
-            }
-            gs4i_correct_one(&rule, &u[b], &acc[b], &jump[b], &q);
-            if (!commit) { gs4i_judge(&q, p.position + 4 * k, grid->h, report, p.id[k]); continue; }
-            if (edge && (bodies || gs4i_has_left(grid, &q.x))) gs4i_correct_contact(sim, &q, report);
-            gs4i_see_motion(&fastest, &q);
-            gs4i_store_corrected(&p, k, &q);
-        }
+        gs4i_to_lanes(u.value, n, k.U);
+        gs4i_gradient_lanes(u.dx, u.dy, u.dz, n, k.L);
+        gs4i_to_lanes(acc, n, k.A);
+        if (jumps) gs4i_to_lanes(jump, n, k.jump);
+        gs4i_correct_batch(rule, &k, &q);
+        if (!commit) { gs4i_judge(&q, k.L, p.position + 4 * i, n, grid->h, p.id + i, report); continue; }
+        gs4i_pack_batch(&q, 1, &out);
+        if (edge) gs4i_correct_contact(sim, n, &out, &u, report);
+        gs4i_see_motion(&seen, q.v, k.L);
+        gs4i_store_batch(&p, i, n, &out);
     }
-    if (commit) gs4i_report_motion(report, &fastest);
+    if (commit) gs4i_report_motion(report, &seen);
 }
 
 static void gs4i_correct_task(int index, void *context)
@@ -2797,107 +2979,191 @@ static void gs4i_rehearse_task(int index, void *context)
     gs4i_correct((const gs4i_pass *)context, index, 0);
 }
 
-/* Symplectic Euler, there: momentum with the impulse of stress and weight, as one affine field (MLS-MPM):
- * m_i v_i = sum w [ m (v + dt g) + (m C - dt V sigma 4/h^2) (x_i - x) ]. */
+/* --- symplectic Euler -------------------------------------------------------------------------------- */
+
+/* The velocity gradients of n particles. */
+GS4I_INLINE void gs4i_load_affine(const gs4i_particles *p, size_t i, int n, gs4i_gradient L)
+{
+    gs4i_gradient_lanes(p->affine[0] + 4 * i, p->affine[1] + 4 * i, p->affine[2] + 4 * i, n, L);
+}
+
+/* |C| dt is bounded by 1/4: the factor that makes it so. */
+GS4I_INLINE void gs4i_affine_bound(gs4i_gradient C, gs4_real dt, gs4i_lanes bound)
+{
+    const gs4_real limit = GS4I_C(0.0625) / (dt * dt);
+    gs4i_lanes squared;
+    int b, j, good = 1;
+    GS4I_BATCH_LOOP(b) {
+        gs4i_wide_mask fine;
+        squared[b] = C[0][0][b] * C[0][0][b];
+        for (j = 1; j < 9; j++) squared[b] += C[j / 3][j % 3][b] * C[j / 3][j % 3][b];
+        fine = squared[b] <= limit;
+        good &= gs4i_all(&fine);
+        bound[b] = (squared[b] - squared[b]) + GS4I_C(1);
+    }
+    for (b = 0; b < GS4I_BATCH && !good; b++)
+        if (GS4I_NTH(squared, b) > limit) GS4I_NTH(bound, b) = GS4I_SQRT(limit / GS4I_NTH(squared, b));
+}
+
+/* Momentum of a batch on its way to the nodes: m v at the node in the middle, and what changes by one node along each axis. */
+typedef struct gs4i_affine_forces { gs4_real middle[4 * GS4I_BATCH], x[4 * GS4I_BATCH], y[4 * GS4I_BATCH], z[4 * GS4I_BATCH]; } gs4i_affine_forces;
+
+/* Momentum and impulse of stress and weight as one affine field: m (v + dt g) + (m C - dt V sigma 4/h^2) (x_i - x). */
+GS4I_INLINE void gs4i_affine_momentum(const gs4i_batch *q, const gs4i_batch_laws *l, const gs4i_stencils *s, gs4i_gradient C, gs4_real dt, gs4_real h,
+                                      const gs4_real fall[3], gs4i_affine_forces *f, gs4i_lanes mu)
+{
+    static const int place[3][3] = { { 0, 3, 4 }, { 3, 1, 5 }, { 4, 5, 2 } };
+    gs4i_symmetric sigma;
+    gs4i_lanes bound, k, middle[3], none;
+    gs4i_gradient Q;
+    int b, i, j;
+    gs4i_liquid_stress(l, q->v[3], C, sigma, mu);
+    gs4i_affine_bound(C, dt, bound);
+    GS4I_BATCH_LOOP(b) {
+        bound[b] *= q->x[3][b] * h;
+        k[b] = -dt * q->x[3][b] * l->inv_density[b] * q->v[3][b] * (4 / h);
+    }
+    for (i = 0; i < 3; i++) for (j = 0; j < 3; j++) GS4I_BATCH_LOOP(b) Q[i][j][b] = bound[b] * C[i][j][b] + k[b] * sigma[place[i][j]][b];
+    for (i = 0; i < 3; i++)
+        GS4I_BATCH_LOOP(b)
+            middle[i][b] = q->x[3][b] * (q->v[i][b] + fall[i]) - (Q[i][0][b] * s->xi[0][b] + Q[i][1][b] * s->xi[1][b] + Q[i][2][b] * s->xi[2][b]);
+    memset(none, 0, sizeof none);
+    gs4i_from_lanes(middle[0], middle[1], middle[2], q->x[3], f->middle);
+    gs4i_from_lanes(Q[0][0], Q[1][0], Q[2][0], none, f->x);
+    gs4i_from_lanes(Q[0][1], Q[1][1], Q[2][1], none, f->y);
+    gs4i_from_lanes(Q[0][2], Q[1][2], Q[2][2], none, f->z);
+}
+
+/* tile += w_ij (B + (i - 1) Qx + (j - 1) Qy + (k - 1) Qz), for particle n of a batch */
+GS4I_INLINE void gs4i_scatter_affine(gs4_real *tile, const gs4i_stencils *s, int n, const gs4i_affine_forces *f)
+{
+    gs4i_row w, wx, v, p0, p1, p2, side[3], r, t;
+    gs4i_quad q;
+    int j, k;
+    gs4i_row_of_nodes(&w, GS4I_NTH_CONST(s->w[0][0], n), GS4I_NTH_CONST(s->w[0][1], n), GS4I_NTH_CONST(s->w[0][2], n));
+    gs4i_row_of_nodes(&wx, -GS4I_NTH_CONST(s->w[0][0], n), 0, GS4I_NTH_CONST(s->w[0][2], n));
+    GS4I_LOAD(q, f->middle + 4 * n); gs4i_row_of_quad(&v, &q); GS4I_ROW_MUL(p0, w, v);
+    GS4I_LOAD(q, f->x + 4 * n);      gs4i_row_of_quad(&v, &q); GS4I_ROW_MAD(p0, wx, v);
+    GS4I_LOAD(q, f->y + 4 * n);      gs4i_row_of_quad(&v, &q); GS4I_ROW_MUL(p1, w, v);
+    GS4I_LOAD(q, f->z + 4 * n);      gs4i_row_of_quad(&v, &q); GS4I_ROW_MUL(p2, w, v);
+    for (j = 0; j < 3; j++) {
+        if (j == 0) GS4I_ROW_DIFFERENCE(side[1], p0, p1); else if (j == 1) side[1] = p0; else GS4I_ROW_SUM(side[1], p0, p1);
+        GS4I_ROW_SPLAT_MUL(side[1], GS4I_NTH_CONST(s->w[1][j], n), side[1]);
+        GS4I_ROW_SPLAT_MUL(t, GS4I_NTH_CONST(s->w[1][j], n), p2);
+        GS4I_ROW_DIFFERENCE(side[0], side[1], t);
+        GS4I_ROW_SUM(side[2], side[1], t);
+        for (k = 0; k < 3; k++) {
+            gs4_real *row = tile + 4 * (s->base[n] + GS4I_TILE * (GS4I_TILE * k + j));
+            GS4I_ROW_LOAD(r, row);
+            GS4I_ROW_SPLAT_MAD(r, GS4I_NTH_CONST(s->w[2][k], n), side[k]);
+            GS4I_ROW_STORE(row, r);
+        }
+    }
+}
+
+/* Symplectic Euler, there: one affine scatter with stress (MLS-MPM). */
 static void gs4i_scatter_euler(int index, void *context)
 {
     const gs4i_pass *pass = (const gs4i_pass *)context;
     gs4_sim *sim = pass->sim;
-    const gs4i_particles p = sim->particles;               /* copies: stores cannot alias them */
+    const gs4i_particles p = sim->particles;
     const int o = pass->blocks[index];
     const gs4i_reach reach = { 0, 0 };
     const gs4_real dt = sim->rule.dt, h = sim->grid.h;
     const gs4i_frame frame = gs4i_tile_frame(&sim->grid, o);
-    const gs4i_quad g = { GS4I_LANES(dt * sim->desc.gravity.x, dt * sim->desc.gravity.y, dt * sim->desc.gravity.z, 0) };
+    const gs4_real fall[3] = { dt * sim->desc.gravity.x, dt * sim->desc.gravity.y, dt * sim->desc.gravity.z };
     gs4i_report *report = &sim->reports[o];
-    const gs4i_law *laws = sim->laws;
-    gs4i_seen seen = { GS4I_HUGE, 0, 0, 0 };
+    gs4i_batch_laws laws;
+    gs4i_seen seen;
     gs4_real tile[GS4I_TILE_REALS];
+    int row = 0;
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
     uint64_t rows = 0;
     gs4i_report_clear(report);
     memset(tile, 0, sizeof tile);
-    gs4i_tile_prefetch(&sim->grid, o, sim->grid.momentum);
-    for (; i < end; i += GS4I_BATCH) {
+    memset(&laws, 0, sizeof laws);
+    gs4i_see_nothing(&seen);
+    for (; i < end; i += GS4I_BATCH, row += 2) {
         const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
-        gs4i_stencil s[GS4I_BATCH];
-        gs4i_quad C[GS4I_BATCH][3], mv[GS4I_BATCH], sigma[3];
-        int b, j;
-        for (b = 0; b < n; b++) gs4i_predicted_stencil(&p, i + (size_t)b, reach, &frame, &s[b]);
+        gs4i_batch q;
+        gs4i_stencils s;
+        gs4i_gradient C;
+        gs4i_affine_forces f;
+        gs4i_lanes mu;
+        int b;
+        gs4i_tile_prefetch(&sim->grid, o, row, sim->grid.momentum);
+        gs4i_stage_batch(&p, i, n, reach, &frame, &q, &s);
+        gs4i_load_affine(&p, i, n, C);
+        gs4i_take_laws(sim->laws, p.material + i, n, &laws);
+        gs4i_affine_momentum(&q, &laws, &s, C, dt, h, fall, &f, mu);
+        gs4i_see_liquids(&seen, &laws, q.v[3], mu);
+        gs4i_check_liquids(report, q.v[3], mu, p.id + i, n);
         for (b = 0; b < n; b++) {
-            const size_t at = i + (size_t)b;
-            const gs4i_law *law = &laws[p.material[at]];
-            const gs4_real m = p.position[4 * at + 3], J = p.velocity[4 * at + 3], k = -dt * m * law->inv_density * J * (4 / (h * h));
-            gs4_real bound, mu;
-            gs4i_load_affine(p.affine + 9 * at, C[b]);
-            mu = gs4i_liquid_stress(law, J, C[b], sigma);
-            if (!(mu >= 0 && mu < GS4I_HUGE)) gs4i_see_bad(report, GS4I_BAD_VISCOSITY, p.id[at]);
-            gs4i_see_liquid(&seen, law, J, mu);
-            bound = m * gs4i_affine_bound(C[b], dt);
-            for (j = 0; j < 3; j++) { GS4I_SPLAT_MUL(C[b][j], bound, C[b][j]); GS4I_SPLAT_MAD(C[b][j], k, sigma[j]); }
-            GS4I_LOAD(mv[b], p.velocity + 4 * at);
-            GS4I_SUM(mv[b], mv[b], g);
-            GS4I_SPLAT_MUL(mv[b], m, mv[b]);
-            GS4I_LANE(mv[b], 3) = m;
-        }
-        for (b = 0; b < n; b++) {
-            if (s[b].base < 0) { report->strayed++; continue; }
-            rows |= gs4i_touched_rows(s[b].base);
-            gs4i_scatter_affine(tile, &s[b], h, &mv[b], C[b]);
+            if (s.base[b] < 0) { report->strayed++; continue; }
+            rows |= gs4i_touched_rows(s.base[b]);
+            gs4i_scatter_affine(tile, &s, b, &f);
         }
     }
-    gs4i_report_liquid(report, &seen);
+    gs4i_report_liquids(report, &seen);
     report->rows = rows;
     gs4i_tile_add(&sim->grid, o, rows, tile, sim->grid.momentum);
 }
 
-/* Symplectic Euler, and back: v = sum w v_i, C = sum v_i (x) grad w, J += dt J tr C, x += dt v. */
-GS4I_INLINE void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit)
+/* v = sum w v_i, C = sum v_i (x) grad w, J += dt J tr C, x += dt v. */
+GS4I_INLINE void gs4i_advect_batch(gs4_real dt, const gs4i_gathered *u, int n, gs4i_batch *q, gs4i_gradient C)
+{
+    gs4i_lanes v[4];
+    int b, c;
+    gs4i_to_lanes(u->value, n, v);
+    gs4i_gradient_lanes(u->dx, u->dy, u->dz, n, C);
+    for (c = 0; c < 3; c++) GS4I_BATCH_LOOP(b) { q->x[c][b] += dt * v[c][b]; q->v[c][b] = v[c][b]; }
+    GS4I_BATCH_LOOP(b) q->v[3][b] += dt * q->v[3][b] * (C[0][0][b] + C[1][1][b] + C[2][2][b]);
+}
+
+/* Symplectic Euler, and back. */
+static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit)
 {
     gs4_sim *sim = pass->sim;
-    const int o = pass->blocks[index];
+    const int o = pass->blocks[index], next = pass->blocks[index + 1 < pass->count ? index + 1 : index];
     const gs4i_reach reach = { 0, 0 };
-    const gs4_real dt = sim->rule.dt;
     const gs4i_particles p = sim->particles;
     gs4i_grid *grid = &sim->grid;
     gs4i_report *report = &sim->reports[o];
     const gs4i_frame frame = gs4i_tile_frame(grid, o);
-    const gs4i_quad zero = { GS4I_LANES(0, 0, 0, 0) };
-    gs4i_fastest fastest = { zero, zero };
+    gs4i_seen seen;
     gs4_real nodes[GS4I_TILE_REALS];
-    const int bodies = sim->boundary.body_count;
     int edge = gs4i_at_edge(grid, o), c;
+    gs4i_gathered u;
+    gs4i_stored out;
+    int row = 0;
     size_t i = (size_t)grid->first[o], end = (size_t)grid->first[o + 1];
     for (c = 0; c < 27; c++) edge |= grid->jump_of[grid->neighbour[27 * (size_t)o + (size_t)c]];
     gs4i_tile_load(grid, o, report->rows, grid->momentum, nodes);
-    if (index + 1 < pass->count) gs4i_tile_prefetch(grid, pass->blocks[index + 1], grid->momentum);
-    for (; i < end; i += GS4I_BATCH) {
+    gs4i_see_nothing(&seen);
+    for (; i < end; i += GS4I_BATCH, row += 2) {
         const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
-        gs4i_stencil s[GS4I_BATCH];
-        gs4i_local u[GS4I_BATCH];
-        gs4i_row w, d;
+        gs4i_batch q;
+        gs4i_stencils s;
+        gs4i_gradient C;
         int b;
-        for (b = 0; b < n; b++) gs4i_predicted_stencil(&p, i + (size_t)b, reach, &frame, &s[b]);
+        gs4i_tile_prefetch(grid, next, row, grid->momentum);
+        gs4i_stage_batch(&p, i, n, reach, &frame, &q, &s);
         for (b = 0; b < n; b++) {
-            gs4i_x_weights(&s[b], &w, &d);
-            gs4i_gather_local(nodes + 4 * s[b].base, &s[b], &w, &d, &u[b]);
+            gs4i_row w, d;
+            gs4i_x_weights(&s, b, &w, &d);
+            gs4i_gather_local(nodes + 4 * s.base[b], &s, b, &w, &d, &u);
         }
-        for (b = 0; b < n; b++) {
-            const size_t k = i + (size_t)b;
-            const gs4_real J = p.velocity[4 * k + 3];
-            gs4i_corrected q;
-            GS4I_LOAD(q.x, p.position + 4 * k);
-            GS4I_SPLAT_MAD(q.x, dt, u[b].value);
-            q.v = u[b].value; q.a = zero; q.lag = zero;
-            q.C[0] = u[b].dx; q.C[1] = u[b].dy; q.C[2] = u[b].dz;
-            GS4I_LANE(q.v, 3) = J + dt * J * (GS4I_LANE(u[b].dx, 0) + GS4I_LANE(u[b].dy, 1) + GS4I_LANE(u[b].dz, 2));
-            if (!commit) { gs4i_judge(&q, p.position + 4 * k, grid->h, report, p.id[k]); continue; }
-            if (edge && (bodies || gs4i_has_left(grid, &q.x))) gs4i_correct_contact(sim, &q, report);
-            gs4i_see_motion(&fastest, &q);
-            gs4i_store_corrected(&p, k, &q);
-        }
+        gs4i_advect_batch(sim->rule.dt, &u, n, &q, C);
+        if (!commit) { gs4i_judge(&q, C, p.position + 4 * i, n, grid->h, p.id + i, report); continue; }
+        gs4i_pack_batch(&q, 0, &out);
+        if (edge) gs4i_correct_contact(sim, n, &out, &u, report);
+        gs4i_see_motion(&seen, q.v, C);
+        gs4i_store_batch(&p, i, n, &out);
+        memcpy(p.affine[0] + 4 * i, u.dx, 4 * (size_t)n * sizeof *u.dx);
+        memcpy(p.affine[1] + 4 * i, u.dy, 4 * (size_t)n * sizeof *u.dy);
+        memcpy(p.affine[2] + 4 * i, u.dz, 4 * (size_t)n * sizeof *u.dz);
     }
-    if (commit) gs4i_report_motion(report, &fastest);
+    if (commit) gs4i_report_motion(report, &seen);
 }
 
 static void gs4i_gather_euler_task(int index, void *context)
@@ -3013,22 +3279,29 @@ static gs4_real gs4i_stable_dt(const gs4_sim *sim, const gs4i_report *r)
 static void gs4i_look_at_particles(const gs4_sim *sim, gs4i_report *r)
 {
     const gs4i_particles *p = &sim->particles;
-    gs4i_seen seen = { GS4I_HUGE, 0, 0, 0 };
-    size_t i;
-    int c;
+    const gs4i_reach reach = { 0, 0 };
+    gs4i_batch_laws laws;
+    gs4i_seen seen;
+    int i, c;
     gs4i_report_clear(r);
-    for (i = 0; i < (size_t)p->count; i++) {
-        const gs4_real none[12] = { 0 }, *v = p->velocity + 4 * i, *C = p->affine ? p->affine + 9 * i : none;
-        const gs4i_law *law = &sim->laws[p->material[i]];
-        gs4i_quad L[3], sigma[3];
-        gs4_real grad2 = 0;
-        gs4i_load_affine(C, L);
-        gs4i_see_liquid(&seen, law, v[3], gs4i_liquid_stress(law, v[3], L, sigma));
-        for (c = 0; c < 9; c++) grad2 += C[c] * C[c];
-        r->max_speed = gs4i_max(r->max_speed, v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-        r->max_gradient = gs4i_max(r->max_gradient, grad2);
+    gs4i_see_nothing(&seen);
+    memset(&laws, 0, sizeof laws);
+    for (i = 0; i < p->count; i += GS4I_BATCH) {
+        const int n = p->count - i < GS4I_BATCH ? p->count - i : GS4I_BATCH;
+        gs4i_batch q;
+        gs4i_gradient L;
+        gs4i_symmetric sigma;
+        gs4i_lanes mu;
+        gs4i_load_batch(p, (size_t)i, n, reach, &q);
+        if (!p->with_rates) gs4i_load_affine(p, (size_t)i, n, L);
+        else memset(L, 0, sizeof L);
+        gs4i_take_laws(sim->laws, p->material + i, n, &laws);
+        gs4i_liquid_stress(&laws, q.v[3], L, sigma, mu);
+        gs4i_see_liquids(&seen, &laws, q.v[3], mu);
+        gs4i_see_motion(&seen, q.v, L);
     }
-    gs4i_report_liquid(r, &seen);
+    gs4i_report_liquids(r, &seen);
+    gs4i_report_motion(r, &seen);
     r->max_speed = GS4I_SQRT(r->max_speed);
     r->max_gradient = GS4I_SQRT(r->max_gradient);
     for (c = 0; c < sim->boundary.body_count; c++) {        /* what bodies and mouths will do to their nodes */
@@ -3333,11 +3606,12 @@ static int gs4i_add_one(gs4_sim *sim, gs4_vec3 x, gs4_vec3 v, gs4_real mass, int
 {
     gs4i_particles *p = &sim->particles;
     size_t i = (size_t)p->count;
+    int k;
     if (p->count >= p->capacity || sim->next_id == UINT32_MAX) return 0;
     p->position[4 * i] = x.x; p->position[4 * i + 1] = x.y; p->position[4 * i + 2] = x.z; p->position[4 * i + 3] = mass;
     p->velocity[4 * i] = v.x; p->velocity[4 * i + 1] = v.y; p->velocity[4 * i + 2] = v.z; p->velocity[4 * i + 3] = 1;
-    if (p->with_rates) { memset(p->rate + 4 * i, 0, 4 * sizeof(gs4_real)); memset(p->lag + 3 * i, 0, 3 * sizeof(gs4i_half)); }
-    if (p->affine) memset(p->affine + 9 * i, 0, 9 * sizeof(gs4_real));
+    if (p->with_rates) { memset(p->rate + 4 * i, 0, 4 * sizeof(gs4_real)); memset(p->lag + 4 * i, 0, 4 * sizeof(gs4i_half)); }
+    for (k = 0; k < 3 && p->affine[k]; k++) memset(p->affine[k] + 4 * i, 0, 4 * sizeof(gs4_real));
     p->id[i] = sim->next_id++;
     p->material[i] = (uint8_t)material;
     p->count++;
@@ -4482,11 +4756,12 @@ static int gs4i_make_room(gs4_sim *sim, int64_t n)
 static void gs4i_fill_one(gs4_sim *sim, gs4_vec3 x, gs4_vec3 centre, const gs4_fill *f, gs4_real mass)
 {
     const gs4_vec3 w = f->angular_velocity;
-    const gs4_real C[9] = { 0, w.z, -w.y, -w.z, 0, w.x, w.y, -w.x, 0 };
+    const gs4_real C[3][4] = { { 0, w.z, -w.y, 0 }, { -w.z, 0, w.x, 0 }, { w.y, -w.x, 0, 0 } };
     const size_t i = (size_t)sim->particles.count;
     const gs4_vec3 v = gs4i_add(f->velocity, gs4i_cross(w, gs4i_sub(x, centre)));
+    int k;
     if (!gs4i_add_one(sim, x, v, mass, f->material)) return;
-    if (sim->particles.affine) memcpy(sim->particles.affine + 9 * i, C, sizeof C);
+    for (k = 0; k < 3 && sim->particles.affine[k]; k++) memcpy(sim->particles.affine[k] + 4 * i, C[k], sizeof C[k]);
     gs4i_note_speed(sim, gs4i_length(v));
 }
 
@@ -4922,16 +5197,16 @@ GS4_API uint64_t gs4_state_hash(const gs4_sim *sim)
     const gs4i_particles *p;
     uint64_t sum = 0, h;
     size_t i, n;
-    int s;
+    int s, k;
     if (!sim) return 0;
     p = &sim->particles;
     for (i = 0; i < (size_t)p->count; i++) {
         h = gs4i_hash_bytes(gs4i_mix(p->id[i]), p->position + 4 * i, 4 * sizeof(gs4_real));
         h = gs4i_hash_bytes(h ^ p->material[i], p->velocity + 4 * i, 4 * sizeof(gs4_real));
-        if (p->affine) h = gs4i_hash_bytes(h, p->affine + 9 * i, 9 * sizeof(gs4_real));
+        for (k = 0; k < 3 && p->affine[k]; k++) h = gs4i_hash_bytes(h, p->affine[k] + 4 * i, 3 * sizeof(gs4_real));
         if (p->with_rates) {
             h = gs4i_hash_bytes(h, p->rate + 4 * i, 4 * sizeof(gs4_real));
-            h = gs4i_hash_bytes(h, p->lag + 3 * i, 3 * sizeof(gs4i_half));
+            h = gs4i_hash_bytes(h, p->lag + 4 * i, 3 * sizeof(gs4i_half));
         }
         sum += h;
     }
@@ -4971,9 +5246,11 @@ GS4_API int gs4_material_preset(const char *name, gs4_material *material)
 #pragma GCC pop_options
 #endif
 
-#undef GS4I_BLOCK
+#undef GS4I_BATCH_LOOP
 #undef GS4I_BLOCK_NODES
 #undef GS4I_C
+#undef GS4I_CHOOSE
+#undef GS4I_CHOOSE_INT
 #undef GS4I_DESTINATION
 #undef GS4I_DIFFERENCE
 #undef GS4I_EACH
@@ -4996,6 +5273,8 @@ GS4_API int gs4_material_preset(const char *name, gs4_material *material)
 #undef GS4I_MUL
 #undef GS4I_NODE_REALS
 #undef GS4I_NO_HEAT
+#undef GS4I_NTH
+#undef GS4I_NTH_CONST
 #undef GS4I_PREFETCH
 #undef GS4I_PRESSED
 #undef GS4I_RESTRICT
@@ -5019,10 +5298,15 @@ GS4_API int gs4_material_preset(const char *name, gs4_material *material)
 #undef GS4I_TILE
 #undef GS4I_TILE_REALS
 #undef GS4I_TINY
+#undef GS4I_TO_REAL
+#undef GS4I_TRUNCATE
 #undef GS4I_TRY
 #undef GS4I_VECTORS
 #undef GS4I_VISCOUS_EIGENVALUE
 #undef GS4I_VISITED
+#undef GS4I_WIDE_MAX
+#undef GS4I_WIDE_MIN
+#undef GS4I_WIDTH
 
 #endif /* GS4MPM_IMPLEMENTATION */
 

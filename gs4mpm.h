@@ -108,9 +108,9 @@
  * ERRORS. Every call returns 0 or more for success and a negative gs4_result otherwise; gs4_last_error has a sentence. Every field is
  * checked, NaN included. A call that fails has changed nothing, out of memory included; a step that is refused has not been taken.
  *
- * MEMORY. GS4: 63 bytes a particle in float (position, velocity, J and their rates, mass, id, material, and 4 for sorting), 48 a cell
- * near material, 16 more near walls and bodies, 4 per 64 cells of the domain. Symplectic Euler: 77 and 32. Double, GS4: 117 and 96.
- * Stepping allocates nothing once the scene has stopped growing.
+ * MEMORY. GS4: 65 bytes a particle in float (position, velocity, J and their rates, mass, id, material, and 4 for sorting), 48 a cell
+ * near material, 16 more near walls and bodies, 4 per 64 cells of the domain. Symplectic Euler: 89 and 32. Double, GS4: 121 and 96.
+ * Stepping allocates nothing once the scene has stopped growing; it takes 34 KB of stack a thread, 67 in double.
  *
  * THREADS. `parallel_for` or the pool. The same bits for any number of threads: blocks of one colour share no node, sums run in the
  * order of particles within a block. Two simulations on two threads are fine. Callbacks (distances, viscosity) may be called from
@@ -1235,7 +1235,7 @@ typedef struct gs4i_grid {
     int32_t *neighbour;                 /* per occupied block: slots of the 27 blocks around, x fastest */
     int32_t *by_colour; int colour_first[9];    /* occupied blocks by parity of their coordinates: same colour, disjoint tiles */
     int32_t *jump_of; gs4_real *jump; int jump_count, jump_capacity;   /* [[boundary]]: per slot, 1 + its place in `jump` */
-    uint8_t *contact;                   /* of the nodes in `jump`: bit a: an image in contact along axis a; bit 3: pressed on the wall */
+    uint8_t *contact;                   /* of the nodes in `jump`, see [[boundary]] */
     gs4i_scratch lists[2], histogram;   /* of sorting */
 } gs4i_grid;
 
@@ -1285,6 +1285,7 @@ static void gs4i_grid_free(gs4i_memory *m, gs4i_grid *g)
     gs4i_free(m, g->neighbour, o, 27 * sizeof *g->neighbour);
     gs4i_free(m, g->by_colour, o, sizeof *g->by_colour);
     gs4i_free(m, g->jump, (size_t)g->jump_capacity, GS4I_NODE_REALS * sizeof(gs4_real));
+    gs4i_free(m, g->contact, (size_t)g->jump_capacity, GS4I_BLOCK_NODES);
     gs4i_free(m, g->lists[0].data, g->lists[0].bytes, 1);
     gs4i_free(m, g->lists[1].data, g->lists[1].bytes, 1);
     gs4i_free(m, g->histogram.data, g->histogram.bytes, 1);
@@ -2274,9 +2275,15 @@ static int gs4i_place_jumps(gs4i_memory *m, const gs4i_boundary *b, gs4i_grid *g
     if (n > g->jump_capacity) {
         int wanted = n + n / 4;
         gs4_real *jump = (gs4_real *)gs4i_alloc(m, (size_t)wanted, GS4I_NODE_REALS * sizeof *jump);
-        if (!jump) return GS4_ERROR_MEMORY;
+        uint8_t *contact = (uint8_t *)gs4i_alloc(m, (size_t)wanted, GS4I_BLOCK_NODES);
+        if (!jump || !contact) {
+            gs4i_free(m, jump, (size_t)wanted, GS4I_NODE_REALS * sizeof *jump);
+            gs4i_free(m, contact, (size_t)wanted, GS4I_BLOCK_NODES);
+            return GS4_ERROR_MEMORY;
+        }
         gs4i_free(m, g->jump, (size_t)g->jump_capacity, GS4I_NODE_REALS * sizeof *jump);
-        g->jump = jump; g->jump_capacity = wanted;
+        gs4i_free(m, g->contact, (size_t)g->jump_capacity, GS4I_BLOCK_NODES);
+        g->jump = jump; g->contact = contact; g->jump_capacity = wanted;
     }
     return GS4_OK;
 }
@@ -2286,7 +2293,13 @@ GS4I_INLINE gs4_real *gs4i_jump_at(const gs4i_grid *g, uint32_t node)
     return g->jump + GS4I_NODE_REALS * (size_t)(g->jump_of[node / 64] - 1) + 4 * (size_t)(node % 64);
 }
 
-#define GS4I_PRESSED GS4I_C(8)          /* in the fourth number of a jump: material pressed on the wall there */
+/* Contact of a node: bit a: an image that folds along axis a; GS4I_PRESSED: material pressed on the wall there. */
+GS4I_INLINE uint8_t *gs4i_contact_at(const gs4i_grid *g, uint32_t node)
+{
+    return g->contact + (size_t)GS4I_BLOCK_NODES * (size_t)(g->jump_of[node / 64] - 1) + node % 64;
+}
+
+#define GS4I_PRESSED 8
 
 GS4I_INLINE void gs4i_reflection(gs4_wall wall, int axis, gs4_real sign[3])
 {
@@ -2303,7 +2316,7 @@ static int gs4i_wall_touches(const gs4i_grid *g, const gs4i_image *pair, int wal
     return into > 0 || (g->memory && g->memory[4 * (size_t)pair->image + 3] >= 2);
 }
 
-/* Fold mass and momentum back from images; which axes did so is kept in the fourth number of the jump, bit by bit. */
+/* Fold mass and momentum back from images; the fourth number of the jump is 1 where one did, `contact` has along which axes. */
 static void gs4i_fold_momentum(const gs4i_boundary *b, const gs4i_grid *g)
 {
     int wall, i, a;
@@ -2315,7 +2328,10 @@ static void gs4i_fold_momentum(const gs4i_boundary *b, const gs4i_grid *g)
             const gs4_real *from = g->momentum + 4 * (size_t)pair->image;
             gs4_real *to = g->momentum + 4 * (size_t)pair->mirror;
             if (b->walls[wall] == GS4_WALL_SEPARATE && !gs4i_wall_touches(g, pair, wall)) continue;
-            if (b->walls[wall] != GS4_WALL_PERIODIC) gs4i_jump_at(g, pair->image)[3] += GS4I_C(1 << wall / 2);
+            if (b->walls[wall] != GS4_WALL_PERIODIC) {
+                gs4i_jump_at(g, pair->image)[3] = 1;
+                *gs4i_contact_at(g, pair->image) |= (uint8_t)(1 << wall / 2);
+            }
             for (a = 0; a < 3; a++) to[a] += sign[a] * from[a];
             to[3] += from[3];
         }
@@ -2324,7 +2340,7 @@ static void gs4i_fold_momentum(const gs4i_boundary *b, const gs4i_grid *g)
 
 GS4I_INLINE int gs4i_is_folded(const gs4i_boundary *b, const gs4i_grid *g, const gs4i_image *pair, int wall)
 {
-    return b->walls[wall] == GS4_WALL_PERIODIC || ((int)gs4i_jump_at(g, pair->image)[3] >> (wall / 2) & 1);
+    return b->walls[wall] == GS4_WALL_PERIODIC || (*gs4i_contact_at(g, pair->image) >> (wall / 2) & 1);
 }
 
 static void gs4i_fold_force(const gs4i_boundary *b, const gs4i_grid *g)
@@ -2338,7 +2354,7 @@ static void gs4i_fold_force(const gs4i_boundary *b, const gs4i_grid *g)
             const gs4_real *from = g->force + 4 * (size_t)pair->image;
             gs4_real *to = g->force + 4 * (size_t)pair->mirror;
             int folded = gs4i_is_folded(b, g, pair, wall);
-            if (b->walls[wall] == GS4_WALL_SEPARATE && from[wall / 2] * outward > 0) gs4i_jump_at(g, pair->image)[3] += GS4I_PRESSED;
+            if (b->walls[wall] == GS4_WALL_SEPARATE && from[wall / 2] * outward > 0) *gs4i_contact_at(g, pair->image) |= GS4I_PRESSED;
             if (folded) for (a = 0; a < 3; a++) to[a] += sign[a] * from[a];
         }
     }
@@ -2480,7 +2496,6 @@ struct gs4_sim {
     gs4i_law *laws; int material_count, material_capacity;
     gs4i_emitter *emitters; int emitter_count, emitter_capacity;
     gs4i_report *reports; int report_capacity;      /* per occupied block */
-    struct gs4i_node_report *node_reports; int node_report_capacity;   /* per group of blocks with nodes */
     gs4i_report worst;                  /* extremes of the present state, as far as steps have seen them */
     gs4i_rule rule;
     double time, last_dt, seconds[GS4I_CLOCKS];
@@ -2771,11 +2786,11 @@ static void gs4i_scatter_forces(int index, void *context)
 
 /* --- S7 ---------------------------------------------------------------------------------------------- */
 
-/* Whether any block around occupied block o has jumps; then their tile, with 1 in lane 3 of images in contact, else 0. */
+/* Whether any block around occupied block o has jumps; then their tile; the fourth number is 1 in images that fold, else 0. */
 static int gs4i_load_jumps(const gs4i_grid *g, int o, uint64_t rows, gs4_real *tile)
 {
     const int32_t *nb = g->neighbour + 27 * (size_t)o;
-    int any = 0, i, row, e;
+    int any = 0, i, row;
     for (i = 0; i < 27; i++) any |= g->jump_of[nb[i]];
     if (!any) return 0;
     memset(tile, 0, GS4I_TILE_REALS * sizeof *tile);
@@ -2787,7 +2802,6 @@ static int gs4i_load_jumps(const gs4i_grid *g, int o, uint64_t rows, gs4_real *t
             static const int from[3] = { 8, 0, 0 }, to[3] = { 0, 8, 24 }, count[3] = { 8, 16, 8 };
             if (!g->jump_of[at[i] / GS4I_NODE_REALS]) continue;
             memcpy(tile + to[i], gs4i_jump_at(g, (uint32_t)(at[i] / 4)) + from[i], (size_t)count[i] * sizeof *tile);
-            for (e = to[i] + 3; e < to[i] + count[i]; e += 4) tile[e] = GS4I_C(((int)tile[e] & 7) != 0);
         }
     }
     return 1;
@@ -2917,6 +2931,43 @@ static void gs4i_judge(gs4i_batch *q, gs4i_gradient L, const gs4_real *old_x, in
     }
 }
 
+/* Can the nodes of a block alone prove that S7 is safe for its particles? A node of mass m_i has weight at most m_i/m_p and
+ * gradient at most sqrt(2 m_i/m_p)/h in any particle p, so with q_i = min(1, 14 sqrt(m_i/m_min)) and r the mean velocity of
+ * the tile no particle sees |div u| > 4.7/h max_i q_i |u_i - r|_1. */
+static int gs4i_is_calm(const gs4i_pass *pass, int index)
+{
+    const gs4_sim *sim = pass->sim;
+    const int o = pass->blocks[index], next = pass->blocks[index + 1 < pass->count ? index + 1 : index];
+    const gs4i_report *report = &sim->reports[o];
+    const gs4_real h = sim->grid.h, light = sim->min_mass * GS4I_C(1.0 / 196), limit = GS4I_C(0.2 / 4.7) * h / sim->rule.dt;
+    gs4_real mass = 0;
+    const gs4i_quad zero = { GS4I_LANES(0, 0, 0, 0) };
+    gs4i_quad sum = zero, worst = zero, total = zero, q, off;
+    gs4_real u[GS4I_TILE_REALS];
+    int row, i, c;
+    if (!(report->min_J > GS4I_C(0.25) && report->max_J < 4)) return 0;
+    gs4i_tile_load(&sim->grid, o, report->rows, sim->grid.momentum, u);
+    for (row = 0; row < 64; row += 2) gs4i_tile_prefetch(&sim->grid, next, row, sim->grid.momentum);
+    for (row = 0; row < 64; row++)
+        for (i = 4 * GS4I_TILE * row; i < 4 * GS4I_TILE * (row + 1) && (report->rows >> row & 1); i += 4) {
+            GS4I_LOAD(q, u + i);
+            GS4I_SPLAT_MAD(sum, u[i + 3], q);
+            mass += u[i + 3];
+        }
+    for (c = 0; c < 3; c++) if (!(gs4i_abs(GS4I_LANE(sum, c)) * sim->rule.dt < mass * h)) return 0;
+    GS4I_SPLAT_MUL(sum, 1 / mass, sum);
+    for (row = 0; row < 64; row++)
+        for (i = 4 * GS4I_TILE * row; i < 4 * GS4I_TILE * (row + 1) && (report->rows >> row & 1); i += 4) {
+            GS4I_LOAD(q, u + i);
+            GS4I_DIFFERENCE(off, q, sum);
+            if (u[i + 3] <= light) GS4I_SPLAT_MUL(off, 14 * GS4I_SQRT(u[i + 3] / sim->min_mass), off);
+            GS4I_MUL(off, off, off);
+            GS4I_GREATER(worst, off, worst);
+            GS4I_SUM(total, total, off);                    /* the greatest loses NaN, the sum does not */
+        }
+    return gs4i_finite(GS4I_LANE(total, 0) + GS4I_LANE(total, 1) + GS4I_LANE(total, 2)) && GS4I_SQRT(GS4I_LANE(worst, 0)) + GS4I_SQRT(GS4I_LANE(worst, 1)) + GS4I_SQRT(GS4I_LANE(worst, 2)) < limit;
+}
+
 /* S7: gather and correct. With `commit` 0 nothing is written: a rehearsal that only reports. */
 static void gs4i_correct(const gs4i_pass *pass, int index, int commit)
 {
@@ -2976,7 +3027,8 @@ static void gs4i_correct_task(int index, void *context)
 
 static void gs4i_rehearse_task(int index, void *context)
 {
-    gs4i_correct((const gs4i_pass *)context, index, 0);
+    const gs4i_pass *pass = (const gs4i_pass *)context;
+    if (!gs4i_is_calm(pass, index)) gs4i_correct(pass, index, 0);
 }
 
 /* --- symplectic Euler -------------------------------------------------------------------------------- */
@@ -3173,7 +3225,8 @@ static void gs4i_gather_euler_task(int index, void *context)
 
 static void gs4i_rehearse_euler_task(int index, void *context)
 {
-    gs4i_gather_euler((const gs4i_pass *)context, index, 0);
+    const gs4i_pass *pass = (const gs4i_pass *)context;
+    if (!gs4i_is_calm(pass, index)) gs4i_gather_euler(pass, index, 0);
 }
 
 /* Run a scattering kernel over all occupied blocks, colour after colour. */
@@ -3340,15 +3393,9 @@ static gs4i_rule gs4i_make_rule(const gs4_sim *sim, gs4_real dt)
 
 enum { GS4I_GROUP = 16 };               /* blocks a task */
 
-/* Sums and extremes of one group of blocks. */
-typedef struct gs4i_node_report {
-    double momentum[3], mass; gs4_real bound; int bad; } gs4i_node_report;
-
 typedef struct gs4i_node_pass {
     gs4_sim *sim;
     gs4_real lightest;                  /* nodes with less mass are empty: what they hold is below rounding */
-    gs4_real reference[3];              /* velocity that all share: what matters is what differs from it */
-    gs4i_node_report *reports;
 } gs4i_node_pass;
 
 GS4I_INLINE int gs4i_group_end(const gs4i_grid *g, int index)
@@ -3370,7 +3417,10 @@ static void gs4i_clear_jumps(int index, void *context)
     const gs4i_grid *g = &((const gs4i_node_pass *)context)->sim->grid;
     int s;
     for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++)
-        if (g->jump_of[s]) memset(gs4i_jump_at(g, (uint32_t)(64 * s)), 0, GS4I_NODE_REALS * sizeof(gs4_real));
+        if (g->jump_of[s]) {
+            memset(gs4i_jump_at(g, (uint32_t)(64 * s)), 0, GS4I_NODE_REALS * sizeof(gs4_real));
+            memset(gs4i_contact_at(g, (uint32_t)(64 * s)), 0, GS4I_BLOCK_NODES);
+        }
 }
 
 GS4I_INLINE gs4_vec3 gs4i_node_position(const gs4i_grid *g, int slot, int i)
@@ -3403,25 +3453,29 @@ static void gs4i_node_velocities(int index, void *context)
 {
     const gs4i_node_pass *pass = (const gs4i_node_pass *)context;
     const gs4i_grid *g = &pass->sim->grid;
-    gs4i_node_report *r = &pass->reports[index];
-    int s, i, c;
-    memset(r, 0, sizeof *r);
+    int s, i;
     for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
         gs4_real *q = g->momentum + (size_t)s * GS4I_NODE_REALS;
-        for (i = 0; i < GS4I_BLOCK_NODES; i++) {
-            const gs4_real m = q[4 * i + 3], inverse = m > pass->lightest ? 1 / m : GS4I_C(0);
-            for (c = 0; c < 3; c++) { r->momentum[c] += (double)q[4 * i + c]; q[4 * i + c] *= inverse; }
-            r->mass += (double)m;
+        for (i = 0; i < 4 * GS4I_BLOCK_NODES; i += 4) {
+            const gs4_real m = q[i + 3];
+            gs4i_quad v;
+            GS4I_LOAD(v, q + i);
+            GS4I_SPLAT_MUL(v, m > pass->lightest ? 1 / m : GS4I_C(0), v);
+            GS4I_LANE(v, 3) = m;
+            GS4I_STORE(q + i, v);
         }
         gs4i_hold_nodes(pass->sim, s, q, NULL, g->jump_of[s] ? gs4i_jump_at(g, (uint32_t)(64 * s)) : NULL);
     }
 }
 
-/* What a node remembered of component c before this step. A node that was empty takes ag_i = acc_i; where rates start
- * afresh ag_i = 0, as the particles' are. */
-GS4I_INLINE gs4_real gs4i_remembered(const gs4i_rule *rule, const gs4_real *ag, int c, gs4_real acc)
+/* What a node remembered before this step. A node that was empty takes ag_i = acc_i; where rates start afresh ag_i = 0, as
+ * the particles' are. */
+GS4I_INLINE void gs4i_remembered(const gs4i_rule *rule, const gs4_real *ag, const gs4i_quad *acc, gs4i_quad *before)
 {
-    return rule->afresh ? GS4I_C(0) : (int)ag[3] & 1 ? ag[c] : acc;
+    const gs4i_quad zero = { GS4I_LANES(0, 0, 0, 0) };
+    if (rule->afresh) *before = zero;
+    else if ((int)ag[3] & 1) GS4I_LOAD(*before, ag);
+    else *before = *acc;
 }
 
 /* The share of s (acc_i - ag_i) that a node takes, smoothly from 0 where it is filled by less than 15 % to 1 at 65 %: the
@@ -3439,18 +3493,22 @@ static void gs4i_node_accelerations(int index, void *context)
     const gs4i_node_pass *pass = (const gs4i_node_pass *)context;
     const gs4i_grid *g = &pass->sim->grid;
     const gs4i_rule *rule = &pass->sim->rule;
-    int s, i, c;
+    int s, i;
     for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
         gs4_real *q = g->momentum + (size_t)s * GS4I_NODE_REALS, *f = g->force + (size_t)s * GS4I_NODE_REALS;
         const gs4_real *ag = g->memory + (size_t)s * GS4I_NODE_REALS;
         for (i = 0; i < 4 * GS4I_BLOCK_NODES; i += 4) {
             const gs4_real inverse = q[i + 3] > pass->lightest ? 1 / q[i + 3] : GS4I_C(0);
             const gs4_real share = rule->s * gs4i_node_share(rule, q[i + 3] * rule->inv_full);
-            for (c = 0; c < 3; c++) {
-                const gs4_real acc = f[i + c] * inverse;
-                f[i + c] = acc;
-                q[i + c] += share * (acc - gs4i_remembered(rule, ag + i, c, acc));
-            }
+            const gs4i_quad some = { GS4I_LANES(share, share, share, 0) };
+            gs4i_quad acc, before, u;
+            GS4I_LOAD(acc, f + i); GS4I_LOAD(u, q + i);
+            GS4I_SPLAT_MUL(acc, inverse, acc);
+            GS4I_STORE(f + i, acc);
+            gs4i_remembered(rule, ag + i, &acc, &before);
+            GS4I_DIFFERENCE(acc, acc, before);
+            GS4I_MAD(u, some, acc);
+            GS4I_STORE(q + i, u);
         }
         gs4i_hold_nodes(pass->sim, s, q, f, NULL);
     }
@@ -3462,43 +3520,21 @@ static void gs4i_node_memories(int index, void *context)
     const gs4i_node_pass *pass = (const gs4i_node_pass *)context;
     const gs4i_grid *g = &pass->sim->grid;
     const gs4i_rule *rule = &pass->sim->rule;
-    int s, i, c;
+    int s, i;
     for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
         const gs4_real *q = g->momentum + (size_t)s * GS4I_NODE_REALS, *f = g->force + (size_t)s * GS4I_NODE_REALS;
         gs4_real *ag = g->memory + (size_t)s * GS4I_NODE_REALS;
         for (i = 0; i < 4 * GS4I_BLOCK_NODES; i += 4) {
-            const int flags = g->jump_of[s] ? (int)gs4i_jump_at(g, (uint32_t)(64 * s + i / 4))[3] : 0;
+            const int flags = g->jump_of[s] ? *gs4i_contact_at(g, (uint32_t)(64 * s + i / 4)) : 0;
             const int there = q[i + 3] > pass->lightest && !(flags & 7);
-            for (c = 0; c < 3; c++) {
-                const gs4_real before = gs4i_remembered(rule, ag + i, c, f[i + c]);
-                ag[i + c] = there ? before + (f[i + c] - before) / rule->alpha_m : GS4I_C(0);
-            }
+            gs4i_quad acc, before;
+            GS4I_LOAD(acc, f + i);
+            gs4i_remembered(rule, ag + i, &acc, &before);
+            GS4I_DIFFERENCE(acc, acc, before);
+            GS4I_SPLAT_MAD(before, rule->inv_alpha_m, acc);
+            GS4I_SPLAT_MUL(before, GS4I_C(there), before);
+            GS4I_STORE(ag + i, before);
             ag[i + 3] = GS4I_C(there + (flags & 8 ? 2 : 0));
-        }
-    }
-}
-
-/* How far the particles can be driven, bounded from the nodes alone. A node of mass m_i has weight at most m_i/m_p and
- * gradient at most sqrt(2 m_i/m_p)/h in any particle p, so with q_i = min(1, 14 sqrt(m_i/m_min)) no particle sees
- * |div u| > 4.7/h max_i q_i |u_i - u_ref|_1. Where that is small no rehearsal is needed. */
-static void gs4i_node_bounds(int index, void *context)
-{
-    const gs4i_node_pass *pass = (const gs4i_node_pass *)context;
-    const gs4_sim *sim = pass->sim;
-    const gs4i_grid *g = &sim->grid;
-    gs4i_node_report *r = &pass->reports[index];
-    int s, i, c;
-    r->bound = 0; r->bad = 0;
-    for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
-        const gs4_real *q = g->momentum + (size_t)s * GS4I_NODE_REALS, *f = g->force + (size_t)s * GS4I_NODE_REALS;
-        for (i = 0; i < 4 * GS4I_BLOCK_NODES; i += 4) {
-            gs4_real sum = 0, all = 0, ratio;
-            if (!(q[i + 3] > pass->lightest)) continue;
-            for (c = 0; c < 3; c++) { sum += gs4i_abs(q[i + c] - pass->reference[c]); all += q[i + c] + f[i + c]; }
-            ratio = q[i + 3] / sim->min_mass;
-            if (ratio < GS4I_C(1.0 / 196)) sum *= 14 * GS4I_SQRT(ratio);
-            r->bound = gs4i_max(r->bound, sum);
-            if (!gs4i_finite(all) || !gs4i_finite(sum)) r->bad = 1;
         }
     }
 }
@@ -3519,13 +3555,6 @@ static int gs4i_after_occupy(gs4_sim *sim)
         if (!r) return gs4i_fail_memory(sim);
         gs4i_free(m, sim->reports, (size_t)sim->report_capacity, sizeof *r);
         sim->reports = r; sim->report_capacity = sim->grid.occupied_capacity;
-    }
-    if (gs4i_groups(sim) > sim->node_report_capacity) {
-        const int wanted = gs4i_groups(sim) + gs4i_groups(sim) / 8;
-        gs4i_node_report *r = (gs4i_node_report *)gs4i_alloc(m, (size_t)wanted, sizeof *r);
-        if (!r) return gs4i_fail_memory(sim);
-        gs4i_free(m, sim->node_reports, (size_t)sim->node_report_capacity, sizeof *r);
-        sim->node_reports = r; sim->node_report_capacity = wanted;
     }
     return GS4_OK;
 }
@@ -3560,17 +3589,10 @@ static int gs4i_rasterise(gs4_sim *sim, gs4i_node_pass *nodes)
 static void gs4i_set_velocities(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     const int groups = gs4i_groups(sim);
-    double sum[4] = { 0, 0, 0, 0 };
-    int i, c;
     gs4i_parallel_for(&sim->tasks, groups, gs4i_clear_jumps, nodes);
     gs4i_fold_momentum(&sim->boundary, &sim->grid);
     gs4i_parallel_for(&sim->tasks, groups, gs4i_node_velocities, nodes);
     gs4i_fill_images(&sim->boundary, &sim->grid, sim->grid.momentum);
-    for (i = 0; i < groups; i++) {
-        for (c = 0; c < 3; c++) sum[c] += nodes->reports[i].momentum[c];
-        sum[3] += nodes->reports[i].mass;
-    }
-    for (c = 0; c < 3; c++) nodes->reference[c] = GS4I_C(sum[3] > 0 ? sum[c] / sum[3] : 0);
 }
 
 /* Is what the particles have seen so far acceptable, and is dt still within the limit that follows from it? */
@@ -3585,16 +3607,9 @@ static int gs4i_check_stage(gs4_sim *sim)
 }
 
 /* Before anything is written to the particles: can the step be trusted? */
-static int gs4i_rehearse(gs4_sim *sim, gs4i_node_pass *nodes)
+static int gs4i_rehearse(gs4_sim *sim)
 {
-    const int groups = gs4i_groups(sim);
-    gs4i_report r = gs4i_all_reports(sim);
-    gs4_real bound = 0;
-    int i, bad = 0;
-    gs4i_parallel_for(&sim->tasks, groups, gs4i_node_bounds, nodes);
-    for (i = 0; i < groups; i++) { bound = gs4i_max(bound, nodes->reports[i].bound); bad |= nodes->reports[i].bad; }
-    if (bad) return gs4i_fail(sim, GS4_ERROR_UNSTABLE, "the velocity of a node would not be finite; the step was not taken");
-    if (GS4I_C(4.7) * bound * sim->rule.dt < GS4I_C(0.2) * sim->grid.h && r.min_J > GS4I_C(0.25) && r.max_J < 4) return GS4_OK;
+    gs4i_report r;
     gs4i_gather(sim, sim->desc.integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER ? gs4i_rehearse_euler_task : gs4i_rehearse_task);
     r = gs4i_all_reports(sim);
     return r.bad ? gs4i_fail_bad(sim, &r) : GS4_OK;
@@ -3801,7 +3816,6 @@ static int gs4i_step(gs4_sim *sim, gs4_real dt)
         if (sim->unsorted) GS4I_TRY(gs4i_bin(sim));                                             /* S1 */
         GS4I_TRY(gs4i_rasterise(sim, &nodes));                                                  /* S2, S3 */
         if (gs4i_place_jumps(&sim->memory, &sim->boundary, &sim->grid) != GS4_OK) return gs4i_fail_memory(sim);
-        nodes.reports = sim->node_reports;
         gs4i_set_velocities(sim, &nodes);
         if (!euler) {
             gs4i_scatter(sim, gs4i_scatter_forces);                                             /* S4, S5 */
@@ -3811,7 +3825,7 @@ static int gs4i_step(gs4_sim *sim, gs4_real dt)
             gs4i_fill_images(&sim->boundary, &sim->grid, sim->grid.force);
         }
         GS4I_TRY(gs4i_check_stage(sim));
-        GS4I_TRY(gs4i_rehearse(sim, &nodes));
+        GS4I_TRY(gs4i_rehearse(sim));
         if (!euler) gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_node_memories, &nodes);
         gs4i_gather(sim, euler ? gs4i_gather_euler_task : gs4i_correct_task);                   /* S7 */
     }
@@ -4164,7 +4178,7 @@ static int gs4i_rebuild(gs4_sim *next, const gs4i_head *h, const gs4i_pieces *p)
     if (!g->table) return GS4_ERROR_MEMORY;
     if (gs4i_grid_reserve(&next->memory, g, h->active, next->particles.with_rates) != GS4_OK
         || gs4i_grid_reserve_occupied(&next->memory, g, h->occupied + 1) != GS4_OK) return GS4_ERROR_MEMORY;
-    memcpy(g->block, p->at[GS4I_PIECE_BLOCKS], p->size[GS4I_PIECE_BLOCKS]);
+    if (h->active) memcpy(g->block, p->at[GS4I_PIECE_BLOCKS], p->size[GS4I_PIECE_BLOCKS]);
     memcpy(g->occupied_block, p->at[GS4I_PIECE_OCCUPIED], p->size[GS4I_PIECE_OCCUPIED]);
     memcpy(g->first, p->at[GS4I_PIECE_FIRST], p->size[GS4I_PIECE_FIRST]);
     if (!gs4i_blocks_are_sound(next, h, g->occupied_block, g->first, g->block)) return GS4_ERROR_FORMAT;
@@ -4191,7 +4205,6 @@ static void gs4i_release_state(gs4_sim *sim)
     gs4i_grid_free(m, &sim->grid);
     for (i = 0; i < 6; i++) gs4i_free(m, sim->boundary.images[i], (size_t)sim->boundary.image_capacity[i], sizeof(gs4i_image));
     gs4i_free(m, sim->reports, (size_t)sim->report_capacity, sizeof(gs4i_report));
-    gs4i_free(m, sim->node_reports, (size_t)sim->node_report_capacity, sizeof(gs4i_node_report));
 }
 
 /* Make the state of the file beside the present one, and put it in its place when it is whole. */
@@ -4207,7 +4220,7 @@ static int gs4i_restore(gs4_sim *sim, const gs4i_head *h, const gs4i_pieces *p)
     memcpy(next.grid.periodic, empty.periodic, sizeof empty.periodic);
     next.grid.h = empty.h; next.grid.inv_h = empty.inv_h; next.grid.origin = empty.origin; next.grid.table_count = empty.table_count;
     for (i = 0; i < 6; i++) { next.boundary.images[i] = NULL; next.boundary.image_count[i] = next.boundary.image_capacity[i] = 0; }
-    next.reports = NULL; next.node_reports = NULL; next.report_capacity = next.node_report_capacity = 0;
+    next.reports = NULL; next.report_capacity = 0;
     result = gs4i_rebuild(&next, h, p);
     if (result != GS4_OK) {
         gs4i_release_state(&next);

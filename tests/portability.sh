@@ -360,7 +360,7 @@ const wasi = new WASI({ version: 'preview1', args: process.argv.slice(2), preope
 const module = await WebAssembly.compile(readFileSync(process.argv[2]));
 process.exitCode = wasi.start(await WebAssembly.instantiate(module, wasi.getImportObject())) ?? 0;
 END
-    machine "clang --target=wasm32-wasi -D_WASI_EMULATED_PROCESS_CLOCKS -lwasi-emulated-process-clocks" "$strict_c -Wno-unused-command-line-argument" \
+    machine "clang --target=wasm32-wasi -Wl,-z,stack-size=262144 -D_WASI_EMULATED_PROCESS_CLOCKS -lwasi-emulated-process-clocks" "$strict_c -Wno-unused-command-line-argument" \
         100 "node --no-warnings run.mjs" .wasm
 }
 

@@ -322,7 +322,7 @@ static void test_errors_calls(void)
 {
     gs4_sim *sim = err_scene();
     const gs4_vec3 good = at(0, 0, 0), bad[6] = { at(ERR_NAN, 0, 0), at(0, ERR_INFINITY, 0), at(0, 0, -ERR_INFINITY), at(ERR_NAN, ERR_NAN, ERR_NAN), at(sizeof(gs4_real) == 8 ? 1e300 : 1e30, 0, 0), at(0, 0, sizeof(gs4_real) == 8 ? -1e300 : -1e30) };
-    static const double dts[] = { 0, -1, ERR_NAN, ERR_INFINITY, -ERR_INFINITY };
+    const double dts[] = { 0, -1, ERR_NAN, ERR_INFINITY, -ERR_INFINITY };
     static const int ids[] = { -1, 2, INT_MAX, INT_MIN };
     gs4_collider c;
     gs4_emitter e;
@@ -536,7 +536,7 @@ static void test_errors_shapes(void)
 /* Distances that are not finite: no particle may be lost, none may be made. */
 static void test_errors_sdf(void)
 {
-    static const double values[] = { ERR_NAN, ERR_INFINITY, -ERR_INFINITY, -1e30, 1e30 };
+    const double values[] = { ERR_NAN, ERR_INFINITY, -ERR_INFINITY, -1e30, 1e30 };
     int v, contact;
     for (v = 0; v < 5; v++)
         for (contact = 0; contact < 3; contact++) {
@@ -651,7 +651,7 @@ static void test_errors_large_mesh(void)
 
 static void test_errors_edit(void)
 {
-    static const double wrong[] = { ERR_NAN, ERR_INFINITY, -ERR_INFINITY, 1e30, -1e30, 5, -5 };
+    const double wrong[] = { ERR_NAN, ERR_INFINITY, -ERR_INFINITY, 1e30, -1e30, 5, -5 };
     int field, v, c, euler;
     for (euler = 0; euler < 2; euler++) for (field = 0; field < 2; field++) for (v = 0; v < 7; v++) for (c = 0; c < 3; c++) {
         gs4_sim_desc d = err_desc();
@@ -706,7 +706,7 @@ static void test_errors_edit_repaired(void)
 /* A position that is no number must not get anywhere by another way. */
 static void test_errors_edit_then_add(void)
 {
-    static const double wrong[] = { ERR_NAN, ERR_INFINITY, -1e30 };
+    const double wrong[] = { ERR_NAN, ERR_INFINITY, -1e30 };
     const gs4_fill f = scene_fill(at(0, 0, 0));
     int v;
     for (v = 0; v < 3; v++) {
@@ -772,7 +772,7 @@ static void test_errors_refused_step(void)
  * particles have just left through open walls. */
 static void test_errors_viscosity_callback(void)
 {
-    static const double wrong[] = { ERR_NAN, -1, ERR_INFINITY, -ERR_INFINITY, 1e30 };
+    const double wrong[] = { ERR_NAN, -1, ERR_INFINITY, -ERR_INFINITY, 1e30 };
     int euler, walls, v, i;
     for (euler = 0; euler < 2; euler++) for (walls = 0; walls < 2; walls++) {
         err_law law = { 0, 0 };

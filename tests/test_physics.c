@@ -314,6 +314,72 @@ static void test_stokes_first(void)
     }
 }
 
+/* Start-up of Couette flow between a wall at rest, y = 0, and a sticky body that goes along x, y = 1, from rest:
+ * u = y + sum 2 (-1)^k / (k pi) sin(k pi y) exp(-k^2 pi^2 nu t) */
+static double couette(double y, double t)
+{
+    const double nu = 0.5, pi = acos(-1.0);
+    double u = y;
+    int k;
+    for (k = 1; k < 60; k++) u += (k & 1 ? -2 : 2) / (k * pi) * sin(k * pi * y) * exp(-k * k * pi * pi * nu * t);
+    return u;
+}
+
+/* Profile error (2-norm, away from the walls) at time t, with n - gap cells between the wall and the surface of the body: a plane of
+ * nodes is 1/2 - gap of a cell in front of that. *off: how many cells behind it the profile, taken for steady, reaches u = 1. */
+static double couette_error(int n, gs4_integrator integrator, double gap, double t, double *off)
+{
+    const double h = 1 / (n - gap);
+    gs4_sim_desc d = scene_cube(n);
+    gs4_material m = scene_liquid(1, 0.5, 8);
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    gs4_collider body;
+    gs4_sim *sim;
+    double sum = 0, weight = 0, yu = 0, yy = 0;
+    gs4_view x, v;
+    int i;
+    memset(&body, 0, sizeof body);
+    body.shape = gs4_plane(at(0, 1, 0), at(0, -1, 0)); body.velocity = at(1, 0, 0); body.contact = GS4_WALL_STICK;
+    d.cells[0] = d.cells[2] = 4; d.cells[1] = n + 3; d.cell_size = (gs4_real)h; d.integrator = integrator;
+    d.walls[0] = d.walls[1] = d.walls[4] = d.walls[5] = GS4_WALL_PERIODIC; d.walls[2] = GS4_WALL_STICK;
+    sim = physics_create(&d, &m);
+    CHECK(gs4_add_collider(sim, &body) == 0);
+    CHECK(gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(4 * h, 1, 4 * h)), &f) > 0);
+    CHECK(physics_run(sim, t) == 0);
+    x = gs4_particles(sim, GS4_FIELD_POSITION); v = gs4_particles(sim, GS4_FIELD_VELOCITY);
+    for (i = 0; i < x.count; i++) {
+        const double y = (double)x.data[(size_t)i * (size_t)x.stride + 1], u = (double)v.data[(size_t)i * (size_t)v.stride];
+        const double e = u - couette(y, t);
+        if (y < 0.1 || y > 0.9) continue;
+        sum += e * e; weight += 1; yu += y * u; yy += y * y;
+    }
+    gs4_destroy(sim);
+    *off = (yy / yu - 1) / h;
+    return sqrt(sum / weight);
+}
+
+/* A body holds the nodes inside of it: its surface is a wall to first order only. Here it lies just in front of a plane of nodes. */
+static void test_couette(void)
+{
+    static const double times[2] = { 0.1, 0.4 };
+    const double gap = 0.51;
+    double off;
+    int i, k;
+    for (i = 0; i < 2; i++)
+        for (k = 0; k < 2; k++) {
+            const double coarse = couette_error(8, physics_integrators[i], gap, times[k], &off);
+            const double fine = couette_error(16, physics_integrators[i], gap, times[k], &off);
+            if (test_filter[0]) printf("Couette, integrator %d, t %g: errors %.2e %.2e, order %.2f\n", (int)physics_integrators[i], times[k], coarse, fine, log2(coarse / fine));
+            CHECK(fine < 0.025);
+            CHECK(log2(coarse / fine) > 1.3);
+            if (test_slow) {
+                const double finest = couette_error(32, physics_integrators[i], gap, times[k], &off);
+                if (test_filter[0]) printf("    %.2e, order %.2f\n", finest, log2(fine / finest));
+                CHECK(log2(fine / finest) > 0.85);
+            }
+        }
+}
+
 /* A drop on a sticky floor, Re 5, Fr 2.26 (2021, figure 9 left): width over D against t U/D from an axisymmetric volume-of-fluid
  * computation (finest level), allowed 3 %. Just after the impact (t U/D 1.58) the foot of the drop is 5 % too wide: not held yet. */
 static void test_drop_impact(void)

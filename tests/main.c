@@ -17,6 +17,7 @@ int main(int count, char **values)
     RUN(test_shear_wave);
     RUN(test_stokes_first);
     RUN(test_couette);
+    RUN(test_couette_surface);
     RUN(test_column_at_rest);
     RUN(test_sound_speed);
     RUN(test_drop_at_rest);

@@ -380,6 +380,21 @@ static void test_couette(void)
         }
 }
 
+/* Wherever its surface lies between two planes of nodes, a sticky body is a wall within about a cell of it. */
+static void test_couette_surface(void)
+{
+    static const double gaps[4] = { 0.01, 0.25, 0.49, 0.8 };
+    double off;
+    int i, k;
+    for (i = 0; i < 2; i++)
+        for (k = 0; k < 4; k++) {
+            couette_error(8, physics_integrators[i], gaps[k], 1, &off);
+            if (test_filter[0]) printf("Couette, integrator %d: nodes %.2f cells before the body: wall %+.2f cells behind its surface\n",
+                                       (int)physics_integrators[i], 0.5 - gaps[k], off);
+            CHECK_CLOSE(off, 0, 1.1);
+        }
+}
+
 /* A drop on a sticky floor, Re 5, Fr 2.26 (2021, figure 9 left): width over D against t U/D from an axisymmetric volume-of-fluid
  * computation (finest level), allowed 3 %. Just after the impact (t U/D 1.58) the foot of the drop is 5 % too wide: not held yet. */
 static void test_drop_impact(void)

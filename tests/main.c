@@ -24,6 +24,7 @@ int main(int count, char **values)
     RUN(test_drop_impact);
     run_errors();
     run_files();
+    RUN(test_order_as_printed);
     RUN(test_order_in_time);
     return test_finish();
 }

@@ -13,6 +13,7 @@ int main(int count, char **values)
     test_arguments(count, values);
     RUN(test_free_flight);
     RUN(test_spin);
+    RUN(test_momentum);
     RUN(test_poiseuille);
     RUN(test_shear_wave);
     RUN(test_stokes_first);

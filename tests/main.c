@@ -14,6 +14,7 @@ int main(int count, char **values)
     RUN(test_free_flight);
     RUN(test_spin);
     RUN(test_momentum);
+    RUN(test_momentum_seam);
     RUN(test_poiseuille);
     RUN(test_shear_wave);
     RUN(test_stokes_first);

@@ -143,6 +143,14 @@ static void test_momentum(void)
     }
 }
 
+/* The seam of a periodic box is no place: a drop that goes through it keeps its momentum as any other. */
+static void test_momentum_seam(void)
+{
+    double spin, t, lost = momentum_lost(GS4_INTEGRATOR_GS4, (double)INFINITY, 1, GS4_WALL_PERIODIC, &spin, &t);
+    if (test_filter[0]) printf("through the seam: momentum within %.1e\n", lost);
+    CHECK(lost < MOMENTUM_ROUNDING);
+}
+
 /* Plane channel along x between walls y = 0 and y = 1, periodic in x and z; profile error (2-norm) at time t. */
 typedef double (*physics_profile)(double y, double t);
 

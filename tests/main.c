@@ -7,6 +7,7 @@
 #include "test_physics.c"
 #include "test_errors.c"
 #include "test_files.c"
+#include "test_stability.c"
 
 int main(int count, char **values)
 {
@@ -26,6 +27,8 @@ int main(int count, char **values)
     RUN(test_drop_impact);
     run_errors();
     run_files();
+    RUN(test_stability);
+    RUN(test_extremes);
     RUN(test_order_as_printed);
     RUN(test_order_in_time);
     return test_finish();

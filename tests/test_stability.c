@@ -1,0 +1,155 @@
+/* Steps just below the limit stay bounded and steps above it are refused, for every member of the family; and extremes of everything
+ * at once: a step is taken or refused with a sentence, numbers stay finite, energy does not come from nowhere. */
+
+static double stability_random(uint32_t *state)
+{
+    *state = *state * 1664525u + 1013904223u;
+    return (double)(*state >> 8) / 16777216.0 - 0.5;
+}
+
+static void stability_stir(gs4_sim *sim, double speed, uint32_t seed)
+{
+    gs4_edit v = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
+    int i, c;
+    for (i = 0; i < v.count; i++)
+        for (c = 0; c < 3; c++) v.data[(size_t)i * (size_t)v.stride + (size_t)c] += (gs4_real)(speed * stability_random(&seed));
+}
+
+/* Kinetic and, of the Tait equation, compressive: V0 (rho0 c0^2 / 7) (J^-6/6 + J - 7/6), J. */
+static double stability_energy(gs4_sim *sim, double sound_speed)
+{
+    const gs4_view J = gs4_particles(sim, GS4_FIELD_VOLUME_RATIO), m = gs4_particles(sim, GS4_FIELD_MASS);
+    double sum = gs4_get_stats(sim).kinetic_energy;
+    int i;
+    for (i = 0; i < J.count; i++) {
+        const double j = (double)J.data[(size_t)i * (size_t)J.stride];
+        sum += (double)m.data[(size_t)i * (size_t)m.stride] * sound_speed * sound_speed / 7 * (pow(j, -6) / 6 + j - 7.0 / 6);
+    }
+    return sum;
+}
+
+/* A jittered drop, 7 cells across, stirred by c0/1000: the most that 0.95 of the limit makes of its energy in `steps` steps. */
+static double stability_growth(gs4_integrator integrator, double rho, double spurious, double viscosity, int steps)
+{
+    gs4_sim_desc d = scene_cube(16);
+    gs4_material m = scene_liquid(1000, viscosity, 10);
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    gs4_sim *sim;
+    double start, most = 0;
+    uint64_t hash;
+    int i, result;
+    d.integrator = integrator; d.rho_inf = (gs4_real)rho; d.rho_inf_spurious = (gs4_real)spurious;
+    if (integrator == GS4_INTEGRATOR_GS4) d.flip_decay_time = INFINITY;
+    sim = physics_create(&d, &m);
+    f.jitter = 1; f.random_seed = 5;
+    CHECK(gs4_add_particles(sim, gs4_sphere(at(0.5, 0.5, 0.5), (gs4_real)(3.5 / 16)), &f) > 0);
+    stability_stir(sim, 0.01, 1);
+    start = stability_energy(sim, 10);
+    for (i = 0; i < steps && most < 100; i++) {
+        CHECK_RESULT(sim, gs4_step(sim, (gs4_real)(0.95 * (double)gs4_stable_dt(sim))), GS4_OK);
+        most = fmax(most, stability_energy(sim, 10) / start);
+        if (i % 100) continue;
+        hash = gs4_state_hash(sim);
+        result = gs4_step(sim, (gs4_real)(1.5 * (double)gs4_stable_dt(sim)));
+        CHECK(result == GS4_ERROR_ARGUMENT || result == GS4_ERROR_UNSTABLE);
+        CHECK(gs4_state_hash(sim) == hash);
+    }
+    if (test_filter[0]) printf("integrator %d, rho %g %g, viscosity %g: energy at most %.4f, at the end %.4f of what it was\n", (int)integrator, rho, spurious,
+                               viscosity, most, stability_energy(sim, 10) / start);
+    gs4_destroy(sim);
+    return most;
+}
+
+static void test_stability(void)
+{
+    static const double family[4][2] = { { 0, 0 }, { 0.5, 0 }, { 0.5, 0.5 }, { 1, 0.5 } };
+    const int steps = test_slow ? 3000 : 300;
+    int i, k;
+    for (k = 0; k < (test_slow ? 3 : 1); k++) {
+        const double viscosity = k == 0 ? 0 : k == 1 ? 30 : 3000;       /* sound, both, viscosity limit the step */
+        for (i = 0; i < 4; i++) CHECK(stability_growth(GS4_INTEGRATOR_GS4, family[i][0], family[i][1], viscosity, steps) < 1.1);
+        CHECK(stability_growth(GS4_INTEGRATOR_SYMPLECTIC_EULER, 0, 0, viscosity, steps) < 1.1);
+    }
+}
+
+/* --- extremes ------------------------------------------------------------------------------------------- */
+
+typedef struct stability_scene {
+    double viscosity, sound_speed, gravity, cell_size, flight;          /* of cells a second, towards the floor */
+    gs4_integrator integrator;
+    gs4_wall floor;
+} stability_scene;
+
+/* The one of the 5 x 4^3 x 2 x 2 x 3 combinations that has this number. */
+static stability_scene stability_choose(int number)
+{
+    static const double viscosities[5] = { 0, 1e-3, 1, 1e3, 1e6 }, sounds[4] = { 0.1, 1, 1e2, 1e4 };
+    static const double gravities[4] = { 0, 9.81, 1e3, 1e5 }, sizes[4] = { 1e-6, 1e-3, 1, 1e3 };
+    static const gs4_wall floors[3] = { GS4_WALL_STICK, GS4_WALL_SLIP, GS4_WALL_SEPARATE };
+    stability_scene s;
+    s.viscosity = viscosities[number % 5]; number /= 5;
+    s.sound_speed = sounds[number % 4]; number /= 4;
+    s.gravity = gravities[number % 4]; number /= 4;
+    s.cell_size = sizes[number % 4]; number /= 4;
+    s.flight = number % 2 ? 1000 : 0; number /= 2;
+    s.integrator = physics_integrators[number % 2]; number /= 2;
+    s.floor = floors[number];
+    return s;
+}
+
+/* What is wrong after call i, which gave `result`, or NULL. The last is gs4_advance, which must find its way unless the floor is hit
+ * faster than sound. */
+static const char *stability_fault(gs4_sim *sim, const stability_scene *s, int i, int result, double energy)
+{
+    const double h = s->cell_size, speed2 = s->flight * h * s->flight * h + 4 * s->gravity * h;
+    if (result > 0 || (result < 0 && !gs4_last_error(sim)[0])) return "neither taken nor refused with a sentence";
+    if (i == 20 && result < 0 && speed2 < s->sound_speed * s->sound_speed) return "gives up";
+    if (!err_is_finite(sim)) return "not finite";
+    if (s->gravity == 0 && !(stability_energy(sim, s->sound_speed) < 1.1 * energy)) return "energy from nowhere";
+    return NULL;
+}
+
+/* 4 cells across, one cell above the floor: 20 steps and one gs4_advance of as long as 20 of its own would be. Returns its fault. */
+static const char *stability_try(const stability_scene *s, int number, int *refused)
+{
+    const double h = s->cell_size;
+    gs4_sim_desc d = scene_cube(10);
+    gs4_material m = scene_liquid(1000, s->viscosity, s->sound_speed);
+    gs4_fill f = scene_fill(at(0, -s->flight * h, 0));
+    gs4_sim *sim;
+    const char *fault = NULL;
+    double energy;
+    int i, result;
+    d.cell_size = (gs4_real)h; d.gravity.y = (gs4_real)-s->gravity; d.integrator = s->integrator; d.walls[2] = s->floor;
+    sim = physics_create(&d, &m);
+    f.jitter = (gs4_real)0.7; f.random_seed = (uint32_t)number;
+    CHECK(gs4_add_particles(sim, gs4_sphere(at(5 * h, 3 * h, 5 * h), (gs4_real)(2 * h)), &f) > 0);
+    stability_stir(sim, 1e-2 * (s->sound_speed + s->flight * h), 1);
+    energy = stability_energy(sim, s->sound_speed);
+    for (i = 0; i < 21 && !fault; i++) {
+        const double limit = (double)gs4_stable_dt(sim);
+        result = i < 20 ? gs4_step(sim, (gs4_real)(0.95 * limit)) : gs4_advance(sim, (gs4_real)(10 * limit));
+        if (result < 0) ++*refused;
+        fault = stability_fault(sim, s, i, result, energy);
+    }
+    if (fault) printf("    call %d of 21 gave %d (%s), %llu steps, energy %.3g of what it was\n", i, result, result < 0 ? gs4_last_error(sim) : "",
+                      (unsigned long long)gs4_get_stats(sim).steps, stability_energy(sim, s->sound_speed) / energy);
+    gs4_destroy(sim);
+    return fault;
+}
+
+/* 64 of the combinations, spread over them by the golden section; with --slow all. */
+static void test_extremes(void)
+{
+    const int all = 5 * 4 * 4 * 4 * 2 * 2 * 3, count = test_slow ? all : 64;
+    int i, refused = 0;
+    for (i = 0; i < count; i++) {
+        const int number = test_slow ? i : (int)((long)i * 2371 % all);
+        const stability_scene s = stability_choose(number);
+        const char *fault = stability_try(&s, number, &refused);
+        CHECK(fault == NULL);
+        if (fault) printf("    %d: %s: viscosity %g, sound %g, gravity %g, cells of %g, flight %g, integrator %d, floor %d\n", number, fault, s.viscosity,
+                          s.sound_speed, s.gravity, s.cell_size, s.flight, (int)s.integrator, (int)s.floor);
+    }
+    if (test_filter[0]) printf("%d scenes, %d of %d calls refused\n", count, refused, 21 * count);
+}

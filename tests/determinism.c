@@ -1,5 +1,6 @@
 /* A block of liquid falls on a turning ball beside a nozzle, between walls of every kind; prints a hash of the state.
- * Every build for one machine must print the same, whatever this says:
+ * Every build for one machine must print the same, whatever this says, but for the first two:
+ *   scene=bunny    eight bunnies thrown on each other in a box, and a stamp on them, instead
  *   steps=N        length of the run (500)
  *   threads=N      of the library's own pool (GS4_PTHREADS)
  *   shuffle=1      a parallel_for that runs the tasks in another order every time
@@ -7,11 +8,13 @@
  *   frames=F       writes F.ply, F.npy and, as text to compare with, F.txt */
 #define GS4MPM_IMPLEMENTATION
 #include "gs4mpm.h"
+#include "../examples/bunny.h"
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-typedef struct options { int steps, threads, shuffle; const char *checkpoint, *frames; } options;
+typedef struct options { int steps, threads, shuffle, bunnies; const char *checkpoint, *frames; } options;
 
 static gs4_vec3 at(double x, double y, double z)
 {
@@ -38,25 +41,19 @@ static void stop(const char *what, const gs4_sim *sim)
     exit(2);
 }
 
-/* 0.6 x 0.4 x 0.8 m: open above, periodic along y; liquids and a nozzle; no particle yet */
-static gs4_sim *create(gs4_integrator integrator, const options *o, unsigned *calls)
+/* 0.6 x 0.4 x 0.8 m: open above, periodic along y; liquids, a ball and a nozzle; no particle yet */
+static gs4_sim *create_block(gs4_sim_desc *d)
 {
-    gs4_sim_desc d;
     gs4_material m;
     gs4_collider c;
     gs4_emitter e;
     gs4_sim *sim;
-    memset(&d, 0, sizeof d); memset(&m, 0, sizeof m); memset(&c, 0, sizeof c); memset(&e, 0, sizeof e);
-    d.cells[0] = 18; d.cells[1] = 12; d.cells[2] = 24;
-    d.cell_size = (gs4_real)(1.0 / 30);
-    d.gravity.z = (gs4_real)-9.81;
-    d.integrator = integrator;
-    if (integrator == GS4_INTEGRATOR_GS4) { d.rho_inf = (gs4_real)0.8; d.rho_inf_spurious = (gs4_real)0.2; }
-    d.walls[0] = GS4_WALL_STICK; d.walls[1] = GS4_WALL_SEPARATE; d.walls[2] = d.walls[3] = GS4_WALL_PERIODIC;
-    d.walls[4] = GS4_WALL_SLIP; d.walls[5] = GS4_WALL_OPEN;
-    d.threads = o->threads;
-    if (o->shuffle) { d.parallel_for = run_shuffled; d.parallel_user = calls; }
-    if (gs4_create(&d, &sim) < 0) stop("gs4_create", NULL);
+    memset(&m, 0, sizeof m); memset(&c, 0, sizeof c); memset(&e, 0, sizeof e);
+    d->cells[0] = 18; d->cells[1] = 12; d->cells[2] = 24;
+    d->cell_size = (gs4_real)(1.0 / 30);
+    d->walls[0] = GS4_WALL_STICK; d->walls[1] = GS4_WALL_SEPARATE; d->walls[2] = d->walls[3] = GS4_WALL_PERIODIC;
+    d->walls[4] = GS4_WALL_SLIP; d->walls[5] = GS4_WALL_OPEN;
+    if (gs4_create(d, &sim) < 0) stop("gs4_create", NULL);
     m.density = 1000; m.viscosity = (gs4_real)0.5; m.sound_speed = 20;
     if (gs4_add_material(sim, &m) < 0) stop("gs4_add_material", sim);
     m.density = 800; m.viscosity = 5;
@@ -68,6 +65,67 @@ static gs4_sim *create(gs4_integrator integrator, const options *o, unsigned *ca
     e.fill.material = 1; e.fill.velocity = at(0, 0, -1);
     if (gs4_add_emitter(sim, &e) < 0) stop("gs4_add_emitter", sim);
     return sim;
+}
+
+static void fill_block(gs4_sim *sim)
+{
+    gs4_fill block;
+    memset(&block, 0, sizeof block);
+    block.velocity = at(0.3, 0.5, 0); block.angular_velocity = at(0, 0, 2); block.jitter = (gs4_real)0.2; block.random_seed = 7;
+    if (gs4_add_particles(sim, gs4_box(at(0.2, 0.1, 0.28), at(0.45, 0.3, 0.45)), &block) < 0) stop("gs4_add_particles", sim);
+}
+
+/* examples/bunny.c on a coarse grid with z up: a box of 0.24 x 0.24 x 0.72 m whose walls are sticky, two liquids, a stamp on its way down */
+static gs4_sim *create_bunnies(gs4_sim_desc *d)
+{
+    gs4_material m;
+    gs4_collider c;
+    gs4_sim *sim;
+    int i;
+    memset(&m, 0, sizeof m); memset(&c, 0, sizeof c);
+    d->cells[0] = d->cells[1] = 20; d->cells[2] = 60;
+    d->cell_size = (gs4_real)0.012; d->origin = at(-0.12, -0.12, 0);
+    if (gs4_create(d, &sim) < 0) stop("gs4_create", NULL);
+    for (i = 0; i < 2; i++) {
+        m.density = 1200; m.viscosity = (gs4_real)(i ? 6 : 2); m.sound_speed = 20;
+        if (gs4_add_material(sim, &m) < 0) stop("gs4_add_material", sim);
+    }
+    c.shape = gs4_box(at(-0.06, -0.06, 0.66), at(0.06, 0.06, 0.7)); c.contact = GS4_WALL_STICK; c.velocity = at(0, 0, -3.5);
+    if (gs4_add_collider(sim, &c) < 0) stop("gs4_add_collider", sim);
+    return sim;
+}
+
+static void fill_bunnies(gs4_sim *sim)
+{
+    static gs4_real vertices[8][BUNNY_VERTEX_COUNT][3];
+    gs4_fill bunny;
+    int i, k;
+    memset(&bunny, 0, sizeof bunny);
+    for (i = 0; i < 8; i++) {
+        const double turn = 1.3 * i, tip = 0.5 * i;
+        for (k = 0; k < BUNNY_VERTEX_COUNT; k++) {
+            const double x = (double)bunny_vertices[k][0], y = -(double)bunny_vertices[k][2], z = (double)bunny_vertices[k][1] - 0.49;
+            const double tipped = cos(tip) * y - sin(tip) * z;
+            vertices[i][k][0] = (gs4_real)((i % 2 ? 0.054 : -0.054) + 0.1 * (cos(turn) * x - sin(turn) * tipped));
+            vertices[i][k][1] = (gs4_real)((i / 2 % 2 ? 0.054 : -0.054) + 0.1 * (sin(turn) * x + cos(turn) * tipped));
+            vertices[i][k][2] = (gs4_real)(0.06 + 0.075 * i + 0.1 * (sin(tip) * y + cos(tip) * z));
+        }
+        bunny.material = i % 2; bunny.velocity = at(0, 0, -1 - 0.2 * i);
+        if (gs4_add_particles(sim, gs4_mesh(&vertices[i][0][0], BUNNY_VERTEX_COUNT, &bunny_triangles[0][0], BUNNY_TRIANGLE_COUNT), &bunny) < 0)
+            stop("gs4_add_particles", sim);
+    }
+}
+
+static gs4_sim *create(gs4_integrator integrator, const options *o, unsigned *calls)
+{
+    gs4_sim_desc d;
+    memset(&d, 0, sizeof d);
+    d.gravity.z = (gs4_real)-9.81;
+    d.integrator = integrator;
+    if (integrator == GS4_INTEGRATOR_GS4) { d.rho_inf = (gs4_real)0.8; d.rho_inf_spurious = (gs4_real)0.2; }
+    d.threads = o->threads;
+    if (o->shuffle) { d.parallel_for = run_shuffled; d.parallel_user = calls; }
+    return o->bunnies ? create_bunnies(&d) : create_block(&d);
 }
 
 static void write_frames(gs4_sim *sim, const char *name)
@@ -97,12 +155,9 @@ static void run(const char *name, gs4_integrator integrator, const options *o)
 {
     unsigned calls = 0;
     gs4_sim *sim = create(integrator, o, &calls);
-    gs4_fill block;
     uint64_t hash;
     int i;
-    memset(&block, 0, sizeof block);
-    block.velocity = at(0.3, 0.5, 0); block.angular_velocity = at(0, 0, 2); block.jitter = (gs4_real)0.2; block.random_seed = 7;
-    if (gs4_add_particles(sim, gs4_box(at(0.2, 0.1, 0.28), at(0.45, 0.3, 0.45)), &block) < 0) stop("gs4_add_particles", sim);
+    if (o->bunnies) fill_bunnies(sim); else fill_block(sim);
     for (i = 0; i < o->steps; i++) {
         if (i == o->steps / 2 && o->checkpoint) {
             if (gs4_save(sim, o->checkpoint) < 0) stop("gs4_save", sim);
@@ -128,11 +183,12 @@ static const char *value_of(const char *argument, const char *name)
 
 int main(int count, char **values)
 {
-    options o = { 500, 0, 0, NULL, NULL };
+    options o = { 500, 0, 0, 0, NULL, NULL };
     const char *v;
     int i;
     for (i = 1; i < count; i++) {
-        if ((v = value_of(values[i], "steps=")) != NULL) o.steps = atoi(v);
+        if ((v = value_of(values[i], "scene=")) != NULL && strcmp(v, "bunny") == 0) o.bunnies = 1;
+        else if ((v = value_of(values[i], "steps=")) != NULL) o.steps = atoi(v);
         else if ((v = value_of(values[i], "threads=")) != NULL) o.threads = atoi(v);
         else if ((v = value_of(values[i], "shuffle=")) != NULL) o.shuffle = atoi(v);
         else if ((v = value_of(values[i], "checkpoint=")) != NULL) o.checkpoint = v;

@@ -232,14 +232,15 @@ layout() {
 det() {
     program=./det$(echo "$1 $real" | cksum | tr ' ' _)$suffix
     [ -x "$tmp/$program" ] || $1 $real -I. tests/determinism.c -o "$tmp/$program" -lm || return 1
-    (cd "$tmp" && ${3:-} "$program" steps=$steps ${2:-})
+    (cd "$tmp" && ${3:-} "$program" $scene steps=$steps ${2:-})
 }
 
 # same NAME BUILD ARGUMENTS [RUNNER]: prints what the reference printed
-same() { check "$1 $real" prints_same "$2" "$3" "${4:-}"; }
+same() { check "$1 $scene $real" prints_same "$2" "$3" "${4:-}"; }
 prints_same() { det "$@" > "$tmp/det.out" && tr -d '\r' < "$tmp/det.out" | diff "$tmp/reference" -; }
 
 # reference REAL STEPS: what this compiler gives, to compare all others with
+scene=''
 threaded="$CC -O2 -DGS4_PTHREADS -pthread"
 reference() {
     real=$1 steps=$2 suffix=''
@@ -269,8 +270,16 @@ all_hashes() {
     same "GS4_NO_VECTORS" "$CC -O2 -DGS4_NO_VECTORS" ""
     threads_and_checkpoint
 }
-hashes() { all_hashes ""; contraction; }
+hashes() { all_hashes ""; bunnies; contraction; }
 hashes_double() { all_hashes -DGS4_DOUBLE; }
+
+bunnies() {
+    scene=scene=bunny
+    reference "" 500
+    for level in -O0 '-O3 -march=native'; do same "$level" "$CC $level" ""; done
+    threads_and_checkpoint
+    scene=''
+}
 
 # Whether the user's own products and sums are still fused where they asked for it
 contraction() {

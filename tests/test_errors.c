@@ -190,7 +190,7 @@ static void test_errors_desc(void)
         ERR_FIELD(gs4_sim_desc, walls[0], "walls", ERR_INT), ERR_FIELD(gs4_sim_desc, walls[3], "walls", ERR_INT), ERR_FIELD(gs4_sim_desc, walls[5], "walls", ERR_INT),
         ERR_FIELD(gs4_sim_desc, wall_temperature[0], "wall_temperature", ERR_LATER), ERR_FIELD(gs4_sim_desc, wall_temperature[5], "wall_temperature", ERR_LATER),
         ERR_FIELD(gs4_sim_desc, wall_is_isothermal[0], "wall_is_isothermal", ERR_LATER_INT), ERR_FIELD(gs4_sim_desc, wall_is_isothermal[5], "wall_is_isothermal", ERR_LATER_INT),
-        ERR_FIELD(gs4_sim_desc, ambient_temperature, "ambient_temperature", ERR_LATER), ERR_FIELD(gs4_sim_desc, air_is_isothermal, "air_is_isothermal", ERR_LATER_INT),
+        ERR_FIELD(gs4_sim_desc, ambient_temperature, "ambient_temperature", ERR_REAL), ERR_FIELD(gs4_sim_desc, air_is_isothermal, "air_is_isothermal", ERR_LATER_INT),
         ERR_FIELD(gs4_sim_desc, cfl, "cfl", ERR_REAL), ERR_FIELD(gs4_sim_desc, max_dt, "max_dt", ERR_REAL),
         ERR_FIELD(gs4_sim_desc, solver_tolerance, "solver_tolerance", ERR_REAL), ERR_FIELD(gs4_sim_desc, solver_max_iterations, "solver_max_iterations", ERR_INT),
         ERR_FIELD(gs4_sim_desc, max_particles, "max_particles", ERR_INT), ERR_FIELD(gs4_sim_desc, threads, "threads", ERR_INT) };
@@ -204,11 +204,11 @@ static void test_errors_desc(void)
 static void test_errors_material(void)
 {
     static const err_field fields[] = {
-        ERR_FIELD(gs4_material, density, "density", ERR_REAL), ERR_FIELD(gs4_material, liquid, "liquid", ERR_LATER_INT),
+        ERR_FIELD(gs4_material, density, "density", ERR_REAL), ERR_FIELD(gs4_material, liquid, "liquid", ERR_INT),
         ERR_FIELD(gs4_material, viscosity, "viscosity", ERR_REAL), ERR_FIELD(gs4_material, local_fraction, "local_fraction", ERR_REAL),
         ERR_FIELD(gs4_material, relaxation_time, "relaxation_time", ERR_LATER), ERR_FIELD(gs4_material, stretch_time, "stretch_time", ERR_LATER),
         ERR_FIELD(gs4_material, anisotropy, "anisotropy", ERR_LATER), ERR_FIELD(gs4_material, arms, "arms", ERR_LATER),
-        ERR_FIELD(gs4_material, viscosity_law, "viscosity", ERR_LATER_INT),
+        ERR_FIELD(gs4_material, viscosity_law, "viscosity", ERR_INT),
         ERR_FIELD(gs4_material, cross_wlf.a, "cross_wlf", ERR_LATER), ERR_FIELD(gs4_material, cross_wlf.n, "cross_wlf", ERR_LATER),
         ERR_FIELD(gs4_material, cross_wlf.d1, "cross_wlf", ERR_LATER), ERR_FIELD(gs4_material, cross_wlf.a1, "cross_wlf", ERR_LATER),
         ERR_FIELD(gs4_material, cross_wlf.t1, "cross_wlf", ERR_LATER), ERR_FIELD(gs4_material, cross_wlf.t2, "cross_wlf", ERR_LATER),
@@ -220,8 +220,24 @@ static void test_errors_material(void)
         ERR_FIELD(gs4_material, fourier_fraction, "fourier_fraction", ERR_LATER), ERR_FIELD(gs4_material, melting_temperature, "melting_temperature", ERR_LATER),
         ERR_FIELD(gs4_material, latent_heat, "latent_heat", ERR_LATER), ERR_FIELD(gs4_material, can_melt, "can_melt", ERR_LATER_INT),
         ERR_FIELD(gs4_material, viscous_heating, "viscous_heating", ERR_LATER_INT) };
+    static const err_field pom_pom[] = {
+        ERR_FIELD(gs4_material, liquid, "liquid", ERR_INT), ERR_FIELD(gs4_material, viscosity, "viscosity", ERR_REAL),
+        ERR_FIELD(gs4_material, local_fraction, "local_fraction", ERR_REAL), ERR_FIELD(gs4_material, relaxation_time, "relaxation_time", ERR_REAL),
+        ERR_FIELD(gs4_material, stretch_time, "stretch_time", ERR_REAL), ERR_FIELD(gs4_material, anisotropy, "anisotropy", ERR_REAL),
+        ERR_FIELD(gs4_material, arms, "arms", ERR_REAL) };
+    static const err_field cross[] = {
+        ERR_FIELD(gs4_material, cross_wlf.a, "cross_wlf", ERR_REAL), ERR_FIELD(gs4_material, cross_wlf.n, "cross_wlf", ERR_REAL),
+        ERR_FIELD(gs4_material, cross_wlf.d1, "cross_wlf", ERR_REAL), ERR_FIELD(gs4_material, cross_wlf.a1, "cross_wlf", ERR_REAL),
+        ERR_FIELD(gs4_material, cross_wlf.t1, "cross_wlf", ERR_REAL), ERR_FIELD(gs4_material, cross_wlf.t2, "cross_wlf", ERR_REAL) };
     gs4_material m = err_material();
     err_try_all(ERR_MATERIAL, &m, sizeof m, fields, ERR_COUNT(fields));
+    m.liquid = GS4_POM_POM; m.local_fraction = (gs4_real)0.1; m.relaxation_time = 1; m.stretch_time = (gs4_real)0.5; m.anisotropy = (gs4_real)0.1; m.arms = 4;
+    err_try_all(ERR_MATERIAL, &m, sizeof m, pom_pom, ERR_COUNT(pom_pom));
+    m = err_material();
+    m.viscosity_law = GS4_VISCOSITY_CROSS_WLF;
+    m.cross_wlf.a = 1; m.cross_wlf.n = (gs4_real)0.5; m.cross_wlf.d1 = 10; m.cross_wlf.a1 = 1; m.cross_wlf.t1 = 1; m.cross_wlf.t2 = -50;
+    err_try_all(ERR_MATERIAL, &m, sizeof m, cross, ERR_COUNT(cross));
+    m = err_material();
     m.sound_speed = 0; m.bulk_modulus = (gs4_real)1e5;      /* the fields that exclude each other, one at a time */
     err_try_all(ERR_MATERIAL, &m, sizeof m, fields + 15, 1);
     m.bulk_modulus = 0;

@@ -5,6 +5,7 @@
 #include "scenes.h"
 #include "test_order.c"
 #include "test_physics.c"
+#include "test_viscoelastic.c"
 #include "test_errors.c"
 #include "test_files.c"
 #include "test_stability.c"
@@ -25,6 +26,9 @@ int main(int count, char **values)
     RUN(test_sound_speed);
     RUN(test_drop_at_rest);
     RUN(test_drop_impact);
+    RUN(test_elastic_wave);
+    RUN(test_channel_overshoot);
+    RUN(test_stress_is_paid_for_where_it_is);
     run_errors();
     run_files();
     RUN(test_stability);

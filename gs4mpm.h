@@ -1738,6 +1738,7 @@ GS4I_INLINE void gs4i_prefetch_particles(const gs4i_particles *p, size_t i)
         if (p->with_rates) GS4I_PREFETCH(p->lag + 4 * i + b);
         else { GS4I_PREFETCH(p->affine[1] + 4 * i + b); GS4I_PREFETCH(p->affine[2] + 4 * i + b); }
     }
+    for (b = 0; b < p->elastic_reals * GS4I_BATCH; b += 16) GS4I_PREFETCH(p->elastic + (size_t)p->elastic_reals * i + b);
 }
 
 /* Particles i to i + n. */
@@ -2004,7 +2005,11 @@ static int gs4i_preset(const char *name, gs4_material *material)
  * then, eigenvalues are kept within [1e-3, 1e6], and how often is counted. */
 
 /* What the particles of a batch need of their materials. */
-typedef struct gs4i_elastic_laws { gs4i_lanes inv_lambda, stretch /* 2 r; 0: f = 1 */, nu, alpha; } gs4i_elastic_laws;
+typedef struct gs4i_elastic_laws {
+    gs4i_lanes modulus, inv_lambda, stretch /* 2 r; 0: f = 1 */, nu, alpha;
+    const gs4i_law *of[GS4I_BATCH];
+    int pom_pom, varies;                /* some of those seen so far are, or do */
+} gs4i_elastic_laws;
 
 /* Of one batch: stress and its rate, Pa and Pa/s. */
 typedef struct gs4i_elastic { gs4i_symmetric s, rate; } gs4i_elastic;
@@ -2017,7 +2022,9 @@ static void gs4i_take_elastic_laws(const gs4i_batch_laws *laws, gs4i_elastic_law
     int n;
     for (n = 0; n < GS4I_BATCH; n++) {
         const gs4i_law *law = laws->of[n];
-        GS4I_NTH(l->inv_lambda, n) = law->inv_lambda; GS4I_NTH(l->stretch, n) = law->stretch;
+        if (law == l->of[n]) continue;
+        l->of[n] = law; l->pom_pom |= law->stretch > 0; l->varies |= law->varies;
+        GS4I_NTH(l->modulus, n) = law->modulus; GS4I_NTH(l->inv_lambda, n) = law->inv_lambda; GS4I_NTH(l->stretch, n) = law->stretch;
         GS4I_NTH(l->nu, n) = law->nu; GS4I_NTH(l->alpha, n) = law->alpha;
     }
 }
@@ -2049,13 +2056,13 @@ static void gs4i_elastic_rate(const gs4i_elastic_laws *l, gs4i_lanes G, gs4i_sym
         squares[b] = SS[0][b] + SS[1][b] + SS[2][b];
         f1[b] = trace3[b] - trace3[b]; stiff[b] = f1[b];
     }
-    for (n = 0; n < GS4I_BATCH; n++)
-        if (GS4I_NTH(l->stretch, n) > 0) {
+    for (n = 0; n < GS4I_BATCH && l->pom_pom; n++)
+        if (GS4I_NTH_CONST(l->stretch, n) > 0) {
             double own, fast;
-            gs4i_pom_pom((double)GS4I_NTH(l->stretch, n), (double)GS4I_NTH(l->nu, n), (double)GS4I_NTH(l->alpha, n),
+            gs4i_pom_pom((double)GS4I_NTH_CONST(l->stretch, n), (double)GS4I_NTH_CONST(l->nu, n), (double)GS4I_NTH_CONST(l->alpha, n),
                          (double)GS4I_NTH(trace3, n), (double)GS4I_NTH(squares, n), &own, &fast);
             GS4I_NTH(f1, n) = GS4I_C(own);
-            GS4I_NTH(stiff, n) = GS4I_C(fast + (double)GS4I_NTH(l->alpha, n) * 2 * (1 + sqrt((double)GS4I_NTH(squares, n))));
+            GS4I_NTH(stiff, n) = GS4I_C(fast + (double)GS4I_NTH_CONST(l->alpha, n) * 2 * (1 + sqrt((double)GS4I_NTH(squares, n))));
         }
     GS4I_BATCH_LOOP(b) {
         relax[b] = l->inv_lambda[b] * (f1[b] + GS4I_C(1));
@@ -2261,12 +2268,13 @@ static int gs4i_resolved(gs4i_lanes G, gs4i_gradient L, gs4i_symmetric s, gs4i_l
 }
 
 /* G0 = (1 - F_v) mu / lambda_b; where mu depends on the shear rate, of the mu there. */
-static void gs4i_moduli(const gs4i_batch_laws *laws, gs4i_gradient L, gs4i_lanes G)
+static void gs4i_moduli(const gs4i_elastic_laws *l, gs4i_gradient L, gs4i_lanes G)
 {
     int n;
-    for (n = 0; n < GS4I_BATCH; n++) {
-        const gs4i_law *law = laws->of[n];
-        GS4I_NTH(G, n) = law->varies && law->inv_lambda > 0 ? (1 - law->local) * gs4i_viscosity_of(law, L, n) * law->inv_lambda : law->modulus;
+    memcpy(G, l->modulus, sizeof l->modulus);
+    for (n = 0; n < GS4I_BATCH && l->varies; n++) {
+        const gs4i_law *law = l->of[n];
+        if (law->varies && law->inv_lambda > 0) GS4I_NTH(G, n) = (1 - law->local) * gs4i_viscosity_of(law, L, n) * law->inv_lambda;
     }
 }
 
@@ -2280,13 +2288,13 @@ GS4I_INLINE void gs4i_predict_elastic(const gs4i_elastic_laws *l, gs4i_lanes G, 
 }
 
 /* S4: stress at the stage, s~ = s** + w (R + relax (s* - s~)), for n particles of the batch. */
-static void gs4i_stage_elastic(const gs4i_batch_laws *laws, const gs4i_elastic_laws *l, gs4i_elastic *e, gs4_real dt, gs4_real ahead, gs4_real w,
+static void gs4i_stage_elastic(const gs4i_elastic_laws *l, gs4i_elastic *e, gs4_real dt, gs4_real ahead, gs4_real w,
                                gs4i_gradient L, int n, gs4i_symmetric s, gs4i_elastic_count *count)
 {
     gs4i_symmetric R;
     gs4i_lanes G, relax, stiff;
     int b, c, ok[GS4I_BATCH];
-    gs4i_moduli(laws, L, G);
+    gs4i_moduli(l, L, G);
     gs4i_predict_elastic(l, G, e, ahead, L, s, R, relax, stiff);
     for (c = 0; c < 6; c++)
         GS4I_BATCH_LOOP(b) s[c][b] = (e->s[c][b] + (ahead - w) * e->rate[c][b] + w * (R[c][b] + relax[b] * s[c][b])) / (GS4I_C(1) + w * relax[b]);
@@ -2297,7 +2305,7 @@ static void gs4i_stage_elastic(const gs4i_batch_laws *laws, const gs4i_elastic_l
 /* S7: s by rule 1, (alpha_m + w relax) ds' = R(y) + relax (y - s*) - s' with w = alpha_f gamma dt, for n particles of the batch.
  * y is the predicted stress s*; where there are no rates to predict with, that of the midpoint rule; and it is taken again
  * at s* + w ds' for members with gamma near 1/2, which a prediction alone leaves unstable. */
-static void gs4i_correct_elastic(const gs4i_batch_laws *laws, const gs4i_elastic_laws *l, gs4i_elastic *e, const gs4i_rule *rule, gs4i_gradient L, int n,
+static void gs4i_correct_elastic(const gs4i_elastic_laws *l, gs4i_elastic *e, const gs4i_rule *rule, gs4i_gradient L, int n,
                                  gs4i_elastic_count *count)
 {
     const gs4_real dt = rule->dt, w = rule->alpha_f * rule->gamma * dt;
@@ -2305,7 +2313,7 @@ static void gs4i_correct_elastic(const gs4i_batch_laws *laws, const gs4i_elastic
     gs4i_symmetric star, y, R, change;
     gs4i_lanes G, relax, stiff;
     int b, c, ok[GS4I_BATCH], pass, passes = rule->gamma > GS4I_C(0.66) ? 1 : 5;
-    gs4i_moduli(laws, L, G);
+    gs4i_moduli(l, L, G);
     for (c = 0; c < 6; c++) GS4I_BATCH_LOOP(b) star[c][b] = y[c][b] = e->s[c][b] + rule->alpha_f * dt * e->rate[c][b];
     if (rule->afresh) {
         gs4i_elastic_rate(l, G, e->s, L, R, relax, stiff);
@@ -2328,39 +2336,54 @@ static void gs4i_correct_elastic(const gs4i_batch_laws *laws, const gs4i_elastic
     for (b = 0; b < n; b++) if (!ok[b]) gs4i_split_one(l, G, L, &old, b, (double)dt, (double)rule->gamma, e->s, e->rate, count);
 }
 
-/* Elastic waves of each particle, squared speed over inverse density at most: 2 G0 c_max, by the largest row sum of c. */
-static void gs4i_see_elastic(const gs4i_batch_laws *laws, gs4i_gradient L, gs4i_symmetric s, gs4i_lanes stiffness)
+/* Elastic waves of each particle: density times squared speed at most, 2 G0 c_max, by the largest row sum of c. */
+static void gs4i_see_elastic(const gs4i_elastic_laws *l, gs4i_gradient L, gs4i_symmetric s, gs4i_lanes stiffness)
 {
     gs4i_lanes G;
-    int b, n, i;
-    gs4i_moduli(laws, L, G);
-    GS4I_BATCH_LOOP(b) stiffness[b] = G[b] - G[b];
-    for (n = 0; n < GS4I_BATCH; n++)
+    int b, i, j;
+    gs4i_moduli(l, L, G);
+    GS4I_BATCH_LOOP(b) {
+        gs4i_wide zero = G[b] - G[b], most = zero;
         for (i = 0; i < 3; i++) {
-            const gs4_real row = gs4i_abs(GS4I_NTH(s[gs4i_place[i][0]], n)) + gs4i_abs(GS4I_NTH(s[gs4i_place[i][1]], n)) + gs4i_abs(GS4I_NTH(s[gs4i_place[i][2]], n));
-            GS4I_NTH(stiffness, n) = gs4i_max(GS4I_NTH(stiffness, n), 2 * (row + GS4I_NTH(G, n)));
+            gs4i_wide row = zero;
+            for (j = 0; j < 3; j++) {
+                const gs4i_wide x = s[gs4i_place[i][j]][b], minus = zero - x;
+                gs4i_wide size;
+                GS4I_WIDE_MAX(size, x, minus);
+                row += size;
+            }
+            GS4I_WIDE_MAX(most, row, most);
         }
+        stiffness[b] = GS4I_C(2) * (most + G[b]);
+    }
 }
 
 /* Stress of n particles from memory, six numbers each and six of the rate where there are rates; and back. */
 static void gs4i_load_elastic(const gs4_real *from, int reals, int n, gs4i_elastic *e)
 {
     gs4_real four[4 * GS4I_BATCH];
-    gs4i_lanes l[4];
-    int part, b, c;
-    memset(e, 0, sizeof *e);
+    gs4i_lanes l[12];
+    int part, b;
+    memset(l, 0, sizeof l);
     for (part = 0; 4 * part < reals; part++) {
-        for (b = 0; b < n; b++) memcpy(four + 4 * b, from + reals * b + 4 * part, (reals == 6 && part ? 2 : 4) * sizeof *four);
-        if (reals == 6 && part) for (b = 0; b < n; b++) four[4 * b + 2] = four[4 * b + 3] = 0;
-        gs4i_to_lanes(four, n, l);
-        for (c = 0; c < 4; c++) GS4I_BATCH_LOOP(b) (4 * part + c < 6 ? e->s : e->rate - 6)[4 * part + c][b] = l[c][b];
+        for (b = 0; b < n; b++) memcpy(four + 4 * b, from + reals * b + 4 * part, 4 * sizeof *four);    /* of six: two more than there are */
+        gs4i_to_lanes(four, n, l + 4 * part);
     }
+    memcpy(e->s, l, sizeof e->s);
+    if (reals == 12) memcpy(e->rate, l + 6, sizeof e->rate);
+    else memset(e->rate, 0, sizeof e->rate);
 }
 
 static void gs4i_store_elastic(gs4_real *to, int reals, int n, gs4i_elastic *e)
 {
-    int b, c;
-    for (b = 0; b < n; b++) for (c = 0; c < reals; c++) to[reals * b + c] = c < 6 ? GS4I_NTH(e->s[c], b) : GS4I_NTH(e->rate[c - 6], b);
+    gs4_real four[3][4 * GS4I_BATCH];
+    int b, part;
+    gs4i_from_lanes(e->s[0], e->s[1], e->s[2], e->s[3], four[0]);
+    gs4i_from_lanes(e->s[4], e->s[5], e->rate[0], e->rate[1], four[1]);
+    gs4i_from_lanes(e->rate[2], e->rate[3], e->rate[4], e->rate[5], four[2]);
+    for (b = 0; b < n; b++)
+        for (part = 0; 4 * part < reals; part++)
+            memcpy(to + reals * b + 4 * part, four[part] + 4 * b, (reals == 6 && part ? 2 : 4) * sizeof *to);
 }
 
 /* ==== [[boundary]] walls by images, bodies by nodes, what contact does to velocities =============== *
@@ -3004,7 +3027,7 @@ GS4I_INLINE void gs4i_stage_batch(const gs4i_particles *p, size_t i, int n, gs4i
 
 /* --- what a pass sees, for its report ---------------------------------------------------------------- */
 
-typedef struct gs4i_seen { gs4i_lanes min_J, max_J, max_viscosity, max_sound, speed2, gradient2; int bad; } gs4i_seen;
+typedef struct gs4i_seen { gs4i_lanes min_J, max_J, max_viscosity, max_sound, max_stiffness, speed2, gradient2; } gs4i_seen;
 
 GS4I_INLINE void gs4i_see_nothing(gs4i_seen *r)
 {
@@ -3050,6 +3073,7 @@ static void gs4i_report_liquids(gs4i_report *r, const gs4i_seen *s)
     int n;
     for (n = 0; n < GS4I_BATCH; n++) r->min_J = gs4i_min(r->min_J, GS4I_NTH_CONST(s->min_J, n));
     r->max_J = gs4i_largest(s->max_J); r->max_viscosity = gs4i_largest(s->max_viscosity); r->max_sound = gs4i_largest(s->max_sound);
+    r->max_stiffness = gs4i_largest(s->max_stiffness);
 }
 
 static void gs4i_report_motion(gs4i_report *r, const gs4i_seen *s)
@@ -3080,41 +3104,43 @@ GS4I_INLINE void gs4i_check_liquids(gs4i_report *r, gs4i_lanes J, gs4i_lanes mu,
 /* --- non-local stress --------------------------------------------------------------------------------- */
 
 /* Adds the stress of the stage (GS4) or of now (Euler) to sigma, for particles i to i + n. */
-static void gs4i_add_elastic(const gs4i_particles *p, size_t i, int n, const gs4i_rule *rule, const gs4i_batch_laws *laws, gs4i_gradient L,
-                             gs4i_symmetric sigma, gs4i_report *report)
+static void gs4i_add_elastic(const gs4i_particles *p, size_t i, int n, const gs4i_rule *rule, const gs4i_batch_laws *laws, gs4i_elastic_laws *l,
+                             gs4i_gradient L, gs4i_symmetric sigma, gs4i_seen *seen, gs4i_report *report)
 {
-    gs4i_elastic_laws l;
     gs4i_elastic e;
     gs4i_elastic_count count = { 0, 0, 0 };
     gs4i_symmetric s;
     gs4i_lanes stiffness;
-    int b, c;
-    gs4i_take_elastic_laws(laws, &l);
+    int b, c, good = 1;
+    gs4i_take_elastic_laws(laws, l);
     gs4i_load_elastic(p->elastic + (size_t)p->elastic_reals * i, p->elastic_reals, n, &e);
-    if (p->with_rates) gs4i_stage_elastic(laws, &l, &e, rule->dt, rule->reach.ahead, rule->s, L, n, s, &count);
+    if (p->with_rates) gs4i_stage_elastic(l, &e, rule->dt, rule->reach.ahead, rule->s, L, n, s, &count);
     else memcpy(s, e.s, sizeof s);
     for (c = 0; c < 6; c++) GS4I_BATCH_LOOP(b) sigma[c][b] += s[c][b];
-    gs4i_see_elastic(laws, L, s, stiffness);
-    for (b = 0; b < n; b++) {
-        report->max_stiffness = gs4i_max(report->max_stiffness, GS4I_NTH(stiffness, b) * GS4I_NTH_CONST(laws->inv_density, b));
-        if (!(GS4I_NTH(stiffness, b) < GS4I_HUGE) || count.failed == b + 1) gs4i_see_bad(report, GS4I_BAD_STRESS, p->id[i + (size_t)b]);
+    gs4i_see_elastic(l, L, s, stiffness);
+    GS4I_BATCH_LOOP(b) {
+        const gs4i_wide_mask fine = stiffness[b] < GS4I_HUGE;
+        const gs4i_wide speed2 = stiffness[b] * laws->inv_density[b];
+        GS4I_WIDE_MAX(seen->max_stiffness[b], seen->max_stiffness[b], speed2);
+        good &= gs4i_all(&fine);
     }
+    for (b = 0; b < n && !good; b++) if (!(GS4I_NTH(stiffness, b) < GS4I_HUGE)) gs4i_see_bad(report, GS4I_BAD_STRESS, p->id[i + (size_t)b]);
+    if (count.failed) gs4i_see_bad(report, GS4I_BAD_STRESS, p->id[i + (size_t)count.failed - 1]);
     report->hard += count.split;
 }
 
 /* S7 of the non-local stress; with `commit` 0 only whether it can be done. */
-static void gs4i_advance_elastic(const gs4i_particles *p, size_t i, int n, const gs4i_rule *rule, const gs4i_batch_laws *laws, gs4i_gradient L,
-                                 gs4i_report *report, int commit)
+static void gs4i_advance_elastic(const gs4i_particles *p, size_t i, int n, const gs4i_rule *rule, const gs4i_batch_laws *laws, gs4i_elastic_laws *l,
+                                 gs4i_gradient L, gs4i_report *report, int commit)
 {
-    gs4i_elastic_laws l;
     gs4i_elastic e;
     gs4i_elastic_count count = { 0, 0, 0 };
     gs4_real *at = p->elastic + (size_t)p->elastic_reals * i;
     gs4i_rule euler = *rule;
-    gs4i_take_elastic_laws(laws, &l);
+    gs4i_take_elastic_laws(laws, l);
     gs4i_load_elastic(at, p->elastic_reals, n, &e);
     euler.alpha_m = euler.alpha_f = euler.gamma = 1; euler.afresh = 0;
-    gs4i_correct_elastic(laws, &l, &e, p->with_rates ? rule : &euler, L, n, &count);
+    gs4i_correct_elastic(l, &e, p->with_rates ? rule : &euler, L, n, &count);
     if (count.failed) gs4i_see_bad(report, GS4I_BAD_STRESS, p->id[i + (size_t)count.failed - 1]);
     if (!commit) return;
     report->split += count.split; report->bounded += count.bounded;
@@ -3188,8 +3214,9 @@ static void gs4i_scatter_momentum(int index, void *context)
 typedef struct gs4i_forces { gs4_real x[4 * GS4I_BATCH], y[4 * GS4I_BATCH], z[4 * GS4I_BATCH], weight[4 * GS4I_BATCH]; } gs4i_forces;
 
 /* Volume and stress at the stage, J~ by rule 1, implicit in itself for known div v: (J~ - J**) / s = J~ div v. */
-GS4I_INLINE void gs4i_stage_forces(const gs4i_particles *p, size_t i, int n, const gs4i_batch *q, const gs4i_batch_laws *l, const gs4i_rule *rule,
-                                   gs4i_gradient L, const gs4_real gravity[3], gs4i_forces *f, gs4i_lanes J, gs4i_lanes mu, gs4i_report *report)
+GS4I_INLINE void gs4i_stage_forces(const gs4i_particles *p, size_t i, int n, const gs4i_batch *q, const gs4i_batch_laws *l, gs4i_elastic_laws *el,
+                                   const gs4i_rule *rule, gs4i_gradient L, const gs4_real gravity[3], gs4i_forces *f, gs4i_lanes J, gs4i_lanes mu,
+                                   gs4i_seen *seen, gs4i_report *report)
 {
     gs4i_symmetric sigma;
     gs4i_lanes g[3], none;
@@ -3199,7 +3226,7 @@ GS4I_INLINE void gs4i_stage_forces(const gs4i_particles *p, size_t i, int n, con
         J[b] = (q->v[3][b] + (rule->reach.ahead - rule->s) * q->a[3][b]) / (GS4I_C(1) - rule->s * div);
     }
     gs4i_liquid_stress(l, J, L, sigma, mu);
-    if (p->elastic_reals) gs4i_add_elastic(p, i, n, rule, l, L, sigma, report);
+    if (p->elastic_reals) gs4i_add_elastic(p, i, n, rule, l, el, L, sigma, seen, report);
     for (c = 0; c < 6; c++) GS4I_BATCH_LOOP(b) sigma[c][b] *= -q->x[3][b] * l->inv_density[b] * J[b];
     for (c = 0; c < 3; c++) GS4I_BATCH_LOOP(b) g[c][b] = q->x[3][b] * gravity[c];
     memset(none, 0, sizeof none);
@@ -3234,6 +3261,7 @@ static void gs4i_scatter_forces(int index, void *context)
     const gs4_real gravity[3] = { sim->desc.gravity.x, sim->desc.gravity.y, sim->desc.gravity.z };
     gs4i_report *report = &sim->reports[o];
     gs4i_batch_laws laws;
+    gs4i_elastic_laws elastic;
     gs4i_seen seen;
     gs4_real nodes[GS4I_TILE_REALS], tile[GS4I_TILE_REALS];
     int row = 0;
@@ -3241,6 +3269,7 @@ static void gs4i_scatter_forces(int index, void *context)
     gs4i_tile_load(&sim->grid, o, report->rows, sim->grid.momentum, nodes);
     memset(tile, 0, sizeof tile);
     memset(&laws, 0, sizeof laws);
+    memset(&elastic, 0, sizeof elastic);
     gs4i_see_nothing(&seen);
     for (; i < end; i += GS4I_BATCH, row += 2) {
         const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
@@ -3261,7 +3290,7 @@ static void gs4i_scatter_forces(int index, void *context)
         }
         gs4i_gradient_lanes(v.dx, v.dy, v.dz, n, L);
         gs4i_take_laws(sim->laws, p.material + i, n, &laws);
-        gs4i_stage_forces(&p, i, n, &q, &laws, &rule, L, gravity, &f, J, mu, report);
+        gs4i_stage_forces(&p, i, n, &q, &laws, &elastic, &rule, L, gravity, &f, J, mu, &seen, report);
         gs4i_see_liquids(&seen, &laws, J, mu);
         gs4i_check_liquids(report, J, mu, p.id + i, n);
         for (b = 0; b < n; b++) gs4i_scatter_force(tile, &s, b, &f);
@@ -3467,6 +3496,7 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit)
     gs4i_report *report = &sim->reports[o];
     const gs4i_frame frame = gs4i_tile_frame(grid, o);
     gs4i_batch_laws laws;
+    gs4i_elastic_laws elastic;
     gs4i_seen seen;
     gs4i_corrections k;
     gs4_real u_nodes[GS4I_TILE_REALS], a_nodes[GS4I_TILE_REALS], j_nodes[GS4I_TILE_REALS];
@@ -3479,6 +3509,7 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit)
     gs4i_tile_load(grid, o, report->rows, grid->force, a_nodes);
     gs4i_see_nothing(&seen);
     memset(&laws, 0, sizeof laws);
+    memset(&elastic, 0, sizeof elastic);
     memset(k.jump, 0, sizeof k.jump);
     for (; i < end; i += GS4I_BATCH, row += 2) {
         const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
@@ -3503,7 +3534,7 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit)
         gs4i_correct_batch(rule, &k, &q);
         if (p.elastic_reals) {
             gs4i_take_laws(sim->laws, p.material + i, n, &laws);
-            gs4i_advance_elastic(&p, i, n, &rule, &laws, k.L, report, commit);
+            gs4i_advance_elastic(&p, i, n, &rule, &laws, &elastic, k.L, report, commit);
         }
         if (!commit) { gs4i_judge(&q, k.L, p.position + 4 * i, n, grid->h, p.id + i, report); continue; }
         gs4i_pack_batch(&q, 1, &out);
@@ -3556,8 +3587,8 @@ typedef struct gs4i_affine_forces { gs4_real middle[4 * GS4I_BATCH], x[4 * GS4I_
 
 /* Momentum and impulse of stress and weight as one affine field: m (v + dt g) + (m C - dt V sigma 4/h^2) (x_i - x). */
 GS4I_INLINE void gs4i_affine_momentum(const gs4i_particles *p, size_t at, int n, const gs4i_rule *rule, const gs4i_batch *q, const gs4i_batch_laws *l,
-                                      const gs4i_stencils *s, gs4i_gradient C, gs4_real h, const gs4_real fall[3], gs4i_affine_forces *f,
-                                      gs4i_lanes mu, gs4i_report *report)
+                                      gs4i_elastic_laws *el, const gs4i_stencils *s, gs4i_gradient C, gs4_real h, const gs4_real fall[3],
+                                      gs4i_affine_forces *f, gs4i_lanes mu, gs4i_seen *seen, gs4i_report *report)
 {
     const gs4_real dt = rule->dt;
     gs4i_symmetric sigma;
@@ -3565,7 +3596,7 @@ GS4I_INLINE void gs4i_affine_momentum(const gs4i_particles *p, size_t at, int n,
     gs4i_gradient Q;
     int b, i, j;
     gs4i_liquid_stress(l, q->v[3], C, sigma, mu);
-    if (p->elastic_reals) gs4i_add_elastic(p, at, n, rule, l, C, sigma, report);
+    if (p->elastic_reals) gs4i_add_elastic(p, at, n, rule, l, el, C, sigma, seen, report);
     gs4i_affine_bound(C, dt, bound);
     GS4I_BATCH_LOOP(b) {
         bound[b] *= q->x[3][b] * h;
@@ -3622,6 +3653,7 @@ static void gs4i_scatter_euler(int index, void *context)
     const gs4_real fall[3] = { dt * sim->desc.gravity.x, dt * sim->desc.gravity.y, dt * sim->desc.gravity.z };
     gs4i_report *report = &sim->reports[o];
     gs4i_batch_laws laws;
+    gs4i_elastic_laws elastic;
     gs4i_seen seen;
     gs4_real tile[GS4I_TILE_REALS];
     int row = 0;
@@ -3630,6 +3662,7 @@ static void gs4i_scatter_euler(int index, void *context)
     gs4i_report_clear(report);
     memset(tile, 0, sizeof tile);
     memset(&laws, 0, sizeof laws);
+    memset(&elastic, 0, sizeof elastic);
     gs4i_see_nothing(&seen);
     for (; i < end; i += GS4I_BATCH, row += 2) {
         const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
@@ -3643,7 +3676,7 @@ static void gs4i_scatter_euler(int index, void *context)
         gs4i_stage_batch(&p, i, n, reach, &frame, &q, &s);
         gs4i_load_affine(&p, i, n, C);
         gs4i_take_laws(sim->laws, p.material + i, n, &laws);
-        gs4i_affine_momentum(&p, i, n, &sim->rule, &q, &laws, &s, C, h, fall, &f, mu, report);
+        gs4i_affine_momentum(&p, i, n, &sim->rule, &q, &laws, &elastic, &s, C, h, fall, &f, mu, &seen, report);
         gs4i_see_liquids(&seen, &laws, q.v[3], mu);
         gs4i_check_liquids(report, q.v[3], mu, p.id + i, n);
         for (b = 0; b < n; b++) {
@@ -3679,6 +3712,7 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit)
     gs4i_report *report = &sim->reports[o];
     const gs4i_frame frame = gs4i_tile_frame(grid, o);
     gs4i_batch_laws laws;
+    gs4i_elastic_laws elastic;
     gs4i_seen seen;
     gs4_real nodes[GS4I_TILE_REALS];
     int edge = gs4i_at_edge(grid, o), c;
@@ -3690,6 +3724,7 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit)
     gs4i_tile_load(grid, o, report->rows, grid->momentum, nodes);
     gs4i_see_nothing(&seen);
     memset(&laws, 0, sizeof laws);
+    memset(&elastic, 0, sizeof elastic);
     for (; i < end; i += GS4I_BATCH, row += 2) {
         const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
         gs4i_batch q;
@@ -3706,7 +3741,7 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit)
         gs4i_advect_batch(sim->rule.dt, &u, n, &q, C);
         if (p.elastic_reals) {
             gs4i_take_laws(sim->laws, p.material + i, n, &laws);
-            gs4i_advance_elastic(&p, i, n, &sim->rule, &laws, C, report, commit);
+            gs4i_advance_elastic(&p, i, n, &sim->rule, &laws, &elastic, C, report, commit);
         }
         if (!commit) { gs4i_judge(&q, C, p.position + 4 * i, n, grid->h, p.id + i, report); continue; }
         gs4i_pack_batch(&q, 0, &out);
@@ -3841,11 +3876,13 @@ static void gs4i_look_at_particles(const gs4_sim *sim, gs4i_report *r)
     const gs4i_particles *p = &sim->particles;
     const gs4i_reach reach = { 0, 0 };
     gs4i_batch_laws laws;
+    gs4i_elastic_laws elastic;
     gs4i_seen seen;
     int i, c;
     gs4i_report_clear(r);
     gs4i_see_nothing(&seen);
     memset(&laws, 0, sizeof laws);
+    memset(&elastic, 0, sizeof elastic);
     for (i = 0; i < p->count; i += GS4I_BATCH) {
         const int n = p->count - i < GS4I_BATCH ? p->count - i : GS4I_BATCH;
         gs4i_batch q;
@@ -3863,8 +3900,9 @@ static void gs4i_look_at_particles(const gs4_sim *sim, gs4i_report *r)
             gs4i_elastic e;
             gs4i_lanes stiffness;
             gs4i_load_elastic(p->elastic + (size_t)p->elastic_reals * (size_t)i, p->elastic_reals, n, &e);
-            gs4i_see_elastic(&laws, L, e.s, stiffness);
-            for (c = 0; c < n; c++) r->max_stiffness = gs4i_max(r->max_stiffness, GS4I_NTH(stiffness, c) * GS4I_NTH(laws.inv_density, c));
+            gs4i_take_elastic_laws(&laws, &elastic);
+            gs4i_see_elastic(&elastic, L, e.s, stiffness);
+            for (c = 0; c < n; c++) GS4I_NTH(seen.max_stiffness, c) = gs4i_max(GS4I_NTH(seen.max_stiffness, c), GS4I_NTH(stiffness, c) * GS4I_NTH(laws.inv_density, c));
         }
     }
     gs4i_report_liquids(r, &seen);
@@ -5884,7 +5922,7 @@ GS4_API int gs4_point_step(const gs4_material *material, gs4_point *point, const
     for (i = 0; i < 6; i++) afresh &= point->stress_rate[i] == 0;
     gs4i_family(&rule, rho_inf, rho_inf_spurious, afresh);
     rule.dt = dt; rule.afresh = afresh;
-    gs4i_correct_elastic(&q.laws, &q.elastic_laws, &q.e, &rule, q.L, 1, &count);
+    gs4i_correct_elastic(&q.elastic_laws, &q.e, &rule, q.L, 1, &count);
     for (i = 0; i < 6; i++) count.failed |= !(gs4i_abs(GS4I_NTH(q.e.s[i], 0)) < GS4I_HUGE && gs4i_abs(GS4I_NTH(q.e.rate[i], 0)) < GS4I_HUGE);
     if (count.failed)
         return gs4i_say(&fake, gs4i_fail(&fake, GS4_ERROR_UNSTABLE, "the non-local stress would overflow, or swings faster than it can be followed; nothing has changed; a smaller dt would do"));

@@ -29,17 +29,18 @@
  *         return 0;
  *     }
  *
- * WHAT IT DOES NOT DO, YET. Viscoelastic liquids, solids, heat and phase change, implicit and projection schemes are declared
- * and refused with a sentence. It has no surface tension, no two-way coupling to bodies, no sparse domain beyond 2^36 cells.
+ * WHAT IT DOES NOT DO, YET. Solids, heat and phase change, implicit and projection schemes are declared and refused with a sentence.
+ * It has no surface tension, no two-way coupling to bodies, no sparse domain beyond 2^36 cells.
  *
  * MAP. Sections carry a tag; grep -n '\[\[' gs4mpm.h is the table of contents. A section uses only sections above it.
  *
  *     [[config]]    version, precision, linkage                  [[base]]      arithmetic rules, memory, text, tasks
  *     [[types]]     results, vectors, shapes, hooks, views       [[vec]]       three-vectors and shapes
  *     [[materials]] what a liquid is                             [[kernel]]    quadratic B-splines on 27 nodes
- *     [[sim]]       description, scene, stepping, files          [[grid]]      blocks of nodes where there is material
+ *     [[sim]]       description, scene, stepping, files, a point [[grid]]      blocks of nodes where there is material
  *                                                                [[particles]] the store, and how it is sorted
  *                                                                [[liquid]]    pressure, viscosity, presets
+ *                                                                [[viscoelastic]] non-local stress
  *                                                                [[boundary]]  walls by images, bodies by nodes
  *                                                                [[state]]     what a simulation is
  *                                                                [[transfer]]  particles to nodes and back
@@ -52,9 +53,16 @@
  *
  * MODEL
  *     dv/dt = div sigma / rho + g,   dJ/dt = J div v,   dx/dt = v                                                    (1)
- *     sigma = -p I + 2 mu D                                                                                           (2)
+ *     sigma = -p I + 2 F_v mu D + s                                                                                   (2)
  *     p = (rho0 c0^2 / 7) (J^-7 - 1)                     Tait, weakly compressible                                   (3)
- * mu is a constant or a callback of the shear rate sqrt(2 D:D).
+ * mu is a constant, Cross-WLF or a callback of temperature (of the air: there is no heat yet) and shear rate sqrt(2 D:D). F_v is 1
+ * for Newtonian liquids; else s, the non-local stress, is what Oldroyd-B (UCM at F_v 0) or the extended Pom-Pom model say, with
+ * G0 = (1 - F_v) mu / lambda_b, r = lambda_b/lambda_0s, Lam = sqrt(1 + tr s/(3 G0)):
+ *     ds/dt = L s + s L^T + 2 G0 D - [f s + G0 (f - 1) I + (alpha/G0) s.s] / lambda_b                                 (5)
+ *     f = 2 r exp((2/Q) (Lam - 1)) (1 - 1/Lam) + (1 - alpha tr(s.s)/(3 G0^2)) / Lam^2;  Oldroyd-B: f = 1, alpha = 0
+ * s goes by rule (4) where the step resolves it; else by a split that keeps the conformation s/G0 + I positive definite, in as many
+ * substeps as it takes (counted: stress_substeps). With alpha > 1 (5) itself blows up: there, and only there, the eigenvalues of the
+ * conformation are kept within 1e-3 and 1e6 (counted: stress_bounded).
  *
  * TIME. Every quantity y of a particle is kept with its rate r; 0 <= rho_s <= rho_inf <= 1 choose the member of the GS4 family
  * (rho_inf: what high frequencies keep per step, rho_s the same of the spurious root; 0, 0 damps most and is the default):
@@ -67,12 +75,12 @@
  *     S1  sort particles by block of 4^3 cells, when one has strayed more than a cell from its block
  *     S2  x~, v~ by (4); quadratic B-spline weights w at x~
  *     S3  m_i = sum w m,   v_i = sum w m v~ / m_i
- *     S4  L~ = sum v_i (x) grad w;   J~ by (4), implicit in J for known div v;   sigma at (J~, L~) by (2), (3)
+ *     S4  L~ = sum v_i (x) grad w;   J~ by (4), implicit in J for known div v;   s~ by (4), (5);   sigma at (J~, L~, s~) by (2), (3)
  *     S5  f_i = - sum V sigma grad w + sum w m g
  *     S6  acc_i = f_i / m_i;   u_i = v_i + s (acc_i - ag_i), s = alpha_f gamma dt / alpha_m;   ag_i += (acc_i - ag_i) / alpha_m
  *         is what the node remembers; walls and bodies
- *     S7  A = sum w acc_i, U = sum w u_i; v by (4) with dv/dt = A - (v - U) / flip_decay_time; J by (4) with grad u; x by (4)
- *         with dx/dt = U
+ *     S7  A = sum w acc_i, U = sum w u_i; v by (4) with dv/dt = A - (v - U) / flip_decay_time; J, s by (4) with grad u; x
+ *         by (4) with dx/dt = U
  *     S8  bodies move, nozzles give, leavers go
  * Before S7 nothing of the state has changed. When the nodes cannot prove that S7 is safe it is rehearsed; if a particle would
  * leave 1/16 < J < 16, move more than two cells or become non-finite, the step is refused and the last good state stays.
@@ -86,9 +94,9 @@
  *
  * STABILITY. gs4_stable_dt is the least of
  *     sound and viscosity   (w dt)^2 + (d dt) (3 + rho_inf + rho_s - rho_inf rho_s)/2 <= 2 (1 - rho_inf rho_s)
- *                           w = 1.73 c/h, d = 2.5 mu/(rho h^2); symplectic Euler: (w dt)^2 + 2 d dt <= 4, w = 3.5 c/h, d = 16 mu/(rho h^2)
+ *                           w = 1.73 c/h, c^2 that of sound and 2 c_max G0/rho of elastic waves, d = 2.5 F_v mu/(rho h^2); symplectic Euler: (w dt)^2 + 2 d dt <= 4, w = 3.5 c/h, d = 16 mu/(rho h^2)
  *     flow                  one cell a step along each axis, the fall within the step included
- *     strain                |grad v| dt <= 1
+ *     strain, relaxation    |grad v| dt <= 1,  dt <= 1000 lambda_b
  * and gs4_step refuses more. gs4_advance takes the fraction `cfl` of it, and half of that again, up to 7 times, where a step is refused.
  *
  * CONTACT. Walls act by images, second order in space: nodes behind a wall mirror the field (stick: odd; slip: odd along the
@@ -109,7 +117,8 @@
  * checked, NaN included. A call that fails has changed nothing, out of memory included; a step that is refused has not been taken.
  *
  * MEMORY. GS4: 65 bytes a particle in float (position, velocity, J and their rates, mass, id, material, and 4 for sorting), 48 a cell
- * near material, 16 more near walls and bodies, 4 per 64 cells of the domain. Symplectic Euler: 89 and 32. Double, GS4: 121 and 96.
+ * near material, 16 more near walls and bodies, 4 per 64 cells of the domain. Symplectic Euler: 89 and 32. A scene with a viscoelastic
+ * liquid: 48 more a particle (Euler 24). Double, GS4: 121 and 96.
  * Stepping allocates nothing once the scene has stopped growing; it takes 34 KB of stack a thread, 67 in double.
  *
  * THREADS. `parallel_for` or the pool. The same bits for any number of threads: blocks of one colour share no node, sums run in the
@@ -122,7 +131,7 @@
  * LIMITS. 2^30 particles, 2^36 cells, 256 materials. Time steps follow sound: viscosities above some 100 Pa s at millimetre cells
  * mean steps of microseconds. Filling is refused where material is already; emitters pause when max_particles is reached.
  *
- * SOURCES. The GS4 family: Zhou & Tamma 2004; the MPM scheme after "GS4 viscoelastic MPM" (2021), with rates on particles; MLS-MPM:
+ * SOURCES. The GS4 family: Zhou & Tamma 2004; extended Pom-Pom: Verbeeten, Peters & Baaijens 2001, in the form of Oishi et al. 2012; the MPM scheme after "GS4 viscoelastic MPM" (2021), with rates on particles; MLS-MPM:
  * Hu et al. 2018; images, contact and limits: measured for this file. */
 #ifndef GS4MPM_H
 #define GS4MPM_H
@@ -1968,23 +1977,32 @@ GS4I_INLINE void gs4i_liquid_stress(const gs4i_batch_laws *l, const gs4i_wide *J
     }
 }
 
-/* Liquids to start from, density (kg/m^3) and viscosity (Pa s) near the temperature given. */
-static const struct gs4i_preset_row { const char *name; double density, viscosity; } gs4i_presets[] = {
-    { "water",     998.2, 1.002e-3 },   /* 20 C; Kestin, Sokolov & Wakeham, J. Phys. Chem. Ref. Data 7 (1978) 941 */
-    { "olive oil", 911,   0.084 },      /* 20 C; Fellows, Food Processing Technology (2000), table 1.6 */
-    { "glycerol",  1261,  1.41 },       /* 20 C; Segur & Oberstar, Ind. Eng. Chem. 43 (1951) 2117 */
-    { "honey",     1420,  10 },         /* 20-25 C, 17 % water; Yanniotis, Skaltsi & Karaburnioti, J. Food Eng. 72 (2006) 372 */
-    { "lava",      2600,  1000 }        /* basalt at 1130 C, few crystals; Shaw, J. Petrology 10 (1969) 510 */
+/* Liquids to start from: density (kg/m^3) and viscosity (Pa s) near the temperature given; of viscoelastic ones also the local
+ * fraction, the relaxation and stretch times (s), anisotropy and arms. */
+static const struct gs4i_preset_row { const char *name; double density, viscosity; gs4_liquid liquid; double local, relaxation, stretch, anisotropy, arms; } gs4i_presets[] = {
+    { "water",     998.2, 1.002e-3, GS4_NEWTONIAN, 0, 0, 0, 0, 0 },  /* 20 C; Kestin, Sokolov & Wakeham, J. Phys. Chem. Ref. Data 7 (1978) 941 */
+    { "olive oil", 911,   0.084, GS4_NEWTONIAN, 0, 0, 0, 0, 0 },     /* 20 C; Fellows, Food Processing Technology (2000), table 1.6 */
+    { "glycerol",  1261,  1.41, GS4_NEWTONIAN, 0, 0, 0, 0, 0 },      /* 20 C; Segur & Oberstar, Ind. Eng. Chem. 43 (1951) 2117 */
+    { "honey",     1420,  10, GS4_NEWTONIAN, 0, 0, 0, 0, 0 },        /* 20-25 C, 17 % water; Yanniotis, Skaltsi & Karaburnioti, J. Food Eng. 72 (2006) 372 */
+    { "lava",      2600,  1000, GS4_NEWTONIAN, 0, 0, 0, 0, 0 },      /* basalt at 1130 C, few crystals; Shaw, J. Petrology 10 (1969) 510 */
+    { "cream",     1000,  3063, GS4_POM_POM, 0.02, 12.25, 11.025, 1, 16 },        /* "GS4 viscoelastic MPM" (2021), table 4, coiling 3 */
+    { "ice cream", 1000,  3063, GS4_POM_POM, 0.01, 3.0625, 2.7563, 0.01, 16 },    /* the same, buckling 2 */
+    { "boger fluid", 1000, 3063, GS4_OLDROYD_B, 0.02, 12.25, 0, 0, 0 },           /* the same, coiling 2: elastic, not shear thinning */
+    { "polymer melt", 760, 2769, GS4_POM_POM, 0.394, 0.50349, 0.16783, 0.15, 2 }  /* low-density polyethylene at 170 C: third mode of Verbeeten, Peters &
+                                         Baaijens, J. Rheology 45 (2001) 823, table II, the two faster ones as local viscosity */
 };
 
-static int gs4i_preset(const char *name, gs4_material *material)
+static int gs4i_preset(const char *name, gs4_material *m)
 {
     size_t i;
     for (i = 0; i < sizeof gs4i_presets / sizeof gs4i_presets[0]; i++) {
-        if (strcmp(name, gs4i_presets[i].name) != 0) continue;
-        memset(material, 0, sizeof *material);
-        material->density = GS4I_C(gs4i_presets[i].density);
-        material->viscosity = GS4I_C(gs4i_presets[i].viscosity);
+        const struct gs4i_preset_row *p = &gs4i_presets[i];
+        if (strcmp(name, p->name) != 0) continue;
+        memset(m, 0, sizeof *m);
+        m->density = GS4I_C(p->density); m->viscosity = GS4I_C(p->viscosity);
+        m->liquid = p->liquid; m->local_fraction = GS4I_C(p->local);
+        m->relaxation_time = GS4I_C(p->relaxation); m->stretch_time = GS4I_C(p->stretch);
+        m->anisotropy = GS4I_C(p->anisotropy); m->arms = GS4I_C(p->arms);
         return GS4_OK;
     }
     return GS4_ERROR_ARGUMENT;
@@ -5909,7 +5927,7 @@ GS4_API int gs4_point_step(const gs4_material *material, gs4_point *point, const
 {
     gs4_sim fake;
     gs4i_point_batch q;
-    gs4i_rule rule = { 0 };
+    gs4i_rule rule;
     gs4i_elastic_count count = { 0, 0, 0 };
     int i, afresh = 1, r = gs4i_make_point_batch(&fake, material, point, velocity_gradient, &q);
     if (r == GS4_OK) r = gs4i_check(&fake, "dt", dt, GS4I_POSITIVE);
@@ -5920,6 +5938,7 @@ GS4_API int gs4_point_step(const gs4_material *material, gs4_point *point, const
     if (r != GS4_OK) return gs4i_say(&fake, r);
     if (material->liquid == GS4_NEWTONIAN) return GS4_OK;
     for (i = 0; i < 6; i++) afresh &= point->stress_rate[i] == 0;
+    memset(&rule, 0, sizeof rule);
     gs4i_family(&rule, rho_inf, rho_inf_spurious, afresh);
     rule.dt = dt; rule.afresh = afresh;
     gs4i_correct_elastic(&q.elastic_laws, &q.e, &rule, q.L, 1, &count);
@@ -6001,7 +6020,10 @@ GS4_API int gs4_material_preset(const char *name, gs4_material *material)
 #undef GS4I_SOUND_EIGENVALUE
 #undef GS4I_SPLAT_MAD
 #undef GS4I_SPLAT_MUL
+#undef GS4I_SPLIT_LIMIT
+#undef GS4I_SPLIT_TOLERANCE
 #undef GS4I_SQRT
+#undef GS4I_STICKY_REACH
 #undef GS4I_STORE
 #undef GS4I_SUM
 #undef GS4I_THREAD_LOCAL

@@ -4582,7 +4582,8 @@ typedef struct gs4i_head {
     double time, last_dt; uint64_t steps;
     uint32_t next_id; int32_t afresh, unsorted, unseen;
     double min_mass, fastest, shift;
-    int32_t particles, materials, bodies, emitters, active, occupied;
+    int32_t particles, materials, bodies, emitters, active, occupied, elastic_reals;
+    uint64_t split, bounded;
     gs4i_report worst;
 } gs4i_head;
 
@@ -4607,6 +4608,7 @@ static void gs4i_head_of(const gs4_sim *sim, gs4i_head *h)
     h->particles = sim->particles.count; h->materials = sim->material_count;
     h->bodies = sim->boundary.body_count; h->emitters = sim->emitter_count;
     h->active = sim->grid.active; h->occupied = sim->grid.occupied;
+    h->elastic_reals = sim->particles.elastic_reals; h->split = sim->split; h->bounded = sim->bounded;
     h->worst = sim->worst;
 }
 
@@ -4651,7 +4653,7 @@ static int gs4i_check_head(gs4_sim *sim, const gs4i_head *h)
         || memcmp(h->gravity, own.gravity, sizeof h->gravity) || memcmp(h->rho, own.rho, sizeof h->rho)
         || memcmp(&h->decay, &own.decay, sizeof h->decay))
         return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint belongs to a simulation with another description");
-    if (h->materials != own.materials || h->bodies != own.bodies || h->emitters != own.emitters)
+    if (h->materials != own.materials || h->bodies != own.bodies || h->emitters != own.emitters || h->elastic_reals != own.elastic_reals)
         return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint belongs to a scene with other materials, colliders or emitters: add the same ones, in the same order, before gs4_load");
     if (h->particles < 0 || h->active < 0 || h->occupied < 0 || h->particles > GS4I_MAX_PARTICLES || (size_t)h->active > sim->grid.table_count || h->occupied > h->active)
         return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint is damaged");
@@ -4668,11 +4670,13 @@ enum { GS4I_PIECE_LAWS, GS4I_PIECE_BODIES, GS4I_PIECE_EMITTERS, GS4I_PIECE_OCCUP
 /* Sizes from the head; the bytes of all pieces. */
 static size_t gs4i_piece_sizes(gs4_sim *sim, const gs4i_head *h, gs4i_pieces *p)
 {
+    gs4i_particles store = sim->particles;
     gs4i_array a[GS4I_ARRAYS];
     size_t sum = 0;
     int k;
     memset(p, 0, sizeof *p);
-    gs4i_particle_arrays(&sim->particles, a);
+    store.elastic_reals = h->elastic_reals;
+    gs4i_particle_arrays(&store, a);
     p->size[GS4I_PIECE_LAWS] = (size_t)h->materials * sizeof(gs4i_law);
     p->size[GS4I_PIECE_BODIES] = (size_t)h->bodies * sizeof(gs4i_body);
     p->size[GS4I_PIECE_EMITTERS] = (size_t)h->emitters * sizeof(gs4i_emitter);
@@ -4797,7 +4801,7 @@ static int gs4i_restore(gs4_sim *sim, const gs4i_head *h, const gs4i_pieces *p)
     gs4i_grid empty = sim->grid;
     int i, result;
     memset(&next.particles, 0, sizeof next.particles);
-    next.particles.with_rates = sim->particles.with_rates;
+    next.particles.with_rates = sim->particles.with_rates; next.particles.elastic_reals = h->elastic_reals;
     memset(&next.grid, 0, sizeof next.grid);
     memcpy(next.grid.cells, empty.cells, sizeof empty.cells); memcpy(next.grid.blocks, empty.blocks, sizeof empty.blocks);
     memcpy(next.grid.periodic, empty.periodic, sizeof empty.periodic);
@@ -4817,7 +4821,7 @@ static int gs4i_restore(gs4_sim *sim, const gs4i_head *h, const gs4i_pieces *p)
     }
     *sim = next;
     gs4i_restore_scene(sim, p);
-    sim->time = h->time; sim->last_dt = h->last_dt; sim->steps = h->steps;
+    sim->time = h->time; sim->last_dt = h->last_dt; sim->steps = h->steps; sim->split = h->split; sim->bounded = h->bounded;
     sim->next_id = h->next_id; sim->afresh = h->afresh; sim->unsorted = h->unsorted; sim->unseen = h->unseen; sim->edited = 0;
     sim->min_mass = GS4I_C(h->min_mass); sim->fastest = GS4I_C(h->fastest); sim->shift = GS4I_C(h->shift);
     sim->worst = h->worst;

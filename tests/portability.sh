@@ -270,13 +270,22 @@ all_hashes() {
     same "GS4_NO_VECTORS" "$CC -O2 -DGS4_NO_VECTORS" ""
     threads_and_checkpoint
 }
-hashes() { all_hashes ""; bunnies; contraction; }
+hashes() { all_hashes ""; bunnies; elastic; contraction; }
 hashes_double() { all_hashes -DGS4_DOUBLE; }
 
 bunnies() {
     scene=scene=bunny
     reference "" 500
     for level in -O0 '-O3 -march=native'; do same "$level" "$CC $level" ""; done
+    threads_and_checkpoint
+    scene=''
+}
+
+elastic() {
+    scene=elastic=1
+    reference "" 300
+    for level in -O0 '-O3 -march=native'; do same "$level" "$CC $level" ""; done
+    same "GS4_NO_VECTORS" "$CC -O2 -DGS4_NO_VECTORS" ""
     threads_and_checkpoint
     scene=''
 }
@@ -382,15 +391,18 @@ frames() {
 import sys, numpy, meshio
 name, real = sys.argv[1:]
 text = numpy.loadtxt(name + '.txt')
-columns = [('x', 0), ('y', 1), ('z', 2), ('vx', 3), ('vy', 4), ('vz', 5), ('volume_ratio', 6), ('mass', 7), ('id', 8), ('material', 9)]
+columns = [('x', 0), ('y', 1), ('z', 2), ('vx', 3), ('vy', 4), ('vz', 5), ('volume_ratio', 12), ('mass', 13), ('id', 14), ('material', 15)]
 ply, raw = meshio.read(name + '.ply'), numpy.load(name + '.npy')
-assert len(text) > 1000 and text[:, 9].max() == 1
+assert len(text) > 1000 and text[:, 15].max() == 1
 assert raw.shape == (len(text),) and raw['velocity'].dtype == real and ply.points.dtype == real
 for key, c in columns:
     read = ply.points[:, c] if c < 3 else ply.point_data[key]
     assert (read == text[:, c]).all(), 'PLY: ' + key
     read = raw['position'][:, c] if c < 3 else raw['velocity'][:, c - 3] if c < 6 else raw[key]
     assert (read == text[:, c]).all(), 'npy: ' + key
+for c, key in enumerate(['xx', 'yy', 'zz', 'xy', 'xz', 'yz']):
+    assert (ply.point_data['stress_' + key] == text[:, 6 + c]).all() and (raw['stress'][:, c] == text[:, 6 + c]).all(), key
+assert numpy.abs(text[:, 6:12]).max() > 0
 END
     for real in float32 float64; do
         [ $real = float64 ] && flag=-DGS4_DOUBLE || flag=''
@@ -398,7 +410,7 @@ END
     done
 }
 frames_agree() {
-    $CC -O2 ${2:-} -I. tests/determinism.c -o "$tmp/det" -lm && "$tmp/det" steps=50 frames="$tmp/frame" && $python "$tmp/frames.py" "$tmp/frame" $1
+    $CC -O2 ${2:-} -I. tests/determinism.c -o "$tmp/det" -lm && "$tmp/det" steps=50 elastic=1 frames="$tmp/frame" && $python "$tmp/frames.py" "$tmp/frame" $1
 }
 
 link() {

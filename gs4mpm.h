@@ -1260,6 +1260,7 @@ typedef struct gs4i_grid {
     int32_t *by_colour; int colour_first[9];    /* occupied blocks by parity of their coordinates: same colour, disjoint tiles */
     int32_t *jump_of; gs4_real *jump; int jump_count, jump_capacity;   /* [[boundary]]: per slot, 1 + its place in `jump` */
     uint8_t *contact;                   /* of the nodes in `jump`, see [[boundary]] */
+    gs4_real *spread;                   /* 4 a slot: mean velocity of its nodes, how far they are from it, see [[step]] */
     gs4i_scratch lists[2], histogram;   /* of sorting */
 } gs4i_grid;
 
@@ -1300,7 +1301,7 @@ static void gs4i_grid_free(gs4i_memory *m, gs4i_grid *g)
     gs4i_free(m, g->table, g->table_count, sizeof *g->table);
     gs4i_free(m, g->block, c, sizeof *g->block);
     gs4i_free(m, g->occupant, c, sizeof *g->occupant);
-    gs4i_free(m, g->jump_of, c, sizeof *g->jump_of);
+    gs4i_free(m, g->jump_of, c, sizeof *g->jump_of); gs4i_free(m, g->spread, c, 4 * sizeof *g->spread);
     gs4i_free(m, g->momentum, c, GS4I_NODE_REALS * sizeof(gs4_real));
     gs4i_free(m, g->force, c, GS4I_NODE_REALS * sizeof(gs4_real));
     gs4i_free(m, g->memory, c, GS4I_NODE_REALS * sizeof(gs4_real));
@@ -1326,19 +1327,20 @@ static int gs4i_grid_reserve(gs4i_memory *m, gs4i_grid *g, int count, int with_m
     n.block = (uint32_t *)gs4i_alloc(m, c, sizeof *n.block);
     n.occupant = (int32_t *)gs4i_alloc(m, c, sizeof *n.occupant);
     n.jump_of = (int32_t *)gs4i_alloc(m, c, sizeof *n.jump_of);
+    n.spread = (gs4_real *)gs4i_alloc(m, c, 4 * sizeof *n.spread);
     n.momentum = (gs4_real *)gs4i_alloc(m, c, node);
     n.force = (gs4_real *)gs4i_alloc(m, c, node);
     n.memory = with_memory ? (gs4_real *)gs4i_alloc(m, c, node) : NULL;
-    if (!n.block || !n.occupant || !n.jump_of || !n.momentum || !n.force || (with_memory && !n.memory)) {
+    if (!n.block || !n.occupant || !n.jump_of || !n.spread || !n.momentum || !n.force || (with_memory && !n.memory)) {
         gs4i_free(m, n.block, c, sizeof *n.block); gs4i_free(m, n.occupant, c, sizeof *n.occupant);
-        gs4i_free(m, n.jump_of, c, sizeof *n.jump_of); gs4i_free(m, n.momentum, c, node);
+        gs4i_free(m, n.jump_of, c, sizeof *n.jump_of); gs4i_free(m, n.spread, c, 4 * sizeof *n.spread); gs4i_free(m, n.momentum, c, node);
         gs4i_free(m, n.force, c, node); gs4i_free(m, n.memory, c, node);
         return GS4_ERROR_MEMORY;
     }
     if (g->block) memcpy(n.block, g->block, keep * sizeof *n.block);
     if (g->memory) memcpy(n.memory, g->memory, keep * node);
     gs4i_free(m, g->block, old, sizeof *g->block); gs4i_free(m, g->occupant, old, sizeof *g->occupant);
-    gs4i_free(m, g->jump_of, old, sizeof *g->jump_of); gs4i_free(m, g->momentum, old, node);
+    gs4i_free(m, g->jump_of, old, sizeof *g->jump_of); gs4i_free(m, g->spread, old, 4 * sizeof *g->spread); gs4i_free(m, g->momentum, old, node);
     gs4i_free(m, g->force, old, node); gs4i_free(m, g->memory, old, node);
     *g = n;
     return GS4_OK;
@@ -3466,41 +3468,30 @@ static void gs4i_judge(gs4i_batch *q, gs4i_gradient L, const gs4_real *old_x, in
     }
 }
 
-/* Can the nodes of a block alone prove that S7 is safe for its particles? A node of mass m_i has weight at most m_i/m_p and
- * gradient at most sqrt(2 m_i/m_p)/h in any particle p, so with q_i = min(1, 14 sqrt(m_i/m_min)) and r the mean velocity of
- * the tile no particle sees |div u| > 4.7/h max_i q_i |u_i - r|_1. */
+/* Can the nodes around a block alone prove that S7 is safe for its particles? A node of mass m_i has weight at most m_i/m_p and
+ * gradient at most sqrt(2 m_i/m_p)/h in any particle p, so with q_i = min(1, 14 sqrt(m_i/m_min)) and any velocity r no
+ * particle sees |div u| > 4.7/h max_i q_i |u_i - r|_1; `spread` has that maximum about a block's own mean (gs4i_node_spreads). */
 static int gs4i_is_calm(const gs4i_pass *pass, int index)
 {
     const gs4_sim *sim = pass->sim;
-    const int o = pass->blocks[index], next = pass->blocks[index + 1 < pass->count ? index + 1 : index];
+    const gs4i_grid *g = &sim->grid;
+    const int o = pass->blocks[index];
+    const int32_t *nb = g->neighbour + 27 * (size_t)o;
     const gs4i_report *report = &sim->reports[o];
-    const gs4_real h = sim->grid.h, light = sim->min_mass * GS4I_C(1.0 / 196), limit = GS4I_C(0.2 / 4.7) * h / sim->rule.dt;
-    gs4_real mass = 0;
-    const gs4i_quad zero = { GS4I_LANES(0, 0, 0, 0) };
-    gs4i_quad sum = zero, worst = zero, total = zero, q, off;
-    gs4_real u[GS4I_TILE_REALS];
-    int row, i, c;
+    const gs4_real *mean = g->spread + 4 * (size_t)nb[13], limit = GS4I_C(0.2 / 4.7) * g->h / sim->rule.dt;
+    gs4_real worst = 0;
+    int i, c;
     if (!(report->min_J > GS4I_C(0.25) && report->max_J < 4) || report->hard) return 0;
-    gs4i_tile_load(&sim->grid, o, report->rows, sim->grid.momentum, u);
-    for (row = 0; row < 64; row += 2) gs4i_tile_prefetch(&sim->grid, next, row, sim->grid.momentum);
-    for (row = 0; row < 64; row++)
-        for (i = 4 * GS4I_TILE * row; i < 4 * GS4I_TILE * (row + 1) && (report->rows >> row & 1); i += 4) {
-            GS4I_LOAD(q, u + i);
-            GS4I_SPLAT_MAD(sum, u[i + 3], q);
-            mass += u[i + 3];
-        }
-    for (c = 0; c < 3; c++) if (!(gs4i_abs(GS4I_LANE(sum, c)) * sim->rule.dt < mass * h)) return 0;
-    GS4I_SPLAT_MUL(sum, 1 / mass, sum);
-    for (row = 0; row < 64; row++)
-        for (i = 4 * GS4I_TILE * row; i < 4 * GS4I_TILE * (row + 1) && (report->rows >> row & 1); i += 4) {
-            GS4I_LOAD(q, u + i);
-            GS4I_DIFFERENCE(off, q, sum);
-            if (u[i + 3] <= light) GS4I_SPLAT_MUL(off, 14 * GS4I_SQRT(u[i + 3] / sim->min_mass), off);
-            GS4I_MUL(off, off, off);
-            GS4I_GREATER(worst, off, worst);
-            GS4I_SUM(total, total, off);                    /* the greatest loses NaN, the sum does not */
-        }
-    return gs4i_finite(GS4I_LANE(total, 0) + GS4I_LANE(total, 1) + GS4I_LANE(total, 2)) && GS4I_SQRT(GS4I_LANE(worst, 0)) + GS4I_SQRT(GS4I_LANE(worst, 1)) + GS4I_SQRT(GS4I_LANE(worst, 2)) < limit;
+    for (c = 0; c < 3; c++) if (!(gs4i_abs(mean[c]) * sim->rule.dt < g->h)) return 0;
+    for (i = 0; i < 27; i++) {
+        const gs4_real *of = g->spread + 4 * (size_t)nb[i];
+        gs4_real all = of[3];
+        if (all < 0) continue;                              /* no material there */
+        for (c = 0; c < 3; c++) all += gs4i_abs(of[c] - mean[c]);
+        if (!(all < limit)) return 0;
+        worst = gs4i_max(worst, all);
+    }
+    return worst < limit;
 }
 
 /* S7: gather and correct. With `commit` 0 nothing is written: a rehearsal that only reports. */
@@ -4115,6 +4106,35 @@ static void gs4i_node_memories(int index, void *context)
     }
 }
 
+/* Mean velocity of the nodes of each block, and max_i q_i |u_i - mean|_1 with q of gs4i_is_calm; -1 where there is no material. */
+static void gs4i_node_spreads(int index, void *context)
+{
+    const gs4i_node_pass *pass = (const gs4i_node_pass *)context;
+    const gs4i_grid *g = &pass->sim->grid;
+    const gs4_real light = pass->sim->min_mass * GS4I_C(1.0 / 196);
+    const gs4i_quad zero = { GS4I_LANES(0, 0, 0, 0) };
+    int s, i;
+    for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
+        const gs4_real *u = g->momentum + (size_t)s * GS4I_NODE_REALS;
+        gs4i_quad sum = zero, worst = zero, total = zero, q;
+        gs4_real mass = 0, *spread = g->spread + 4 * (size_t)s;
+        for (i = 0; i < 4 * GS4I_BLOCK_NODES; i += 4) { GS4I_LOAD(q, u + i); GS4I_SPLAT_MAD(sum, u[i + 3], q); mass += u[i + 3]; }
+        GS4I_SPLAT_MUL(sum, mass > 0 ? 1 / mass : GS4I_C(0), sum);
+        for (i = 0; i < 4 * GS4I_BLOCK_NODES; i += 4) {
+            if (!(u[i + 3] > 0)) continue;
+            GS4I_LOAD(q, u + i);
+            GS4I_DIFFERENCE(q, q, sum);
+            if (u[i + 3] <= light) GS4I_SPLAT_MUL(q, 14 * GS4I_SQRT(u[i + 3] / pass->sim->min_mass), q);
+            GS4I_MUL(q, q, q);
+            GS4I_GREATER(worst, q, worst);
+            GS4I_SUM(total, total, q);                      /* the greatest loses NaN, the sum does not */
+        }
+        GS4I_STORE(spread, sum);
+        spread[3] = !(mass > 0) ? GS4I_C(-1) : !gs4i_finite(GS4I_LANE(total, 0) + GS4I_LANE(total, 1) + GS4I_LANE(total, 2)) ? GS4I_HUGE
+                  : GS4I_SQRT(GS4I_LANE(worst, 0)) + GS4I_SQRT(GS4I_LANE(worst, 1)) + GS4I_SQRT(GS4I_LANE(worst, 2));
+    }
+}
+
 /* --- stages ------------------------------------------------------------------------------------------- */
 
 #define GS4I_TRY(call) do { int gs4i_r = (call); if (gs4i_r != GS4_OK) return gs4i_r; } while (0)
@@ -4183,9 +4203,10 @@ static int gs4i_check_stage(gs4_sim *sim)
 }
 
 /* Before anything is written to the particles: can the step be trusted? */
-static int gs4i_rehearse(gs4_sim *sim)
+static int gs4i_rehearse(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     gs4i_report r;
+    gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_node_spreads, nodes);
     gs4i_gather(sim, sim->desc.integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER ? gs4i_rehearse_euler_task : gs4i_rehearse_task);
     r = gs4i_all_reports(sim);
     return r.bad ? gs4i_fail_bad(sim, &r) : GS4_OK;
@@ -4404,7 +4425,7 @@ static int gs4i_step(gs4_sim *sim, gs4_real dt)
             gs4i_fill_images(&sim->boundary, &sim->grid, sim->grid.force);
         }
         GS4I_TRY(gs4i_check_stage(sim));
-        GS4I_TRY(gs4i_rehearse(sim));
+        GS4I_TRY(gs4i_rehearse(sim, &nodes));
         if (!euler) gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_node_memories, &nodes);
         gs4i_gather(sim, euler ? gs4i_gather_euler_task : gs4i_correct_task);                   /* S7 */
     }

@@ -29,6 +29,7 @@ int main(int count, char **values)
     RUN(test_elastic_wave);
     RUN(test_channel_overshoot);
     RUN(test_stress_is_paid_for_where_it_is);
+    RUN(test_drop_draws_back);
     run_errors();
     run_files();
     RUN(test_stability);

@@ -2101,7 +2101,7 @@ static void gs4i_elastic_rate(const gs4i_elastic_laws *l, gs4i_lanes G, gs4i_sym
 /* --- the split ----------------------------------------------------------------------------------------- */
 
 /* Of one particle, in double. */
-typedef struct gs4i_split { double inv_lambda, stretch, nu, alpha, L[3][3]; int bounded; } gs4i_split;
+typedef struct gs4i_split { double inv_lambda, stretch, nu, alpha, L[3][3], swing /* how far f h / lambda_b moves within a relaxation */; int bounded; } gs4i_split;
 
 /* Eigenvalues and eigenvectors (columns of Q) of a symmetric matrix, by Jacobi's rotations. */
 static void gs4i_eigen(const double m[6], double values[3], double Q[3][3])
@@ -2123,12 +2123,14 @@ static void gs4i_eigen(const double m[6], double values[3], double Q[3][3])
     for (i = 0; i < 3; i++) values[i] = a[i][i];
 }
 
-static double gs4i_relaxation(const gs4i_split *p, const double c[3])
+/* f, and how fast it changes with the stretch */
+static double gs4i_relaxation(const gs4i_split *p, const double c[3], double *stiff)
 {
     const double S[3] = { c[0] - 1, c[1] - 1, c[2] - 1 };
-    double f1, stiff;
+    double f1;
+    *stiff = 0;
     if (!(p->stretch > 0)) return 1;
-    gs4i_pom_pom(p->stretch, p->nu, p->alpha, (S[0] + S[1] + S[2]) / 3, S[0] * S[0] + S[1] * S[1] + S[2] * S[2], &f1, &stiff);
+    gs4i_pom_pom(p->stretch, p->nu, p->alpha, (S[0] + S[1] + S[2]) / 3, S[0] * S[0] + S[1] * S[1] + S[2] * S[2], &f1, stiff);
     return f1 + 1;
 }
 
@@ -2136,12 +2138,14 @@ static double gs4i_relaxation(const gs4i_split *p, const double c[3])
  * exactly by dc/dt = -(g c - (1 - alpha)) / lambda_b, g = f + alpha (c - 2). */
 static void gs4i_relax(gs4i_split *p, double m[6], double h)
 {
-    double c[3], half[3], next[3], Q[3][3], f;
+    double c[3], half[3], next[3], Q[3][3], f, stiff = 0;
     int i, j, k, stage;
     gs4i_eigen(m, c, Q);
     for (i = 0; i < 3; i++) half[i] = c[i] = c[i] > 0 ? c[i] : 1e-30;   /* rounding of a thin ellipsoid */
     for (stage = 0; stage < 2; stage++) {
-        f = gs4i_relaxation(p, half);
+        const double before = stiff;
+        f = gs4i_relaxation(p, half, &stiff);
+        if (stage) p->swing = fmax(p->swing, fabs(stiff - before) * h * p->inv_lambda);
         for (k = 0; k < 3; k++) {
             const double g = f + p->alpha * (half[k] - 2), t = (stage ? h : 0.5 * h) * p->inv_lambda, x = g * t;
             const double phi = fabs(x) < 1e-9 ? 1 - 0.5 * x : -expm1(-x) / x;
@@ -2202,6 +2206,7 @@ static int gs4i_split_advance(gs4i_split *p, double c[6], double dt)
         gs4i_exponential(p->L, 0.5 * h, half);
         gs4i_multiply3(half, half, E);
         memcpy(one, c, sizeof one); memcpy(two, c, sizeof two);
+        p->swing = 0;
         gs4i_relax(p, one, 0.5 * h); gs4i_convect(E, one); gs4i_relax(p, one, 0.5 * h);
         gs4i_relax(p, two, 0.25 * h); gs4i_convect(half, two); gs4i_relax(p, two, 0.5 * h); gs4i_convect(half, two); gs4i_relax(p, two, 0.25 * h);
         for (i = 0; i < 6; i++) {
@@ -2210,7 +2215,7 @@ static int gs4i_split_advance(gs4i_split *p, double c[6], double dt)
             change = fmax(change, fabs(two[i] - c[i]));
             if (!(fabs(two[i] - one[i]) < 1e290)) error = 1e290;      /* NaN, too */
         }
-        ratio = error / (GS4I_SPLIT_TOLERANCE * size);
+        ratio = fmax(error / (GS4I_SPLIT_TOLERANCE * size), p->swing);   /* where f swings, one and two halves agree on a wrong answer */
         if (ratio <= 1) {
             memcpy(c, two, sizeof two);
             left -= h;

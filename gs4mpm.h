@@ -2252,7 +2252,7 @@ static void gs4i_split_one(const gs4i_elastic_laws *l, gs4i_lanes G, gs4i_gradie
                            gs4i_symmetric after, gs4i_lanes *rate, gs4i_elastic_count *count)
 {
     const double modulus = (double)GS4I_NTH(G, n);
-    double c[6], before[6], end[6];
+    double c[6], before[6], end[6], fast = 0, gap = 1e-290, slope;
     gs4i_split p;
     int i, j;
     p.inv_lambda = (double)GS4I_NTH_CONST(l->inv_lambda, n); p.stretch = (double)GS4I_NTH_CONST(l->stretch, n);
@@ -2261,12 +2261,13 @@ static void gs4i_split_one(const gs4i_elastic_laws *l, gs4i_lanes G, gs4i_gradie
     for (i = 0; i < 6; i++) before[i] = c[i] = (double)GS4I_NTH_CONST(e->s[i], n) / modulus + (i < 3);
     count->split++;
     if (gs4i_split_advance(&p, c, dt) != GS4_OK) count->failed = n + 1;
-    if (rate) gs4i_conformation_rate(&p, c, end);
-    for (i = 0; i < 6; i++) {
-        GS4I_NTH(after[i], n) = GS4I_C(modulus * (c[i] - (i < 3)));
-        if (rate) GS4I_NTH(rate[i], n) = GS4I_C(modulus * ((2 * gamma - 1) * (c[i] - before[i]) / dt + (2 - 2 * gamma) * end[i]));
-    }
+    for (i = 0; i < 6; i++) GS4I_NTH(after[i], n) = GS4I_C(modulus * (c[i] - (i < 3)));
     count->bounded += p.bounded;
+    if (!rate) return;
+    gs4i_conformation_rate(&p, c, end);
+    for (i = 0; i < 6; i++) { fast = fmax(fast, fabs(end[i])); gap = fmax(gap, fabs((c[i] - before[i]) / dt - end[i])); }
+    slope = (2 * gamma - 1) * fmin(1, fast / gap);      /* a transient that is over does not belong into the rate */
+    for (i = 0; i < 6; i++) GS4I_NTH(rate[i], n) = GS4I_C(modulus * (slope * (c[i] - before[i]) / dt + (1 - slope) * end[i]));
 }
 
 /* --- both together ------------------------------------------------------------------------------------- */

@@ -2198,7 +2198,7 @@ static void gs4i_convect(double E[3][3], double m[6])
 /* Conformation after the time dt under constant L. 0, or GS4_ERROR_UNSTABLE where it overflows or takes too long. */
 static int gs4i_split_advance(gs4i_split *p, double c[6], double dt)
 {
-    double h = dt, left = dt, E[3][3], half[3][3];
+    double h = fmin(dt, 0.25 / p->inv_lambda), left = dt, E[3][3], half[3][3];      /* over a longer one any two answers agree: all has relaxed */
     int n, i;
     for (n = 0; n < GS4I_SPLIT_LIMIT && left > 0; n++) {
         double one[6], two[6], error = 0, size = 1e-14, change = 0, ratio;

@@ -2219,7 +2219,7 @@ static int gs4i_split_advance(gs4i_split *p, double c[6], double dt)
         if (ratio <= 1) {
             memcpy(c, two, sizeof two);
             left -= h;
-            if (h < left && change * (left / h) < 1e-6 * size) return GS4_OK;       /* it has settled */
+            if (h < left && (change * (left / h) < 1e-6 * size || change < 4e-15 * (1 + size))) return GS4_OK;     /* it has settled */
         }
         h *= ratio > 0.01 ? fmax(0.9 / cbrt(ratio), 0.1) : 4;
     }

@@ -2201,7 +2201,7 @@ static int gs4i_split_advance(gs4i_split *p, double c[6], double dt)
     double h = fmin(dt, 0.25 / p->inv_lambda), left = dt, E[3][3], half[3][3];      /* over a longer one any two answers agree: all has relaxed */
     int n, i;
     for (n = 0; n < GS4I_SPLIT_LIMIT && left > 0; n++) {
-        double one[6], two[6], error = 0, size = 1e-14, change = 0, ratio;
+        double one[6], two[6], error = 0, change = 0, before = 0, after = 0, size, ratio;
         if (h > left * (1 - 1e-12)) h = left;
         gs4i_exponential(p->L, 0.5 * h, half);
         gs4i_multiply3(half, half, E);
@@ -2209,12 +2209,13 @@ static int gs4i_split_advance(gs4i_split *p, double c[6], double dt)
         p->swing = 0;
         gs4i_relax(p, one, 0.5 * h); gs4i_convect(E, one); gs4i_relax(p, one, 0.5 * h);
         gs4i_relax(p, two, 0.25 * h); gs4i_convect(half, two); gs4i_relax(p, two, 0.5 * h); gs4i_convect(half, two); gs4i_relax(p, two, 0.25 * h);
-        for (i = 0; i < 6; i++) {
-            error = fmax(error, fabs(two[i] - one[i]) / 3);
-            size = fmax(size, fmax(fabs(two[i] - (i < 3)), fabs(c[i] - (i < 3))));
-            change = fmax(change, fabs(two[i] - c[i]));
-            if (!(fabs(two[i] - one[i]) < 1e290)) error = 1e290;      /* NaN, too */
+        for (i = 0; i < 6; i++) {                           /* lengths that no rotation of the axes changes */
+            const double weight = i < 3 ? 1 : 2, now = two[i] - (i < 3), then = c[i] - (i < 3);
+            error += weight * (two[i] - one[i]) * (two[i] - one[i]); change += weight * (now - then) * (now - then);
+            after += weight * now * now; before += weight * then * then;
         }
+        error = sqrt(error) / 3; change = sqrt(change); size = fmax(1e-14, sqrt(fmax(before, after)));
+        if (!(error < 1e145)) error = 1e290;                /* NaN, too */
         ratio = fmax(error / (GS4I_SPLIT_TOLERANCE * size), p->swing);   /* where f swings, one and two halves agree on a wrong answer */
         if (ratio <= 1) {
             memcpy(c, two, sizeof two);

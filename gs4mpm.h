@@ -2216,7 +2216,7 @@ static int gs4i_split_advance(gs4i_split *p, double c[6], double dt)
         }
         error = sqrt(error) / 3; change = sqrt(change); size = fmax(1e-14, sqrt(fmax(before, after)));
         if (!(error < 1e145)) error = 1e290;                /* NaN, too */
-        ratio = fmax(error / (GS4I_SPLIT_TOLERANCE * size), p->swing);   /* where f swings, one and two halves agree on a wrong answer */
+        ratio = fmax(error / (GS4I_SPLIT_TOLERANCE * size + 2e-15 * (1 + size)), p->swing);   /* where f swings, one and two halves agree on a wrong answer */
         if (ratio <= 1) {
             memcpy(c, two, sizeof two);
             left -= h;

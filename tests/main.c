@@ -9,6 +9,7 @@
 #include "test_errors.c"
 #include "test_files.c"
 #include "test_stability.c"
+#include "test_stress.c"
 
 int main(int count, char **values)
 {
@@ -32,6 +33,7 @@ int main(int count, char **values)
     RUN(test_drop_draws_back);
     run_errors();
     run_files();
+    run_stress();
     RUN(test_stability);
     RUN(test_extremes);
     RUN(test_order_as_printed);

@@ -521,3 +521,98 @@ static void test_stress_random(void)
     stress_walks(steps, 1, 1);
     stress_walks(steps, test_slow ? 1e13 : 10, 0);
 }
+
+/* Alpha above 1 has no solution in fast flow (alpha 100: none above Wi 0.005 in shear): eigenvalues stay in the bounds that the header names. */
+static void test_stress_bounded(void)
+{
+    static const double cubes[3] = { 0.98, 0.098, 0.0098 };  /* lambda_b of the cubes in table 4 of 2021: alpha 100, Q 8 */
+    int k, flow, i, steps = 0, refused = 0;
+    for (k = 0; k < 3; k++) for (flow = 0; flow < 3; flow++) {
+        gs4_material m = stress_material(0, 4.9 * 0.99 / cubes[k], cubes[k], 0.01);
+        const double modulus = (double)(m.viscosity * (1 - m.local_fraction)) / cubes[k];
+        gs4_real L[9];
+        gs4_point p;
+        m.stretch_time = (gs4_real)(0.9 * cubes[k]); m.anisotropy = 100; m.arms = 8;
+        memset(&p, 0, sizeof p);
+        for (i = 0; i < 40; i++, steps++) {
+            double low, high;
+            int result;
+            stress_flow(flow, i < 20 ? 0.1 / cubes[k] * (1 + i) : 0, L);
+            result = gs4_point_step(&m, &p, L, (gs4_real)(cubes[k] * (i % 2 ? 0.1 : 0.02)), (gs4_real)0.5, 0);
+            CHECK(result == GS4_OK || result == GS4_ERROR_UNSTABLE);
+            refused += result != GS4_OK;
+            stress_eigenvalues(&p, modulus, &low, &high);
+            CHECK(low > 1e-3 - 1e-6 * (1 + high) && high < 1.001e6);
+        }
+    }
+    CHECK(refused == 0);
+    if (test_filter[0]) printf("%d of %d steps refused\n", refused, steps);
+}
+
+/* --- bad arguments ---------------------------------------------------------------------------------------- */
+
+static void stress_refused(const gs4_material *m, const gs4_point *p, const gs4_real *L, double dt, double rho, double spurious, const char *names)
+{
+    gs4_point copy;
+    const char *said;
+    memcpy(&copy, p, sizeof copy);
+    gs4_point_step(NULL, NULL, NULL, 1, 0, 0);              /* another sentence, so that this one is new */
+    CHECK(gs4_point_step(m, &copy, L, (gs4_real)dt, (gs4_real)rho, (gs4_real)spurious) == GS4_ERROR_ARGUMENT);
+    said = gs4_last_error(NULL);
+    CHECK(strstr(said, names) != NULL);
+    if (!strstr(said, names)) printf("    said: %s; not of: %s\n", said, names);
+    CHECK(memcmp(&copy, p, sizeof copy) == 0);
+}
+
+static void test_stress_bad_arguments(void)
+{
+    const gs4_material good = stress_material(4, 50, 0.1, 0.1);
+    const double bad = (double)NAN;
+    gs4_material m = good;
+    gs4_real L[9] = { 0, 1, 0, 0, 0, 0, 0, 0, 0 }, broken[9] = { 0, 0, 0, 0, 0, 0, 0, 0, 0 }, out[6] = { 7, 7, 7, 7, 7, 7 };
+    gs4_point p, q;
+    int i;
+    memset(&p, 0, sizeof p);
+    CHECK(gs4_point_step(&good, &p, L, (gs4_real)0.01, 0, 0) == GS4_OK);
+    CHECK(gs4_point_step(NULL, &p, L, 1, 0, 0) == GS4_ERROR_ARGUMENT && gs4_last_error(NULL)[0]);
+    CHECK(gs4_point_step(&good, NULL, L, 1, 0, 0) == GS4_ERROR_ARGUMENT && gs4_last_error(NULL)[0]);
+    stress_refused(&good, &p, NULL, 0.01, 0, 0, "NULL");
+    broken[5] = (gs4_real)bad;
+    stress_refused(&good, &p, broken, 0.01, 0, 0, "velocity_gradient");
+    broken[5] = (gs4_real)INFINITY;
+    stress_refused(&good, &p, broken, 0.01, 0, 0, "velocity_gradient");
+    stress_refused(&good, &p, L, 0, 0, 0, "dt"); stress_refused(&good, &p, L, -1, 0, 0, "dt"); stress_refused(&good, &p, L, bad, 0, 0, "dt");
+    stress_refused(&good, &p, L, 0.01, -0.1, 0, "rho_inf"); stress_refused(&good, &p, L, 0.01, 1.1, 0, "rho_inf"); stress_refused(&good, &p, L, 0.01, bad, 0, "rho_inf");
+    stress_refused(&good, &p, L, 0.01, 0.5, 0.6, "rho_inf_spurious"); stress_refused(&good, &p, L, 0.01, 0.5, bad, "rho_inf_spurious");
+    for (i = 0; i < 12; i++) {
+        q = p;
+        (i < 6 ? q.stress : q.stress_rate - 6)[i] = (gs4_real)bad;
+        stress_refused(&good, &q, L, 0.01, 0, 0, i < 6 ? "stress" : "stress_rate");
+    }
+    q = p; q.temperature = (gs4_real)bad; stress_refused(&good, &q, L, 0.01, 0, 0, "temperature");
+#define STRESS_BAD(field, value) do { m = good; m.field = (gs4_real)(value); stress_refused(&m, &p, L, 0.01, 0, 0, #field); \
+        CHECK(gs4_point_stress(&m, &p, L, out) == GS4_ERROR_ARGUMENT && strstr(gs4_last_error(NULL), #field) && out[0] == 7 && out[5] == 7); } while (0)
+    STRESS_BAD(anisotropy, -0.1); STRESS_BAD(anisotropy, bad); STRESS_BAD(arms, 0.9); STRESS_BAD(arms, bad); STRESS_BAD(relaxation_time, 0);
+    STRESS_BAD(relaxation_time, -1); STRESS_BAD(relaxation_time, bad); STRESS_BAD(stretch_time, 0); STRESS_BAD(stretch_time, bad);
+    STRESS_BAD(local_fraction, -0.1); STRESS_BAD(local_fraction, 1.1); STRESS_BAD(local_fraction, bad); STRESS_BAD(viscosity, -1); STRESS_BAD(viscosity, bad);
+#undef STRESS_BAD
+    m = good; m.liquid = (gs4_liquid)7; stress_refused(&m, &p, L, 0.01, 0, 0, "liquid");
+    CHECK(gs4_point_stress(NULL, &p, L, out) == GS4_ERROR_ARGUMENT && gs4_point_stress(&good, NULL, L, out) == GS4_ERROR_ARGUMENT);
+    CHECK(gs4_point_stress(&good, &p, NULL, out) == GS4_ERROR_ARGUMENT && gs4_point_stress(&good, &p, L, NULL) == GS4_ERROR_ARGUMENT);
+    CHECK(gs4_point_stress(&good, &p, broken, out) == GS4_ERROR_ARGUMENT && out[0] == 7);
+}
+
+static void run_stress(void)
+{
+    RUN(test_stress_reference);
+    RUN(test_stress_units);
+    RUN(test_stress_split);
+    RUN(test_stress_steady);
+    RUN(test_stress_turned);
+    RUN(test_stress_rigid_rotation);
+    RUN(test_stress_pitfalls);
+    RUN(test_stress_short_memory);
+    RUN(test_stress_random);
+    RUN(test_stress_bounded);
+    RUN(test_stress_bad_arguments);
+}

@@ -2145,7 +2145,7 @@ static void gs4i_relax(gs4i_split *p, double m[6], double h)
     for (stage = 0; stage < 2; stage++) {
         const double before = stiff;
         f = gs4i_relaxation(p, half, &stiff);
-        if (stage) p->swing = fmax(p->swing, fabs(stiff - before) * h * p->inv_lambda);
+        if (stage) p->swing = fmax(p->swing, (fabs(stiff - before) + 2 * stiff) * h * p->inv_lambda);
         for (k = 0; k < 3; k++) {
             const double g = f + p->alpha * (half[k] - 2), t = (stage ? h : 0.5 * h) * p->inv_lambda, x = g * t;
             const double phi = fabs(x) < 1e-9 ? 1 - 0.5 * x : -expm1(-x) / x;

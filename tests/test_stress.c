@@ -266,6 +266,13 @@ static void test_stress_steady(void)
             if (test_filter[0] && (result < 0 || error > 5e-4 || clock() - start > CLOCKS_PER_SEC / 50)) printf("row %d, Wi %g, time %g: result %d, error %.2e, %.3f s\n", i, row->Wi, times[k], result, error, (double)(clock() - start) / CLOCKS_PER_SEC);
         }
     }
+    for (k = 0; k < 6; k++) {                              /* Oldroyd-B: S_xx = 2 Wi^2, S_xy = Wi */
+        const double Wi = k < 3 ? 1e-3 : 1, L[9] = { 0, Wi, 0, 0, 0, 0, 0, 0, 0 }, S[4] = { 2 * Wi * Wi, Wi, 0, 0 };
+        double c[6] = { 1, 1, 1, 0, 0, 0 };
+        gs4i_split p = stress_split(-1, L);
+        CHECK(gs4i_split_advance(&p, c, times[k % 3]) == GS4_OK);
+        CHECK(stress_split_error(c, S) < 1e-3);
+    }
     if (test_filter[0]) printf("worst error %.1e\n", worst);
 }
 
@@ -597,6 +604,10 @@ static void test_stress_bad_arguments(void)
     STRESS_BAD(local_fraction, -0.1); STRESS_BAD(local_fraction, 1.1); STRESS_BAD(local_fraction, bad); STRESS_BAD(viscosity, -1); STRESS_BAD(viscosity, bad);
 #undef STRESS_BAD
     m = good; m.liquid = (gs4_liquid)7; stress_refused(&m, &p, L, 0.01, 0, 0, "liquid");
+    m = stress_material(-1, 500, 0.1, 0); q = p;            /* Oldroyd-B, pulled at Wi 10 for 100 relaxation times: exp(1900) */
+    stress_flow(REF_UNIAXIAL, 100, broken);
+    CHECK(gs4_point_step(&m, &q, broken, 10, 0, 0) == GS4_ERROR_UNSTABLE && strstr(gs4_last_error(NULL), "overflow") && memcmp(&p, &q, sizeof p) == 0);
+    broken[5] = (gs4_real)bad;
     CHECK(gs4_point_stress(NULL, &p, L, out) == GS4_ERROR_ARGUMENT && gs4_point_stress(&good, NULL, L, out) == GS4_ERROR_ARGUMENT);
     CHECK(gs4_point_stress(&good, &p, NULL, out) == GS4_ERROR_ARGUMENT && gs4_point_stress(&good, &p, L, NULL) == GS4_ERROR_ARGUMENT);
     CHECK(gs4_point_stress(&good, &p, broken, out) == GS4_ERROR_ARGUMENT && out[0] == 7);

@@ -2274,8 +2274,9 @@ static void gs4i_split_one(const gs4i_elastic_laws *l, gs4i_lanes G, gs4i_gradie
 /* --- both together ------------------------------------------------------------------------------------- */
 
 /* Does rule 1 resolve each particle: |L| dt and what relaxes explicitly small, and c = s/G + I inside the cone? */
-static int gs4i_resolved(gs4i_lanes G, gs4i_gradient L, gs4i_symmetric s, gs4i_lanes relax, gs4i_lanes stiff, gs4_real dt, int ok[GS4I_BATCH])
+static int gs4i_resolved(gs4i_lanes G, gs4i_gradient L, gs4i_symmetric s, gs4i_lanes relax, gs4i_lanes stiff, const gs4i_rule *rule, int ok[GS4I_BATCH])
 {
+    const gs4_real dt = rule->dt, fastest = rule->afresh ? 1 / dt : GS4I_HUGE;      /* the midpoint rule of a first step damps nothing */
     gs4i_lanes verdict;
     int b, j, all = 1;
     GS4I_BATCH_LOOP(b) {
@@ -2285,7 +2286,7 @@ static int gs4i_resolved(gs4i_lanes G, gs4i_gradient L, gs4i_symmetric s, gs4i_l
         gs4i_wide_mask good;
         gs4i_wide squared = L[0][0][b] * L[0][0][b];
         for (j = 1; j < 9; j++) squared += L[j / 3][j % 3][b] * L[j / 3][j % 3][b];
-        good = ((squared * (dt * dt) < GS4I_C(0.0625)) & (stiff[b] * dt < GS4I_C(0.4)) & (relax[b] * dt > GS4I_C(-0.1))
+        good = ((squared * (dt * dt) < GS4I_C(0.0625)) & (stiff[b] * dt < GS4I_C(0.4)) & (relax[b] * dt > GS4I_C(-0.1)) & (relax[b] < fastest)
                 & (xx > GS4I_C(1e-3) * G[b]) & (minor > GS4I_C(1e-5) * xx * yy) & (det > GS4I_C(1e-5) * minor * zz)) | (G[b] <= GS4I_TINY);
         all &= gs4i_all(&good);
         GS4I_CHOOSE(verdict[b], good, one, zero);
@@ -2315,9 +2316,10 @@ GS4I_INLINE void gs4i_predict_elastic(const gs4i_elastic_laws *l, gs4i_lanes G, 
 }
 
 /* S4: stress at the stage, s~ = s** + w (R + relax (s* - s~)), for n particles of the batch. */
-static void gs4i_stage_elastic(const gs4i_elastic_laws *l, gs4i_elastic *e, gs4_real dt, gs4_real ahead, gs4_real w,
-                               gs4i_gradient L, int n, gs4i_symmetric s, gs4i_elastic_count *count)
+static void gs4i_stage_elastic(const gs4i_elastic_laws *l, gs4i_elastic *e, const gs4i_rule *rule, gs4i_gradient L, int n, gs4i_symmetric s,
+                               gs4i_elastic_count *count)
 {
+    const gs4_real ahead = rule->reach.ahead, w = rule->s;
     gs4i_symmetric R;
     gs4i_lanes G, relax, stiff;
     int b, c, ok[GS4I_BATCH];
@@ -2325,7 +2327,7 @@ static void gs4i_stage_elastic(const gs4i_elastic_laws *l, gs4i_elastic *e, gs4_
     gs4i_predict_elastic(l, G, e, ahead, L, s, R, relax, stiff);
     for (c = 0; c < 6; c++)
         GS4I_BATCH_LOOP(b) s[c][b] = (e->s[c][b] + (ahead - w) * e->rate[c][b] + w * (R[c][b] + relax[b] * s[c][b])) / (GS4I_C(1) + w * relax[b]);
-    if (gs4i_resolved(G, L, s, relax, stiff, dt, ok)) return;
+    if (gs4i_resolved(G, L, s, relax, stiff, rule, ok)) return;
     for (b = 0; b < n; b++) if (!ok[b]) gs4i_split_one(l, G, L, e, b, (double)ahead, 1, s, NULL, count);
 }
 
@@ -2359,7 +2361,7 @@ static void gs4i_correct_elastic(const gs4i_elastic_laws *l, gs4i_elastic *e, co
             e->s[c][b] = (e->s[c][b] + dt * e->rate[c][b]) + rule->gamma * dt * change[c][b];
             e->rate[c][b] += change[c][b];
         }
-    if (gs4i_resolved(G, L, e->s, relax, stiff, dt, ok)) return;
+    if (gs4i_resolved(G, L, e->s, relax, stiff, rule, ok)) return;
     for (b = 0; b < n; b++) if (!ok[b]) gs4i_split_one(l, G, L, &old, b, (double)dt, (double)rule->gamma, e->s, e->rate, count);
 }
 
@@ -3141,7 +3143,7 @@ static void gs4i_add_elastic(const gs4i_particles *p, size_t i, int n, const gs4
     int b, c, good = 1;
     gs4i_take_elastic_laws(laws, l);
     gs4i_load_elastic(p->elastic + (size_t)p->elastic_reals * i, p->elastic_reals, n, &e);
-    if (p->with_rates) gs4i_stage_elastic(l, &e, rule->dt, rule->reach.ahead, rule->s, L, n, s, &count);
+    if (p->with_rates) gs4i_stage_elastic(l, &e, rule, L, n, s, &count);
     else memcpy(s, e.s, sizeof s);
     for (c = 0; c < 6; c++) GS4I_BATCH_LOOP(b) sigma[c][b] += s[c][b];
     gs4i_see_elastic(l, L, s, stiffness);

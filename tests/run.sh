@@ -12,12 +12,13 @@ case "${1:-}" in
     *) echo "usage: sh tests/run.sh [--full]"; exit 2 ;;
 esac
 tmp=$(mktemp -d) || exit 1
+native=-march=native; echo 'int main(void) { return 0; }' | $CC $native -x c - -o "$tmp/native" 2> /dev/null || native=''
 trap 'rm -rf "$tmp"' EXIT
 trap 'exit 1' HUP INT TERM
 
 # tests NAME FLAGS: tests/main.c in one precision
 tests() {
-    $CC -O2 ${CFLAGS:-} $2 -DGS4_PTHREADS -pthread -I. tests/main.c -o "$tmp/$1" -lm && (cd "$tmp" && "./$1" $slow)
+    $CC -O2 $native ${CFLAGS:-} $2 -DGS4_PTHREADS -pthread -I. tests/main.c -o "$tmp/$1" -lm && (cd "$tmp" && "./$1" $slow)
 }
 
 tests float '' > "$tmp/float.log" 2>&1 &

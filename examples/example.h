@@ -18,7 +18,9 @@
 #ifndef _POSIX_C_SOURCE
 #define _POSIX_C_SOURCE 200809L
 #endif
+#ifndef GS4_PTHREADS
 #define GS4_PTHREADS
+#endif
 #define GS4MPM_IMPLEMENTATION
 #include "gs4mpm.h"
 #include "preview.h"
@@ -32,6 +34,7 @@ typedef enum example_colour { EXAMPLE_PLAIN = 0, EXAMPLE_MATERIAL, EXAMPLE_SPEED
 typedef struct example {
     const char *name, *out;             /* files are OUT/NAME_0001.png; no `out`: the directory "out" */
     int frames, cells, threads;         /* threads 0: two */
+    int row, rows;                      /* of a table of materials: --row 1 to rows, in the names of files too; rows 0: no such option */
     double frame_time;                  /* s from frame to frame; 0: 1/30 */
     example_colour colour;              /* what the pictures show: one colour, the number of the material, or the speed */
     preview_settings look;
@@ -52,8 +55,8 @@ static double example_clock(void *user)
 
 static void example_usage(const example *e, FILE *to)
 {
-    fprintf(to, "usage: %s [--frames N] [--cells N] [--threads N] [--out DIR]   (here %d frames, %d cells, %d threads, %s)\n",
-            e->name, e->frames, e->cells, e->threads, e->out);
+    fprintf(to, "usage: %s%s [--frames N] [--cells N] [--threads N] [--out DIR]   (here %d frames, %d cells, %d threads, %s)\n",
+            e->name, e->rows ? " [--row N]" : "", e->frames, e->cells, e->threads, e->out);
 }
 
 /* Says what is wrong and how it is meant, and leaves. */
@@ -79,12 +82,14 @@ static void example_options(example *e, int argc, char **argv)
     if (!e->out) e->out = "out";
     if (!e->threads) e->threads = 2;
     if (!(e->frame_time > 0)) e->frame_time = 1.0 / 30;
+    if (e->rows && !e->row) e->row = 1;
     for (int i = 1; i < argc; ++i) {
         const char *o = argv[i], *value = i + 1 < argc ? argv[i + 1] : "";
         if (!strcmp(o, "--help")) { example_usage(e, stdout); exit(0); }
         if (!strcmp(o, "--frames")) e->frames = example_number(e, o, value, 1, 9999);
         else if (!strcmp(o, "--cells")) e->cells = example_number(e, o, value, 8, 1024);
         else if (!strcmp(o, "--threads")) e->threads = example_number(e, o, value, 1, 256);
+        else if (e->rows && !strcmp(o, "--row")) e->row = example_number(e, o, value, 1, e->rows);
         else if (strcmp(o, "--out")) example_misuse(e, "there is no option ", o);
         else if (!*value) example_misuse(e, "--out takes the name of a directory", "");
         else e->out = value;
@@ -119,10 +124,11 @@ static void example_write(const example *e, gs4_sim *sim)
     gs4_view x = gs4_particles(sim, GS4_FIELD_POSITION), v = gs4_particles(sim, GS4_FIELD_VELOCITY);
     const uint8_t *material = gs4_particle_materials(sim);
     gs4_real *number = NULL;
-    char path[1024];
+    char path[1024], row[16] = "";
     int failed = 0;
     if (!x.count) return;
-    sprintf(path, "%.900s/%.64s_%04d.ply", e->out, e->name, e->frame);
+    if (e->rows) sprintf(row, "_%d", e->row);
+    sprintf(path, "%.900s/%.64s%s_%04d.ply", e->out, e->name, row, e->frame);
     example_need(sim, gs4_write_ply(sim, path));
     strcpy(strrchr(path, '.'), ".png");
     if (e->colour == EXAMPLE_MATERIAL) {

@@ -43,7 +43,9 @@ int main(int argc, char **argv)
     desc.origin = vec(-box / 2, 0, -box / 2);
     desc.gravity = vec(0, -9.81, 0);
     desc.cfl = real(0.8);
-    sim = example_create(&e, &desc);            /* walls are GS4_WALL_STICK where nothing is said */
+    for (int i = 0; i < 6; ++i)                 /* on a side wall that sticks, what grazes it would hang for ever */
+        desc.walls[i] = i == 2 ? GS4_WALL_STICK : i == 3 ? GS4_WALL_OPEN : GS4_WALL_SLIP;
+    sim = example_create(&e, &desc);
 
     liquid.density = 1200;
     liquid.viscosity = 6;

@@ -2287,7 +2287,7 @@ static int gs4i_resolved(gs4i_lanes G, gs4i_gradient L, gs4i_symmetric s, gs4i_l
         gs4i_wide squared = L[0][0][b] * L[0][0][b];
         for (j = 1; j < 9; j++) squared += L[j / 3][j % 3][b] * L[j / 3][j % 3][b];
         good = ((squared * (dt * dt) < GS4I_C(0.0625)) & (stiff[b] * dt < GS4I_C(0.4)) & (relax[b] * dt > GS4I_C(-0.1)) & (relax[b] < fastest)
-                & (xx > GS4I_C(1e-3) * G[b]) & (minor > GS4I_C(1e-5) * xx * yy) & (det > GS4I_C(1e-5) * minor * zz)) | (G[b] <= GS4I_TINY);
+                & (xx > GS4I_C(1e-3) * G[b]) & (minor > GS4I_C(1e-5) * xx * yy) & (det > GS4I_C(1e-5) * xx * yy * zz)) | (G[b] <= GS4I_TINY);
         all &= gs4i_all(&good);
         GS4I_CHOOSE(verdict[b], good, one, zero);
     }

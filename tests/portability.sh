@@ -304,7 +304,7 @@ fuses() { $1 -O2 -mfma -ffp-contract=fast -I. -c "$tmp/fused.c" -o "$tmp/fused.o
 
 # sanitized COMPILER FLAGS
 sanitized_det() { $1 -g -O1 -DGS4_PTHREADS -pthread -I. tests/determinism.c -o "$tmp/det" -lm && "$tmp/det" steps=100 $2; }
-sanitized_main() { $1 -g -O1 -DGS4_PTHREADS -pthread -I. tests/main.c -o "$tmp/main" -lm && "$tmp/main"; }
+sanitized_main() { $1 -g -O1 -DGS4_PTHREADS -pthread -I. tests/main.c -o "$tmp/main" -lm && "$tmp/main" ${2:-}; }
 
 asan() {
     if have clang; then
@@ -318,7 +318,8 @@ asan() {
 tsan() {
     have gcc || return
     for n in 2 3; do check "determinism on $n threads" sanitized_det "gcc -fsanitize=thread" "threads=$n checkpoint=$tmp/checkpoint"; done
-    check "all tests" sanitized_main "gcc -fsanitize=thread"
+    check "determinism of stress on 2 threads" sanitized_det "gcc -fsanitize=thread" "threads=2 elastic=1"
+    check "tests of files" sanitized_main "gcc -fsanitize=thread" files
 }
 
 # ==== other compilers and machines =============================================================================

@@ -1,6 +1,7 @@
 #!/bin/sh
-# The tests: sh tests/run.sh          under a minute: all quick tests in float and in double, and the cheap part of portability.sh
-#            sh tests/run.sh --full   slow tests as well, and all compilers, machines and sanitizers that are installed
+# The tests: sh tests/run.sh            under a minute: all quick tests in float and in double, and the cheap part of portability.sh
+#            sh tests/run.sh --full     the quick tests, and all compilers, machines and sanitizers that are installed
+#            sh tests/run.sh --nightly  the slow tests, too
 # CC and CFLAGS choose compiler and flags of the quick tests. The last line counts.
 # shellcheck disable=SC2086             # flags are split on purpose
 set -u
@@ -8,8 +9,9 @@ cd "$(dirname "$0")/.." || exit 1
 CC=${CC:-cc}; export CC
 case "${1:-}" in
     '') slow='' part=quick ;;
-    --full) slow=--slow part=full ;;
-    *) echo "usage: sh tests/run.sh [--full]"; exit 2 ;;
+    --full) slow='' part=full ;;
+    --nightly) slow=--slow part=full ;;
+    *) echo "usage: sh tests/run.sh [--full | --nightly]"; exit 2 ;;
 esac
 tmp=$(mktemp -d) || exit 1
 native=-march=native; echo 'int main(void) { return 0; }' | $CC $native -x c - -o "$tmp/native" 2> /dev/null || native=''

@@ -70,7 +70,7 @@ int main(int argc, char **argv)
     e.colour = EXAMPLE_MATERIAL;
 
     for (double at = stamp_start;;) {           /* where the stamp's lower side is */
-        const double t = e.frame * e.frame_time, speed = t < 0.55 ? 0 : t < 1.4 ? -(at - 0.05) / (1.4 - t) : t < 1.6 ? 0 : 0.5;
+        const double t = e.frame * e.frame_time, speed = t < 0.55 ? 0 : t < 1.4 ? -(at - 0.02) / (1.4 - t) : t < 1.6 ? 0 : 0.5;
         example_need(sim, gs4_move_collider(sim, body, vec(0, speed, 0), vec(0, 0, 0)));
         at += speed * e.frame_time;
         for (int a = 0; a < 3; ++a) {

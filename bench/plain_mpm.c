@@ -3,7 +3,7 @@
    First-order MLS-MPM in three dimensions as one writes it from Hu et al. 2018 (doi:10.1145/3197517.3201293 and its "88
    lines" program): array of particle structs, dense grid, quadratic B-splines, 27-node loops, APIC, symplectic Euler.
    Plain C99, one thread, no intrinsics, no sorting; nor is anything slower than a careful author would write it.
-       gcc -O3 -march=native -DPLAIN_MPM_MAIN plain_mpm.c -lm -o plain_mpm       (C11, for timespec_get)
+       gcc -O3 -march=native -DPLAIN_MPM_MAIN bench/plain_mpm.c -lm -o plain_mpm       (C11, for timespec_get)
        ./plain_mpm --cells 50 --particles 1000000 --steps 5 --repeats 7
    Or #include "plain_mpm.c" in another program and call what is declared below.
 

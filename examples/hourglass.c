@@ -57,6 +57,7 @@ int main(int argc, char **argv)
     desc.origin = vec(-0.04 * scale, -g.half, -0.04 * scale);
     desc.gravity = vec(0, -9.81, 0);
     desc.cfl = real(0.8);
+    desc.flip_decay_time = real(1000.0 / 0.49 * 0.08 * 0.08 * scale * scale / e.cells / e.cells);   /* s that viscosity takes over a cell */
     sim = example_create(&e, &desc);
 
     liquid.density = 1000;

@@ -10,7 +10,7 @@ cd "$(dirname "$0")/.." || exit 1
 CC=${CC:-cc}
 
 quick='layout names units snippets few_warnings few_hashes link'
-full='warnings tsan hashes asan arm hashes_double wasm windows tiny musl i386 layout names units snippets link frames'
+full='warnings tsan hashes asan arm hashes_double wasm windows tiny musl i386 layout names units snippets link frames examples'
 
 # A transfer kernel may be longer than 60 lines; nothing else.
 long_functions=''
@@ -429,6 +429,38 @@ needs_only() {
     $CC -I. "$tmp/user.c" "$tmp/link.o" -o "$tmp/linked" -lm || return 1
     readelf -d "$tmp/linked" | grep NEEDED | grep -vE '\[(lib[cm]\.|ld-)' > "$tmp/m"
     refused grep . "$tmp/m"
+}
+
+# ==== examples and benches =====================================================================================
+
+# builds FILE PROGRAM FLAGS...: by the line in the comment at its head, which must be there, but quickly
+builds() {
+    line=$(sed -n 's/^[ *]*g*cc -O3 \(.*\) -o .*/\1/p' "$1" | head -n 1) program=$2
+    [ -n "$line" ] || { echo "no line to build it with"; return 1; }
+    shift 2
+    $CC -O1 $line -Wall -Wno-unused-function -Werror "$@" -o "$program"
+}
+
+# shows FILE PROGRAM [ROW]: one frame, and whether picture and particles are there where it writes such
+shows() {
+    name=$(basename "$1" .c)${3:+_$3}; mkdir -p "$tmp/out"
+    "$2" ${3:+--row $3} --frames 1 --cells 16 --threads 2 --out "$tmp/out" || return 1
+    grep -q example_frame "$1" || return 0
+    [ -s "$tmp/out/${name}_0001.png" ] && [ -s "$tmp/out/${name}_0001.ply" ] || { echo "no picture or no particles"; return 1; }
+}
+
+examples() {
+    for file in bench/*.c examples/*.c; do check "$file is built" builds "$file" "$tmp/$(basename "$file" .c)"; done
+    check "one is built with -DGS4_PTHREADS" builds examples/drop.c "$tmp/drop" -DGS4_PTHREADS
+    for file in examples/*.c; do
+        program=$tmp/$(basename "$file" .c)
+        rows=$(sed -n 's/.*e\.rows = \([0-9]*\);.*/\1/p' "$file")
+        grep -q '"example.h"' "$file" || continue
+        for row in $(seq "${rows:-0}"); do check "$file --row $row" shows "$file" "$program" $row; done
+        [ -n "$rows" ] || check "$file" shows "$file" "$program"
+    done
+    check "examples/minimal.c writes" sh -c 'cd "$1" && ./minimal && [ -s honey.ply ]' sh "$tmp"
+    check "examples/rheometer.c writes" sh -c '"$1/rheometer" --out "$1" && [ -s "$1/rheometer.csv" ] && [ -s "$1/rheometer.svg" ]' sh "$tmp"
 }
 
 # ==== main =====================================================================================================

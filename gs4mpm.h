@@ -2395,7 +2395,8 @@ static void gs4i_load_elastic(const gs4_real *from, int reals, int n, gs4i_elast
     int part, b;
     memset(l, 0, sizeof l);
     for (part = 0; 4 * part < reals; part++) {
-        for (b = 0; b < n; b++) memcpy(four + 4 * b, from + reals * b + 4 * part, 4 * sizeof *four);    /* of six: two more than there are */
+        const int count = reals == 6 && part ? 2 : 4;       /* not a number of the next block's: it may be in work */
+        for (b = 0; b < n; b++) { memcpy(four + 4 * b, from + reals * b + 4 * part, (size_t)count * sizeof *four); if (count == 2) four[4 * b + 2] = four[4 * b + 3] = 0; }
         gs4i_to_lanes(four, n, l + 4 * part);
     }
     memcpy(e->s, l, sizeof e->s);

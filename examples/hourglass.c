@@ -5,9 +5,8 @@
  *
  * Shows shapes given by a distance function: the glass is one, and so is the filling. Materials as in the GS4 paper (figures 12 and
  * 13; table 4, hourglass 1 and 2): 0.49 Pa s, and a Pom-Pom of as much local viscosity and of 49 Pa s in all.
- * The stream of the first is as thin as it leaves the throat and thins further; the second swells below the throat to more than the
- * throat's width, forms clumps that hang on threads, and those tear. It runs in a glass three times as large (54 cm): in the
- * small one its own weight does not get it through the throat. */
+ * The first runs as a stream. The second comes out of the throat in clumps as wide as the throat and wider, which hang on threads
+ * until those tear. It has a glass three times as large (54 cm): in the small one its weight does not get it through. */
 #include "example.h"
 
 typedef struct glass { double throat, bulb, half; } glass;      /* radii of both, half the height, m */

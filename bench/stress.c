@@ -41,7 +41,7 @@ static double run(setting *s, int integrator, double time, int steps, double str
         if (integrator == RULE) {
             gs4i_family(&rule, 0, 0, i == 0);
             rule.dt = dt; rule.afresh = i == 0;
-            gs4i_correct_elastic(&s->laws, &s->elastic_laws, &e, &rule, s->L, GS4I_BATCH, &count);
+            gs4i_correct_elastic(&s->elastic_laws, &e, &rule, s->L, GS4I_BATCH, &count);
         } else if (integrator == FIXED) {
             gs4i_exponential(s->split.L, dt, E);
             gs4i_relax(&s->split, c, 0.5 * dt); gs4i_convect(E, c); gs4i_relax(&s->split, c, 0.5 * dt);

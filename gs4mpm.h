@@ -94,7 +94,8 @@
  *
  * STABILITY. gs4_stable_dt is the least of
  *     sound and viscosity   (w dt)^2 + (d dt) (3 + rho_inf + rho_s - rho_inf rho_s)/2 <= 2 (1 - rho_inf rho_s)
- *                           w = 1.73 c/h, c^2 that of sound and 2 c_max G0/rho of elastic waves, d = 2.5 F_v mu/(rho h^2); symplectic Euler: (w dt)^2 + 2 d dt <= 4, w = 3.5 c/h, d = 16 mu/(rho h^2)
+ *                           w = 1.73 c/h, c^2 that of sound and of elastic waves, 2 c_max G0/rho; d = 2.5 F_v mu/(rho h^2);
+ *                           symplectic Euler: (w dt)^2 + 2 d dt <= 4, w = 3.5 c/h, d = 16 F_v mu/(rho h^2)
  *     flow                  one cell a step along each axis, the fall within the step included
  *     strain, relaxation    |grad v| dt <= 1,  dt <= 1000 lambda_b
  * and gs4_step refuses more. gs4_advance takes the fraction `cfl` of it, and half of that again, up to 7 times, where a step is refused.
@@ -119,7 +120,7 @@
  * MEMORY. GS4: 65 bytes a particle in float (position, velocity, J and their rates, mass, id, material, and 4 for sorting), 48 a cell
  * near material, 16 more near walls and bodies, 4 per 64 cells of the domain. Symplectic Euler: 89 and 32. A scene with a viscoelastic
  * liquid: 48 more a particle (Euler 24). Double, GS4: 121 and 96.
- * Stepping allocates nothing once the scene has stopped growing; it takes 34 KB of stack a thread, 67 in double.
+ * Stepping allocates nothing once the scene has stopped growing; a kernel takes 35 KB of stack, 69 in double.
  *
  * THREADS. `parallel_for` or the pool. The same bits for any number of threads: blocks of one colour share no node, sums run in the
  * order of particles within a block. Two simulations on two threads are fine. Callbacks (distances, viscosity) may be called from
@@ -861,7 +862,6 @@ static void gs4i_shape_bounds(const gs4_shape *s, gs4_vec3 *low, gs4_vec3 *high)
 #endif
 #ifdef GS4I_VECTORS
 typedef gs4_real gs4i_quad __attribute__((vector_size(4 * sizeof(gs4_real))));
-typedef int32_t  gs4i_int4 __attribute__((vector_size(16)));
 #ifdef GS4_DOUBLE
 typedef int64_t  gs4i_mask __attribute__((vector_size(32)));
 #else
@@ -875,7 +875,6 @@ typedef int32_t  gs4i_mask __attribute__((vector_size(16)));
 #define GS4I_SPLAT_MAD(r, s, a) ((r) += (a) * (s))           /* r += s a */
 #define GS4I_SUM(r, a, b) ((r) = (a) + (b))
 #define GS4I_DIFFERENCE(r, a, b) ((r) = (a) - (b))
-#define GS4I_SHIFT(r, a, s) ((r) = (a) + (s))                /* r = a + s  for a number s */
 #define GS4I_GREATER(r, a, b) do { const gs4i_mask gs4i_m = (a) > (b); \
     (r) = (gs4i_quad)(((gs4i_mask)(a) & gs4i_m) | ((gs4i_mask)(b) & ~gs4i_m)); } while (0)
 #else
@@ -890,7 +889,6 @@ typedef struct gs4i_quad { gs4_real lane[4]; } gs4i_quad;
 #define GS4I_SPLAT_MAD(r, s, a) GS4I_EACH(r, (r).lane[gs4i_l] += (a).lane[gs4i_l] * (s))
 #define GS4I_SUM(r, a, b) GS4I_EACH(r, (r).lane[gs4i_l] = (a).lane[gs4i_l] + (b).lane[gs4i_l])
 #define GS4I_DIFFERENCE(r, a, b) GS4I_EACH(r, (r).lane[gs4i_l] = (a).lane[gs4i_l] - (b).lane[gs4i_l])
-#define GS4I_SHIFT(r, a, s) GS4I_EACH(r, (r).lane[gs4i_l] = (a).lane[gs4i_l] + (s))
 #define GS4I_GREATER(r, a, b) GS4I_EACH(r, (r).lane[gs4i_l] = (a).lane[gs4i_l] > (b).lane[gs4i_l] ? (a).lane[gs4i_l] : (b).lane[gs4i_l])
 #endif
 
@@ -1120,7 +1118,7 @@ typedef struct gs4i_frame { gs4_real origin[3], first[3], inv_h; } gs4i_frame;
 /* Coordinates outside of 1 <= x < 7 cells, and NaN, give base -1. */
 GS4I_INLINE void gs4i_stencils_at(gs4i_stencils *s, const gs4i_frame *f, gs4i_lanes x[3])
 {
-        gs4i_wide_int base;
+    gs4i_wide_int base;
     gs4i_wide zero;
     int a, b;
     memset(&zero, 0, sizeof zero);
@@ -1233,6 +1231,16 @@ GS4I_INLINE void gs4i_gradient_lanes(const gs4_real *dx, const gs4_real *dy, con
     for (j = 0; j < 3; j++) {
         gs4i_to_lanes(j == 0 ? dx : j == 1 ? dy : dz, n, c);
         for (i = 0; i < 3; i++) GS4I_BATCH_LOOP(b) L[i][j][b] = c[i][b];
+    }
+}
+
+/* |L|^2 */
+GS4I_INLINE void gs4i_gradient_squared(gs4i_gradient L, gs4i_lanes squared)
+{
+    int b, j;
+    GS4I_BATCH_LOOP(b) {
+        squared[b] = L[0][0][b] * L[0][0][b];
+        for (j = 1; j < 9; j++) squared[b] += L[j / 3][j % 3][b] * L[j / 3][j % 3][b];
     }
 }
 
@@ -1506,7 +1514,7 @@ GS4I_INLINE void gs4i_tile_row(const gs4i_grid *g, int o, int y, int z, ptrdiff_
 /* Rows of a tile that particles touch, a bit each: row (y, z) is bit 8 z + y. */
 GS4I_INLINE uint64_t gs4i_touched_rows(int base) { return (uint64_t)0x070707u << (base / GS4I_TILE); }
 
-/* Ask for two rows of nodes of a tile before they are needed, and count them: a few with each batch of particles, because
+/* Ask for two rows of nodes of a tile before they are needed: a few with each batch of particles, because
  * rows are scattered, no processor foresees them, and all at once are more than one can wait for. */
 GS4I_INLINE void gs4i_tile_prefetch(const gs4i_grid *g, int o, int row, const gs4_real *field)
 {
@@ -2277,17 +2285,15 @@ static void gs4i_split_one(const gs4i_elastic_laws *l, gs4i_lanes G, gs4i_gradie
 static int gs4i_resolved(gs4i_lanes G, gs4i_gradient L, gs4i_symmetric s, gs4i_lanes relax, gs4i_lanes stiff, const gs4i_rule *rule, int ok[GS4I_BATCH])
 {
     const gs4_real dt = rule->dt, fastest = rule->afresh ? 1 / dt : GS4I_HUGE;      /* the midpoint rule of a first step damps nothing */
-    gs4i_lanes verdict;
+    gs4i_lanes squared, verdict;
     int b, j, all = 1;
+    gs4i_gradient_squared(L, squared);
     GS4I_BATCH_LOOP(b) {
         const gs4i_wide zero = G[b] - G[b], one = zero + GS4I_C(1), xx = s[0][b] + G[b], yy = s[1][b] + G[b], zz = s[2][b] + G[b];
         const gs4i_wide minor = xx * yy - s[3][b] * s[3][b];
         const gs4i_wide det = zz * minor - s[4][b] * (s[4][b] * yy - s[3][b] * s[5][b]) - s[5][b] * (xx * s[5][b] - s[3][b] * s[4][b]);
-        gs4i_wide_mask good;
-        gs4i_wide squared = L[0][0][b] * L[0][0][b];
-        for (j = 1; j < 9; j++) squared += L[j / 3][j % 3][b] * L[j / 3][j % 3][b];
-        good = ((squared * (dt * dt) < GS4I_C(0.0625)) & (stiff[b] * dt < GS4I_C(0.4)) & (relax[b] * dt > GS4I_C(-0.1)) & (relax[b] < fastest)
-                & (xx > GS4I_C(1e-3) * G[b]) & (minor > GS4I_C(1e-5) * xx * yy) & (det > GS4I_C(1e-5) * xx * yy * zz)) | (G[b] <= GS4I_TINY);
+        const gs4i_wide_mask good = ((squared[b] * (dt * dt) < GS4I_C(0.0625)) & (stiff[b] * dt < GS4I_C(0.4)) & (relax[b] * dt > GS4I_C(-0.1)) & (relax[b] < fastest)
+            & (xx > GS4I_C(1e-3) * G[b]) & (minor > GS4I_C(1e-5) * xx * yy) & (det > GS4I_C(1e-5) * xx * yy * zz)) | (G[b] <= GS4I_TINY);
         all &= gs4i_all(&good);
         GS4I_CHOOSE(verdict[b], good, one, zero);
     }
@@ -2306,25 +2312,16 @@ static void gs4i_moduli(const gs4i_elastic_laws *l, gs4i_gradient L, gs4i_lanes 
     }
 }
 
-/* Predicted stress s + ahead r, R there, and what relaxes. */
-GS4I_INLINE void gs4i_predict_elastic(const gs4i_elastic_laws *l, gs4i_lanes G, gs4i_elastic *e, gs4_real ahead, gs4i_gradient L,
-                                      gs4i_symmetric s, gs4i_symmetric R, gs4i_lanes relax, gs4i_lanes stiff)
-{
-    int b, c;
-    for (c = 0; c < 6; c++) GS4I_BATCH_LOOP(b) s[c][b] = e->s[c][b] + ahead * e->rate[c][b];
-    gs4i_elastic_rate(l, G, s, L, R, relax, stiff);
-}
-
 /* S4: stress at the stage, s~ = s** + w (R + relax (s* - s~)), for n particles of the batch. */
-static void gs4i_stage_elastic(const gs4i_elastic_laws *l, gs4i_elastic *e, const gs4i_rule *rule, gs4i_gradient L, int n, gs4i_symmetric s,
-                               gs4i_elastic_count *count)
+static void gs4i_stage_elastic(const gs4i_elastic_laws *l, gs4i_lanes G, const gs4i_elastic *e, const gs4i_rule *rule, gs4i_gradient L, int n,
+                               gs4i_symmetric s, gs4i_elastic_count *count)
 {
     const gs4_real ahead = rule->reach.ahead, w = rule->s;
     gs4i_symmetric R;
-    gs4i_lanes G, relax, stiff;
+    gs4i_lanes relax, stiff;
     int b, c, ok[GS4I_BATCH];
-    gs4i_moduli(l, L, G);
-    gs4i_predict_elastic(l, G, e, ahead, L, s, R, relax, stiff);
+    for (c = 0; c < 6; c++) GS4I_BATCH_LOOP(b) s[c][b] = e->s[c][b] + ahead * e->rate[c][b];
+    gs4i_elastic_rate(l, G, s, L, R, relax, stiff);
     for (c = 0; c < 6; c++)
         GS4I_BATCH_LOOP(b) s[c][b] = (e->s[c][b] + (ahead - w) * e->rate[c][b] + w * (R[c][b] + relax[b] * s[c][b])) / (GS4I_C(1) + w * relax[b]);
     if (gs4i_resolved(G, L, s, relax, stiff, rule, ok)) return;
@@ -2366,11 +2363,9 @@ static void gs4i_correct_elastic(const gs4i_elastic_laws *l, gs4i_elastic *e, co
 }
 
 /* Elastic waves of each particle: density times squared speed at most, 2 G0 c_max, by the largest row sum of c. */
-static void gs4i_see_elastic(const gs4i_elastic_laws *l, gs4i_gradient L, gs4i_symmetric s, gs4i_lanes stiffness)
+static void gs4i_see_elastic(gs4i_lanes G, gs4i_symmetric s, gs4i_lanes stiffness)
 {
-    gs4i_lanes G;
     int b, i, j;
-    gs4i_moduli(l, L, G);
     GS4I_BATCH_LOOP(b) {
         gs4i_wide zero = G[b] - G[b], most = zero;
         for (i = 0; i < 3; i++) {
@@ -2874,7 +2869,7 @@ static void gs4i_fill_images(const gs4i_boundary *b, const gs4i_grid *g, gs4_rea
 }
 
 /* How far in front of a sticky body nodes are held, in cells: then it acts as a wall where its surface is, within 0.43 cells
- * (tests: couette_surface). Without, a plane of nodes just in front left liquid next to no node to stick to. */
+ * (symplectic Euler: within 1.02; tests: couette_surface). Without, a plane of nodes just in front left liquid next to no node to stick to. */
 #define GS4I_STICKY_REACH GS4I_C(0.75)
 
 /* What body `b` does to a node at p that would go with velocity v and acceleration acc over the time dt: both become
@@ -3080,13 +3075,12 @@ GS4I_INLINE void gs4i_see_liquids(gs4i_seen *r, const gs4i_batch_laws *l, const 
 /* Largest speed along an axis and largest |L|, squared */
 GS4I_INLINE void gs4i_see_motion(gs4i_seen *r, gs4i_lanes v[3], gs4i_gradient L)
 {
-    int b, i, j;
+    gs4i_lanes squared;
+    int b, i;
+    gs4i_gradient_squared(L, squared);
     GS4I_BATCH_LOOP(b) {
-        gs4i_wide sum;
-        for (i = 0; i < 3; i++) { sum = v[i][b] * v[i][b]; GS4I_WIDE_MAX(r->speed2[b], r->speed2[b], sum); }
-        sum = L[0][0][b] * L[0][0][b];
-        for (j = 1; j < 9; j++) sum += L[j / 3][j % 3][b] * L[j / 3][j % 3][b];
-        GS4I_WIDE_MAX(r->gradient2[b], r->gradient2[b], sum);
+        for (i = 0; i < 3; i++) { const gs4i_wide v2 = v[i][b] * v[i][b]; GS4I_WIDE_MAX(r->speed2[b], r->speed2[b], v2); }
+        GS4I_WIDE_MAX(r->gradient2[b], r->gradient2[b], squared[b]);
     }
 }
 
@@ -3140,14 +3134,15 @@ static void gs4i_add_elastic(const gs4i_particles *p, size_t i, int n, const gs4
     gs4i_elastic e;
     gs4i_elastic_count count = { 0, 0, 0 };
     gs4i_symmetric s;
-    gs4i_lanes stiffness;
+    gs4i_lanes G, stiffness;
     int b, c, good = 1;
     gs4i_take_elastic_laws(laws, l);
+    gs4i_moduli(l, L, G);
     gs4i_load_elastic(p->elastic + (size_t)p->elastic_reals * i, p->elastic_reals, n, &e);
-    if (p->with_rates) gs4i_stage_elastic(l, &e, rule, L, n, s, &count);
+    if (p->with_rates) gs4i_stage_elastic(l, G, &e, rule, L, n, s, &count);
     else memcpy(s, e.s, sizeof s);
     for (c = 0; c < 6; c++) GS4I_BATCH_LOOP(b) sigma[c][b] += s[c][b];
-    gs4i_see_elastic(l, L, s, stiffness);
+    gs4i_see_elastic(G, s, stiffness);
     GS4I_BATCH_LOOP(b) {
         const gs4i_wide_mask fine = stiffness[b] < GS4I_HUGE;
         const gs4i_wide speed2 = stiffness[b] * laws->inv_density[b];
@@ -3489,7 +3484,6 @@ static int gs4i_is_calm(const gs4i_pass *pass, int index)
     const int32_t *nb = g->neighbour + 27 * (size_t)o;
     const gs4i_report *report = &sim->reports[o];
     const gs4_real *mean = g->spread + 4 * (size_t)nb[13], limit = GS4I_C(0.2 / 4.7) * g->h / sim->rule.dt;
-    gs4_real worst = 0;
     int i, c;
     if (!(report->min_J > GS4I_C(0.25) && report->max_J < 4) || report->hard) return 0;
     for (c = 0; c < 3; c++) if (!(gs4i_abs(mean[c]) * sim->rule.dt < g->h)) return 0;
@@ -3499,9 +3493,8 @@ static int gs4i_is_calm(const gs4i_pass *pass, int index)
         if (all < 0) continue;                              /* no material there */
         for (c = 0; c < 3; c++) all += gs4i_abs(of[c] - mean[c]);
         if (!(all < limit)) return 0;
-        worst = gs4i_max(worst, all);
     }
-    return worst < limit;
+    return 1;
 }
 
 /* S7: gather and correct. With `commit` 0 nothing is written: a rehearsal that only reports. */
@@ -3588,12 +3581,10 @@ GS4I_INLINE void gs4i_affine_bound(gs4i_gradient C, gs4_real dt, gs4i_lanes boun
 {
     const gs4_real limit = GS4I_C(0.0625) / (dt * dt);
     gs4i_lanes squared;
-    int b, j, good = 1;
+    int b, good = 1;
+    gs4i_gradient_squared(C, squared);
     GS4I_BATCH_LOOP(b) {
-        gs4i_wide_mask fine;
-        squared[b] = C[0][0][b] * C[0][0][b];
-        for (j = 1; j < 9; j++) squared[b] += C[j / 3][j % 3][b] * C[j / 3][j % 3][b];
-        fine = squared[b] <= limit;
+        const gs4i_wide_mask fine = squared[b] <= limit;
         good &= gs4i_all(&fine);
         bound[b] = (squared[b] - squared[b]) + GS4I_C(1);
     }
@@ -3917,10 +3908,11 @@ static void gs4i_look_at_particles(const gs4_sim *sim, gs4i_report *r)
         gs4i_see_motion(&seen, q.v, L);
         if (p->elastic_reals) {
             gs4i_elastic e;
-            gs4i_lanes stiffness;
+            gs4i_lanes G, stiffness;
             gs4i_load_elastic(p->elastic + (size_t)p->elastic_reals * (size_t)i, p->elastic_reals, n, &e);
             gs4i_take_elastic_laws(&laws, &elastic);
-            gs4i_see_elastic(&elastic, L, e.s, stiffness);
+            gs4i_moduli(&elastic, L, G);
+            gs4i_see_elastic(G, e.s, stiffness);
             for (c = 0; c < n; c++) GS4I_NTH(seen.max_stiffness, c) = gs4i_max(GS4I_NTH(seen.max_stiffness, c), GS4I_NTH(stiffness, c) * GS4I_NTH(laws.inv_density, c));
         }
     }
@@ -6051,7 +6043,6 @@ GS4_API int gs4_material_preset(const char *name, gs4_material *material)
 #undef GS4I_ROW_STORE
 #undef GS4I_ROW_SUM
 #undef GS4I_SEEN
-#undef GS4I_SHIFT
 #undef GS4I_SOUND_EIGENVALUE
 #undef GS4I_SPLAT_MAD
 #undef GS4I_SPLAT_MUL

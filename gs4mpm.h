@@ -36,8 +36,9 @@
  *
  *     [[config]]    version, precision, linkage                  [[base]]      arithmetic rules, memory, text, tasks
  *     [[types]]     results, vectors, shapes, hooks, views       [[vec]]       three-vectors and shapes
- *     [[materials]] what a liquid is                             [[kernel]]    quadratic B-splines on 27 nodes
- *     [[sim]]       description, scene, stepping, files, a point [[grid]]      blocks of nodes where there is material
+ *     [[materials]] what a liquid is                             [[poisson]]   multigrid on a masked grid
+ *     [[sim]]       description, scene, stepping, files, a point [[kernel]]    quadratic B-splines on 27 nodes
+ *     [[poisson]]   the elliptic solver by itself                [[grid]]      blocks of nodes where there is material
  *                                                                [[particles]] the store, and how it is sorted
  *                                                                [[liquid]]    pressure, viscosity, presets
  *                                                                [[viscoelastic]] non-local stress
@@ -172,6 +173,9 @@ typedef double gs4_real;
 #define gs4_plane               gs4_plane_f64
 #define gs4_point_step          gs4_point_step_f64
 #define gs4_point_stress        gs4_point_stress_f64
+#define gs4_poisson_create      gs4_poisson_create_f64
+#define gs4_poisson_destroy     gs4_poisson_destroy_f64
+#define gs4_poisson_solve       gs4_poisson_solve_f64
 #define gs4_real_size           gs4_real_size_f64
 #define gs4_result_string       gs4_result_string_f64
 #define gs4_save                gs4_save_f64
@@ -420,6 +424,43 @@ GS4_API int gs4_point_step(const gs4_material *material, gs4_point *point, const
                            gs4_real dt, gs4_real rho_inf, gs4_real rho_inf_spurious);
 GS4_API int gs4_point_stress(const gs4_material *material, const gs4_point *point, const gs4_real velocity_gradient[9],
                              gs4_real cauchy[6]);  /* 2 F_v mu D and the non-local stress, Pa; without the pressure */
+
+/* ==== [[poisson]] the elliptic solver by itself ==================================================== */
+
+/* (diagonal - div coefficient grad) x = rhs in the liquid cells of a box of cubic cells: for each of them
+ *     diagonal_i x_i + sum over its faces of coefficient_f (x_i - x_j) / cell_size^2 = rhs_i,
+ * where a neighbour in the air has x given at its centre, and solids and what is beyond the box let nothing through. */
+typedef enum gs4_cell { GS4_CELL_AIR = 0 /* x given */, GS4_CELL_LIQUID = 1 /* unknown */, GS4_CELL_SOLID = 2 /* no flux */ } gs4_cell;
+
+typedef struct gs4_poisson_desc {       /* the arrays are read by gs4_poisson_create alone */
+    int cells[3]; gs4_real cell_size;
+    const uint8_t  *kind;               /* gs4_cell per cell, x fastest; beyond the box is GS4_CELL_SOLID */
+    const gs4_real *diagonal;           /* per cell, >= 0; NULL: 0 */
+    const gs4_real *coefficient[3];     /* per face of each axis, (n+1) along that axis, >= 0; NULL: 1 */
+    gs4_real tolerance;                 /* relative residual; 0: 1e-6 double, 1e-4 float */
+    int      max_iterations;            /* 0: 200 */
+    int      threads;                   /* as in gs4_sim_desc, like all that follows */
+    gs4_parallel_for_fn parallel_for; void *parallel_user;
+    gs4_allocator allocator;
+    gs4_now_fn now; void *now_user;
+} gs4_poisson_desc;
+
+typedef struct gs4_poisson gs4_poisson;
+typedef struct gs4_solve_stats {
+    int      iterations;
+    double   residual;                  /* |b - A x| / |b| in the 2-norm, b with what flows in from the air; recomputed from x, before it is rounded to gs4_real */
+    double   setup_seconds, solve_seconds; uint64_t memory_bytes;
+    int      pockets;                   /* parts of the liquid with neither air nor diagonal: x has mean 0 there, and ... */
+    double   removed_mean;              /* ... the mean of rhs, which no x can meet, is taken off: the largest |mean| */
+} gs4_solve_stats;
+
+/* Every value that matters must be finite; those of solids, and of faces that let nothing through, may be anything. Errors have a
+ * sentence in gs4_last_error(NULL). After GS4_ERROR_NOT_CONVERGED x is the last iterate, the best in the energy norm, and `residual`
+ * is true; after other errors x is as it was. */
+GS4_API int  gs4_poisson_create(const gs4_poisson_desc *desc, gs4_poisson **solver);
+GS4_API int  gs4_poisson_solve(gs4_poisson *solver, const gs4_real *rhs, gs4_real *x /* in: guess and air values; out: solution */,
+                               gs4_solve_stats *stats /* or NULL */);
+GS4_API void gs4_poisson_destroy(gs4_poisson *solver);         /* NULL is fine */
 
 #ifdef __cplusplus
 }
@@ -834,6 +875,1583 @@ static void gs4i_shape_bounds(const gs4_shape *s, gs4_vec3 *low, gs4_vec3 *high)
         break;
     case GS4_SHAPE_NONE: case GS4_SHAPE_PLANE: break;
     }
+}
+
+/* ==== [[poisson]] multigrid and conjugate gradients on a masked grid =============================== *
+ *
+ * Solves  h^2 d_i x_i + sum_faces c_f (x_i - x_j) = h^2 b_i  in the liquid cells; x is given in the air, nothing flows into solids.
+ * Level 0 is the grid, level 1 has blocks of 2 x 2 x 2 of its cells; both keep red cells (i + j + k even) and black ones apart, so
+ * that every sweep is unit stride. Cell i of a row is number m = i / 2 of its colour:
+ *
+ *        red    | 0 |   | 1 |   | 2 |         neighbours of cell m of one colour, all of the other: in its row m - 1 + t and m + t,
+ *        black      | 0 |   | 1 |   | 2 |     in the rows beside, above and below m; t = colour ^ (j + k) & 1; i = 2 m + t
+ *        i        0   1   2   3   4   5       children of a coarse cell i: numbers m = i of both colours in four rows
+ *
+ * From level 2 on an unknown is a connected group of cells in a block, and a level is a graph. Restriction sums, prolongation
+ * injects; a coarse face has half the sum of its fine ones, a face to the air 3/4, the diagonal 1: for faces the coefficient of the
+ * wider stencil, measured best for the air. A cycle is red-black Gauss-Seidel, two sweeps down (R B R B) and two up (B R B R), which
+ * is symmetric; it runs in float and preconditions conjugate gradients in double, whose matrix is applied in difference form. */
+
+#define GS4I_STRIP 16                   /* a kernel works on whole strips of a row of one colour; rows are padded to them */
+#define GS4I_SLABS 64
+#define GS4I_GRAPHS 24
+#define GS4I_DIRECT 200                 /* unknowns that are solved by Cholesky */
+#define GS4I_IS_LIQUID 2                /* bits of a kind: unknown; lets flow through */
+#define GS4I_IS_OPEN 1
+
+/* One level on a grid. Rows, and planes at both ends, are guarded by zeros: row j of plane k begins at gs4i_row_of(g, j, k). */
+typedef struct gs4i_masked {
+    int n[3], width;                    /* cells; cells of one colour in a row */
+    size_t stride, plane, count;        /* from row to row, from plane to plane, in all */
+    int32_t *span;                      /* per row: first and last strip with liquid, in cells */
+    float *z[2], *inverse[2];           /* correction; of the diagonal, 0 where there is no unknown */
+    float *w[3][2], *w_low[3][2];       /* coefficient of the face towards +x +y +z, and what float leaves of it; NULL: all equal */
+    float *mass[2], *mass_low[2];       /* h^2 d; level 1: with the faces to the air; -1 in level 0 where w and no unknown */
+    uint8_t *degree[2];                 /* where w is NULL: faces that conduct; 0 where there is no unknown */
+    double *r[2];                       /* residual */
+} gs4i_masked;
+
+typedef struct gs4i_graph {
+    int n, reds;                        /* nodes, red ones first */
+    int32_t *start, *to; float *w;      /* edges of node i: start[i] to start[i + 1] */
+    float *inverse, *diagonal, *air, *mass, *b, *x;
+    int32_t *parent;                    /* in the next graph; -1: a node without edges */
+    uint64_t *block;                    /* its place, 21 bits an axis */
+    gs4i_scratch nodes, edges;
+} gs4i_graph;
+
+typedef struct gs4i_cells { int32_t row, begin, end, pocket; double sum; } gs4i_cells;     /* of a row, without a gap */
+
+typedef struct gs4i_solver {
+    gs4i_memory *memory; const gs4i_tasks *tasks;
+    gs4i_masked level[2];
+    double *x[2]; float *p[2];          /* solution, direction */
+    float *residual;                    /* of red cells of level 1 */
+    int32_t *parent[2];                 /* of cells of level 1 in graph 0, -1: none */
+    uint8_t *kind; size_t kind_row, kind_plane;     /* bits, one cell of zeros around */
+    gs4i_graph graph[GS4I_GRAPHS]; int graphs;
+    double *matrix;                     /* lower triangle of the last graph's */
+    gs4i_cells *runs; int run_count;    /* of closed pockets: neither air nor diagonal */
+    int pockets; double *pocket;        /* per pocket: sum, number of cells */
+    int slabs[2], cut[2][GS4I_SLABS + 1];
+    int32_t *span[2];
+    int uniform, massive; int64_t unknowns;
+    double unit, mass_unit;             /* coefficients and diagonal are scaled by these, */
+    double rhs_unit, x_unit;            /* and right-hand side and x, so that all are about 1 */
+    double alpha; float beta;
+    double *sums, *given;               /* one and three per plane, added in order */
+    float *zeros;                       /* a row */
+    gs4i_scratch grid, kinds, planes, cells, labels, square;
+    int shape[5];                       /* of `grid` */
+    const char *fault, *accepted; double fault_value;      /* what was wrong, in words */
+} gs4i_solver;
+
+GS4I_INLINE size_t gs4i_row_of(const gs4i_masked *g, int j, int k)
+{
+    return ((size_t)(k + 1) * (size_t)(g->n[1] + 1) + (size_t)(j + 1)) * g->stride;
+}
+
+/* --- kernels: strips of one colour ---------------------------------------------------------------------- */
+
+#define GS4I_NEIGHBOURS(type) const type *GS4I_RESTRICT left, const type *GS4I_RESTRICT right, const type *GS4I_RESTRICT south, \
+    const type *GS4I_RESTRICT north, const type *GS4I_RESTRICT below, const type *GS4I_RESTRICT above
+#define GS4I_AROUND(v, at, t, g) (v) + (at) + (t) - 1, (v) + (at) + (t), (v) + (at) - (g)->stride, (v) + (at) + (g)->stride, \
+    (v) + (at) - (g)->plane, (v) + (at) + (g)->plane
+/* faces of the cell itself towards +, of its neighbours towards it */
+#define GS4I_FACES const float *GS4I_RESTRICT wl, const float *GS4I_RESTRICT wr, const float *GS4I_RESTRICT ws, \
+    const float *GS4I_RESTRICT wn, const float *GS4I_RESTRICT wb, const float *GS4I_RESTRICT wa
+#define GS4I_FACES_OF(w, c, at, t, g) (w)[0][!(c)] + (at) + (t) - 1, (w)[0][c] + (at), (w)[1][!(c)] + (at) - (g)->stride, (w)[1][c] + (at), \
+    (w)[2][!(c)] + (at) - (g)->plane, (w)[2][c] + (at)
+#define GS4I_STRIPS(m, l, n) for (m = 0; m < (n); m += GS4I_STRIP) for (l = m; l < m + GS4I_STRIP; l++)
+
+static double gs4i_sum_lanes(const double *v)
+{
+    double s[8];
+    int i;
+    for (i = 0; i < 8; i++) s[i] = v[i] + v[i + 8];
+    return ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
+}
+
+static void gs4i_start_row(float *GS4I_RESTRICT z, const double *GS4I_RESTRICT r, const float *GS4I_RESTRICT inverse, int n)
+{
+    int m, l;
+    GS4I_STRIPS(m, l, n) z[l] = (float)r[l] * inverse[l];
+}
+
+static void gs4i_smooth_uniform(float *GS4I_RESTRICT z, GS4I_NEIGHBOURS(float), const double *GS4I_RESTRICT r,
+                                const float *GS4I_RESTRICT inverse, int n)
+{
+    int m, l;
+    GS4I_STRIPS(m, l, n)
+        z[l] = ((float)r[l] + ((left[l] + right[l]) + (south[l] + north[l]) + (below[l] + above[l]))) * inverse[l];
+}
+
+static void gs4i_smooth_weighted(float *GS4I_RESTRICT z, GS4I_NEIGHBOURS(float), GS4I_FACES, const double *GS4I_RESTRICT r,
+                                 const float *GS4I_RESTRICT inverse, int n)
+{
+    int m, l;
+    GS4I_STRIPS(m, l, n)
+        z[l] = ((float)r[l] + ((wl[l] * left[l] + wr[l] * right[l]) + (ws[l] * south[l] + wn[l] * north[l])
+                               + (wb[l] * below[l] + wa[l] * above[l]))) * inverse[l];
+}
+
+static void gs4i_residual_uniform(float *GS4I_RESTRICT out, const float *GS4I_RESTRICT z, GS4I_NEIGHBOURS(float), const double *GS4I_RESTRICT r,
+                                  const uint8_t *GS4I_RESTRICT degree, const float *GS4I_RESTRICT mass, int n)
+{
+    int m, l;
+    GS4I_STRIPS(m, l, n) {
+        const float around = (left[l] + right[l]) + (south[l] + north[l]) + (below[l] + above[l]);
+        out[l] = ((float)r[l] - ((float)degree[l] + mass[l]) * z[l]) + (degree[l] ? around : 0);
+    }
+}
+
+static void gs4i_residual_weighted(float *GS4I_RESTRICT out, const float *GS4I_RESTRICT z, GS4I_NEIGHBOURS(float), GS4I_FACES,
+                                   const double *GS4I_RESTRICT r, const float *GS4I_RESTRICT mass, int n)
+{
+    int m, l;
+    GS4I_STRIPS(m, l, n) {
+        const float c = z[l], flow = (wl[l] * (c - left[l]) + wr[l] * (c - right[l])) + (ws[l] * (c - south[l]) + wn[l] * (c - north[l]))
+                                   + (wb[l] * (c - below[l]) + wa[l] * (c - above[l]));
+        out[l] = mass[l] < 0 ? 0 : (float)r[l] - (mass[l] * c + flow);
+    }
+}
+
+/* The matrix times v in double. In the double build faces are two floats. */
+#define GS4I_TIMES_UNIFORM(q, v) \
+    const double c = (double)(v)[l], around = ((double)left[l] + (double)right[l]) + ((double)south[l] + (double)north[l]) \
+                                            + ((double)below[l] + (double)above[l]); \
+    const double q = ((double)mass[l] + (double)mass_low[l]) * c + ((double)degree[l] * c - (degree[l] ? around : 0))
+#ifdef GS4_DOUBLE
+#define GS4I_LOW_FACES , const float *GS4I_RESTRICT ll, const float *GS4I_RESTRICT lr, const float *GS4I_RESTRICT ls, \
+    const float *GS4I_RESTRICT ln, const float *GS4I_RESTRICT lb, const float *GS4I_RESTRICT la
+#define GS4I_LOW_FACES_OF(w, c, at, t, g) , GS4I_FACES_OF(w, c, at, t, g)
+#define GS4I_FACE(w, low) ((double)(w) + (double)(low))
+#else
+#define GS4I_LOW_FACES
+#define GS4I_LOW_FACES_OF(w, c, at, t, g)
+#define GS4I_FACE(w, low) ((double)(w))
+#endif
+#define GS4I_TIMES_WEIGHTED(q, v) \
+    const double c = (double)(v)[l], flow = \
+        (GS4I_FACE(wl[l], ll[l]) * (c - (double)left[l]) + GS4I_FACE(wr[l], lr[l]) * (c - (double)right[l])) \
+      + (GS4I_FACE(ws[l], ls[l]) * (c - (double)south[l]) + GS4I_FACE(wn[l], ln[l]) * (c - (double)north[l])) \
+      + (GS4I_FACE(wb[l], lb[l]) * (c - (double)below[l]) + GS4I_FACE(wa[l], la[l]) * (c - (double)above[l])); \
+    const double q = mass[l] < 0 ? 0 : ((double)mass[l] + (double)mass_low[l]) * c + flow
+#define GS4I_UNIFORM_MATRIX const uint8_t *GS4I_RESTRICT degree, const float *GS4I_RESTRICT mass, const float *GS4I_RESTRICT mass_low
+#define GS4I_WEIGHTED_MATRIX GS4I_FACES GS4I_LOW_FACES, const float *GS4I_RESTRICT mass, const float *GS4I_RESTRICT mass_low
+
+/* p.Ap */
+static double gs4i_curvature_uniform(const float *GS4I_RESTRICT p, GS4I_NEIGHBOURS(float), GS4I_UNIFORM_MATRIX, int n)
+{
+    double sum[GS4I_STRIP] = { 0 };
+    int m, l;
+    GS4I_STRIPS(m, l, n) { GS4I_TIMES_UNIFORM(q, p); sum[l - m] += c * q; }
+    return gs4i_sum_lanes(sum);
+}
+
+static double gs4i_curvature_weighted(const float *GS4I_RESTRICT p, GS4I_NEIGHBOURS(float), GS4I_WEIGHTED_MATRIX, int n)
+{
+    double sum[GS4I_STRIP] = { 0 };
+    int m, l;
+    GS4I_STRIPS(m, l, n) { GS4I_TIMES_WEIGHTED(q, p); sum[l - m] += c * q; }
+    return gs4i_sum_lanes(sum);
+}
+
+/* x += alpha p, r -= alpha Ap; gives r.r */
+static double gs4i_update_uniform(double *GS4I_RESTRICT x, double *GS4I_RESTRICT r, double alpha, const float *GS4I_RESTRICT p, GS4I_NEIGHBOURS(float),
+                                  GS4I_UNIFORM_MATRIX, int n)
+{
+    double sum[GS4I_STRIP] = { 0 };
+    int m, l;
+    GS4I_STRIPS(m, l, n) {
+        GS4I_TIMES_UNIFORM(q, p);
+        const double rest = r[l] - alpha * q;
+        x[l] += alpha * c; r[l] = rest; sum[l - m] += rest * rest;
+    }
+    return gs4i_sum_lanes(sum);
+}
+
+static double gs4i_update_weighted(double *GS4I_RESTRICT x, double *GS4I_RESTRICT r, double alpha, const float *GS4I_RESTRICT p, GS4I_NEIGHBOURS(float),
+                                   GS4I_WEIGHTED_MATRIX, int n)
+{
+    double sum[GS4I_STRIP] = { 0 };
+    int m, l;
+    GS4I_STRIPS(m, l, n) {
+        GS4I_TIMES_WEIGHTED(q, p);
+        const double rest = r[l] - alpha * q;
+        x[l] += alpha * c; r[l] = rest; sum[l - m] += rest * rest;
+    }
+    return gs4i_sum_lanes(sum);
+}
+
+/* r -= Ax; gives r.r */
+static double gs4i_defect_uniform(double *GS4I_RESTRICT r, const double *GS4I_RESTRICT x, GS4I_NEIGHBOURS(double), GS4I_UNIFORM_MATRIX, int n)
+{
+    double sum[GS4I_STRIP] = { 0 };
+    int m, l;
+    GS4I_STRIPS(m, l, n) { GS4I_TIMES_UNIFORM(q, x); r[l] -= degree[l] || mass[l] != 0 ? q : 0; sum[l - m] += r[l] * r[l]; }
+    return gs4i_sum_lanes(sum);
+}
+
+static double gs4i_defect_weighted(double *GS4I_RESTRICT r, const double *GS4I_RESTRICT x, GS4I_NEIGHBOURS(double), GS4I_WEIGHTED_MATRIX, int n)
+{
+    double sum[GS4I_STRIP] = { 0 };
+    int m, l;
+    GS4I_STRIPS(m, l, n) { GS4I_TIMES_WEIGHTED(q, x); r[l] -= q; sum[l - m] += r[l] * r[l]; }
+    return gs4i_sum_lanes(sum);
+}
+
+static double gs4i_dot_row(const double *GS4I_RESTRICT r, const float *GS4I_RESTRICT z, int n)
+{
+    double sum[GS4I_STRIP] = { 0 };
+    int m, l;
+    GS4I_STRIPS(m, l, n) sum[l - m] += r[l] * (double)z[l];
+    return gs4i_sum_lanes(sum);
+}
+
+static void gs4i_direct_row(float *GS4I_RESTRICT p, const float *GS4I_RESTRICT z, float beta, int n)
+{
+    int m, l;
+    GS4I_STRIPS(m, l, n) p[l] = z[l] + beta * p[l];
+}
+
+/* --- stages: a plane of a level ------------------------------------------------------------------------- */
+
+/* What all stages know of a row: where its liquid is. */
+#define GS4I_EACH_ROW(g, k, j, at, n) for (j = 0; j < (g)->n[1]; j++) \
+    if (at = gs4i_row_of(g, j, k) + (size_t)(g)->span[2 * ((size_t)(k) * (size_t)(g)->n[1] + (size_t)j)], \
+        n = (g)->span[2 * ((size_t)(k) * (size_t)(g)->n[1] + (size_t)j) + 1] - (g)->span[2 * ((size_t)(k) * (size_t)(g)->n[1] + (size_t)j)], n > 0)
+
+typedef void (*gs4i_stage_fn)(gs4i_solver *s, int level, int k);
+
+static void gs4i_stage_start(gs4i_solver *s, int level, int k)
+{
+    const gs4i_masked *g = &s->level[level];
+    size_t at;
+    int j, n;
+    GS4I_EACH_ROW(g, k, j, at, n) gs4i_start_row(g->z[0] + at, g->r[0] + at, g->inverse[0] + at, n);
+}
+
+static void gs4i_smooth(gs4i_solver *s, int level, int c, int k)
+{
+    const gs4i_masked *g = &s->level[level];
+    size_t at;
+    int j, n;
+    GS4I_EACH_ROW(g, k, j, at, n) {
+        const int t = (c + j + k) & 1;
+        if (g->degree[0]) gs4i_smooth_uniform(g->z[c] + at, GS4I_AROUND(g->z[!c], at, t, g), g->r[c] + at, g->inverse[c] + at, n);
+        else gs4i_smooth_weighted(g->z[c] + at, GS4I_AROUND(g->z[!c], at, t, g), GS4I_FACES_OF(g->w, c, at, t, g), g->r[c] + at, g->inverse[c] + at, n);
+    }
+}
+
+static void gs4i_stage_red(gs4i_solver *s, int level, int k) { gs4i_smooth(s, level, 0, k); }
+static void gs4i_stage_black(gs4i_solver *s, int level, int k) { gs4i_smooth(s, level, 1, k); }
+
+/* Of red cells; that of black ones is zero after their sweep. */
+static void gs4i_residual_row(const gs4i_solver *s, const gs4i_masked *g, float *out, size_t at, int j, int k, int n)
+{
+    const int t = (j + k) & 1;
+    if (g->degree[0]) gs4i_residual_uniform(out, g->z[0] + at, GS4I_AROUND(g->z[1], at, t, g), g->r[0] + at, g->degree[0] + at,
+                                            g->mass[0] ? g->mass[0] + at : s->zeros, n);
+    else gs4i_residual_weighted(out, g->z[0] + at, GS4I_AROUND(g->z[1], at, t, g), GS4I_FACES_OF(g->w, 0, at, t, g), g->r[0] + at, g->mass[0] + at, n);
+}
+
+static void gs4i_stage_residual(gs4i_solver *s, int level, int k)
+{
+    const gs4i_masked *g = &s->level[level];
+    size_t at;
+    int j, n;
+    GS4I_EACH_ROW(g, k, j, at, n) gs4i_residual_row(s, g, s->residual + at, at, j, k, n);
+}
+
+/* Adds cell m of a fine row to coarse cell m, in two colours. */
+static void gs4i_add_parents(double *GS4I_RESTRICT even, double *GS4I_RESTRICT odd, const float *GS4I_RESTRICT fine, int n)
+{
+    int m;
+    for (m = 0; m < n / 2; m++) { even[m] += (double)fine[2 * m]; odd[m] += (double)fine[2 * m + 1]; }
+}
+
+/* A plane of level 1 once both planes below are done. */
+static void gs4i_stage_restrict(gs4i_solver *s, int level, int k)
+{
+    const gs4i_masked *g = &s->level[level], *h = &s->level[level + 1];
+    float out[16 * GS4I_STRIP];
+    const int above = k / 2;
+    int j, f, i, n;
+    if (!(k & 1) && k + 1 < g->n[2]) return;
+    for (j = 0; j < h->n[1]; j++) {
+        const size_t to = gs4i_row_of(h, j, above);
+        const int32_t *wide = h->span + 2 * ((size_t)above * (size_t)h->n[1] + (size_t)j);
+        const int even = (j + above) & 1;
+        memset(h->r[0] + to + wide[0], 0, (size_t)(wide[1] - wide[0]) * sizeof(double));
+        memset(h->r[1] + to + wide[0], 0, (size_t)(wide[1] - wide[0]) * sizeof(double));
+        for (f = 0; f < 4; f++) {
+            const int fj = 2 * j + (f & 1), fk = 2 * above + (f >> 1);
+            const int32_t *span = g->span + 2 * ((size_t)fk * (size_t)g->n[1] + (size_t)fj);
+            if (fj >= g->n[1] || fk >= g->n[2]) continue;
+            for (i = span[0]; i < span[1]; i += n) {
+                n = span[1] - i < 16 * GS4I_STRIP ? span[1] - i : 16 * GS4I_STRIP;
+                gs4i_residual_row(s, g, out, gs4i_row_of(g, fj, fk) + (size_t)i, fj, fk, n);
+                gs4i_add_parents(h->r[even] + to + i / 2, h->r[!even] + to + i / 2, out, n);
+            }
+        }
+    }
+}
+
+static void gs4i_add_children(float *GS4I_RESTRICT z, const float *GS4I_RESTRICT inverse, const float *GS4I_RESTRICT even, const float *GS4I_RESTRICT odd, int n)
+{
+    int m;
+    for (m = 0; m < n / 2; m++) {
+        z[2 * m] = inverse[2 * m] > 0 ? z[2 * m] + even[m] : 0;
+        z[2 * m + 1] = inverse[2 * m + 1] > 0 ? z[2 * m + 1] + odd[m] : 0;
+    }
+}
+
+/* To red cells; black ones follow from them. */
+static void gs4i_stage_prolong(gs4i_solver *s, int level, int k)
+{
+    const gs4i_masked *g = &s->level[level], *h = &s->level[level + 1];
+    size_t at;
+    int j, n;
+    GS4I_EACH_ROW(g, k, j, at, n) {
+        const int even = (j / 2 + k / 2) & 1;
+        const size_t from = gs4i_row_of(h, j / 2, k / 2) + (at - gs4i_row_of(g, j, k)) / 2;
+        gs4i_add_children(g->z[0] + at, g->inverse[0] + at, h->z[even] + from, h->z[!even] + from, n);
+    }
+}
+
+static void gs4i_stage_collect(gs4i_solver *s, int level, int k)
+{
+    const gs4i_masked *g = &s->level[level];
+    size_t at;
+    int j, n, m;
+    if (s->graphs) GS4I_EACH_ROW(g, k, j, at, n) for (m = 0; m < n; m++) {
+        const int32_t parent = s->parent[0][at + (size_t)m];
+        if (parent >= 0) g->z[0][at + (size_t)m] += s->graph[0].x[parent];
+    }
+}
+
+static void gs4i_stage_dot(gs4i_solver *s, int level, int k)
+{
+    const gs4i_masked *g = &s->level[level];
+    double sum = 0;
+    size_t at;
+    int j, n, c;
+    GS4I_EACH_ROW(g, k, j, at, n) for (c = 0; c < 2; c++) sum += gs4i_dot_row(g->r[c] + at, g->z[c] + at, n);
+    s->sums[k] = sum;
+}
+
+static void gs4i_stage_direct(gs4i_solver *s, int level, int k)
+{
+    const gs4i_masked *g = &s->level[level];
+    size_t at;
+    int j, n, c;
+    GS4I_EACH_ROW(g, k, j, at, n) for (c = 0; c < 2; c++) gs4i_direct_row(s->p[c] + at, g->z[c] + at, s->beta, n);
+}
+
+#define GS4I_MASS(s, g, c, at) (g)->mass[c] ? (g)->mass[c] + (at) : (s)->zeros, (g)->mass_low[c] ? (g)->mass_low[c] + (at) : (s)->zeros
+#define GS4I_WEIGHTS(s, g, c, at, t) GS4I_FACES_OF((g)->w, c, at, t, g) GS4I_LOW_FACES_OF((g)->w_low, c, at, t, g), GS4I_MASS(s, g, c, at)
+
+static void gs4i_stage_curvature(gs4i_solver *s, int level, int k)
+{
+    const gs4i_masked *g = &s->level[level];
+    double sum = 0;
+    size_t at;
+    int j, n, c;
+    GS4I_EACH_ROW(g, k, j, at, n) for (c = 0; c < 2; c++) {
+        const int t = (c + j + k) & 1;
+        if (g->degree[0]) sum += gs4i_curvature_uniform(s->p[c] + at, GS4I_AROUND(s->p[!c], at, t, g), g->degree[c] + at, GS4I_MASS(s, g, c, at), n);
+        else sum += gs4i_curvature_weighted(s->p[c] + at, GS4I_AROUND(s->p[!c], at, t, g), GS4I_WEIGHTS(s, g, c, at, t), n);
+    }
+    s->sums[k] = sum;
+}
+
+static void gs4i_stage_update(gs4i_solver *s, int level, int k)
+{
+    const gs4i_masked *g = &s->level[level];
+    double sum = 0;
+    size_t at;
+    int j, n, c;
+    GS4I_EACH_ROW(g, k, j, at, n) for (c = 0; c < 2; c++) {
+        const int t = (c + j + k) & 1;
+        if (g->degree[0]) sum += gs4i_update_uniform(s->x[c] + at, g->r[c] + at, s->alpha, s->p[c] + at, GS4I_AROUND(s->p[!c], at, t, g), g->degree[c] + at, GS4I_MASS(s, g, c, at), n);
+        else sum += gs4i_update_weighted(s->x[c] + at, g->r[c] + at, s->alpha, s->p[c] + at, GS4I_AROUND(s->p[!c], at, t, g), GS4I_WEIGHTS(s, g, c, at, t), n);
+    }
+    s->sums[k] = sum;
+}
+
+static void gs4i_stage_defect(gs4i_solver *s, int level, int k)
+{
+    const gs4i_masked *g = &s->level[level];
+    double sum = 0;
+    size_t at;
+    int j, n, c;
+    GS4I_EACH_ROW(g, k, j, at, n) for (c = 0; c < 2; c++) {
+        const int t = (c + j + k) & 1;
+        if (g->degree[0]) sum += gs4i_defect_uniform(g->r[c] + at, s->x[c] + at, GS4I_AROUND(s->x[!c], at, t, g), g->degree[c] + at, GS4I_MASS(s, g, c, at), n);
+        else sum += gs4i_defect_weighted(g->r[c] + at, s->x[c] + at, GS4I_AROUND(s->x[!c], at, t, g), GS4I_WEIGHTS(s, g, c, at, t), n);
+    }
+    s->sums[k] = sum;
+}
+
+static void gs4i_stage_jacobi(gs4i_solver *s, int level, int k)
+{
+    const gs4i_masked *g = &s->level[level];
+    size_t at;
+    int j, n, c;
+    GS4I_EACH_ROW(g, k, j, at, n) for (c = 0; c < 2; c++) gs4i_start_row(g->z[c] + at, g->r[c] + at, g->inverse[c] + at, n);
+}
+
+/* --- sweeps: stages one behind the other through the planes ------------------------------------------------ *
+ *
+ * Stage q needs stage q - 1 in planes k - 1, k, k + 1; the first needs nothing that a stage writes. So one pass does stage q in plane
+ * step - q while that is in the cache. With slabs each task does first what needs nothing of another slab, then what is left at the cuts:
+ *
+ *     stage 0   |--------------------||--------------------|
+ *     stage 1   |-------------------\  /-------------------|        first pass \ cut / first pass
+ *     stage 2   |------------------\ || /------------------|        second pass: between \ and /
+ *
+ * Every cell sees the same numbers whatever the slabs. The stage that restricts takes planes by two. */
+
+typedef struct gs4i_sweep { gs4i_solver *s; int level; const gs4i_stage_fn *stage; int count; } gs4i_sweep;
+
+GS4I_INLINE int gs4i_even(const gs4i_sweep *w, int q, int k, int up) { return w->stage[q] != gs4i_stage_restrict ? k : up ? (k + 1) & ~1 : k & ~1; }
+
+static void gs4i_sweep_slab(int index, void *context)
+{
+    const gs4i_sweep *w = (const gs4i_sweep *)context;
+    const int a = w->s->cut[w->level][index], b = w->s->cut[w->level][index + 1], first = index == 0, last = index == w->s->slabs[w->level] - 1;
+    int step, q;
+    for (step = a; step < b + w->count; step++)
+        for (q = 0; q < w->count; q++) {
+            const int k = step - q;
+            if (k >= (first ? a : gs4i_even(w, q, a + q, 1)) && k < (last ? b : gs4i_even(w, q, b - q, 0))) w->stage[q](w->s, w->level, k);
+        }
+}
+
+static void gs4i_sweep_cut(int index, void *context)
+{
+    const gs4i_sweep *w = (const gs4i_sweep *)context;
+    const int cut = w->s->cut[w->level][index + 1];
+    int q, k;
+    for (q = 1; q < w->count; q++)
+        for (k = gs4i_even(w, q, cut - q, 0); k < gs4i_even(w, q, cut + q, 1); k++) w->stage[q](w->s, w->level, k);
+}
+
+static void gs4i_sweep_run(gs4i_solver *s, int level, const gs4i_stage_fn *stage, int count)
+{
+    gs4i_sweep w;
+    w.s = s; w.level = level; w.stage = stage; w.count = count;
+    gs4i_parallel_for(s->tasks, s->slabs[level], gs4i_sweep_slab, &w);
+    if (count > 1) gs4i_parallel_for(s->tasks, s->slabs[level] - 1, gs4i_sweep_cut, &w);
+}
+
+static double gs4i_total(const gs4i_solver *s)
+{
+    double sum = 0;
+    int k;
+    for (k = 0; k < s->level[0].n[2]; k++) sum += s->sums[k];
+    return sum;
+}
+
+/* --- the cycle ---------------------------------------------------------------------------------------------- */
+
+static void gs4i_graph_smooth(gs4i_graph *g, int begin, int end)
+{
+    int i, e;
+    for (i = begin; i < end; i++) {
+        float sum = g->b[i];
+        for (e = g->start[i]; e < g->start[i + 1]; e++) sum += g->w[e] * g->x[g->to[e]];
+        g->x[i] = sum * g->inverse[i];
+    }
+}
+
+/* Residual of red nodes to the graph above, or from there to red nodes. */
+static void gs4i_graph_restrict(const gs4i_graph *g, gs4i_graph *up)
+{
+    int i, e;
+    memset(up->b, 0, (size_t)up->n * sizeof(float));
+    for (i = 0; i < g->reds; i++) {
+        float sum = g->b[i] - g->diagonal[i] * g->x[i];
+        if (g->parent[i] < 0) continue;
+        for (e = g->start[i]; e < g->start[i + 1]; e++) sum += g->w[e] * g->x[g->to[e]];
+        up->b[g->parent[i]] += sum;
+    }
+}
+
+static void gs4i_graph_prolong(gs4i_graph *g, const gs4i_graph *up)
+{
+    int i;
+    for (i = 0; i < g->reds; i++) if (g->parent[i] >= 0) g->x[i] += up->x[g->parent[i]];
+}
+
+/* L L^T x = b; rows whose pivot was skipped have a zero on the diagonal of L. */
+static void gs4i_graph_direct(gs4i_graph *g, const double *L)
+{
+    const int n = g->n;
+    double y[GS4I_DIRECT];
+    int i, j;
+    for (i = 0; i < n; i++) {
+        const double *row = L + (size_t)i * (size_t)n;
+        double sum = (double)g->b[i];
+        for (j = 0; j < i; j++) sum -= row[j] * y[j];
+        y[i] = row[i] > 0 ? sum / row[i] : 0;
+    }
+    for (i = n - 1; i >= 0; i--) {
+        const double *row = L + (size_t)i * (size_t)n;
+        y[i] = row[i] > 0 ? y[i] / row[i] : 0;
+        for (j = 0; j < i; j++) y[j] -= row[j] * y[i];
+        g->x[i] = (float)y[i];
+    }
+}
+
+static void gs4i_graph_cycles(gs4i_solver *s)
+{
+    int q;
+    for (q = 0; q < s->graphs - 1; q++) {
+        gs4i_graph *g = &s->graph[q];
+        memset(g->x, 0, (size_t)g->n * sizeof(float));
+        gs4i_graph_smooth(g, 0, g->n); gs4i_graph_smooth(g, 0, g->n);
+        gs4i_graph_restrict(g, &s->graph[q + 1]);
+    }
+    gs4i_graph_direct(&s->graph[q], s->matrix);
+    while (--q >= 0) {
+        gs4i_graph *g = &s->graph[q];
+        gs4i_graph_prolong(g, &s->graph[q + 1]);
+        gs4i_graph_smooth(g, g->reds, g->n); gs4i_graph_smooth(g, 0, g->n); gs4i_graph_smooth(g, 0, g->reds);
+    }
+}
+
+static void gs4i_restrict_groups(gs4i_solver *s)
+{
+    const gs4i_masked *g = &s->level[1];
+    float *b = s->graph[0].b;
+    size_t at;
+    int j, k, n, m;
+    memset(b, 0, (size_t)s->graph[0].n * sizeof *b);
+    for (k = 0; k < g->n[2]; k++)
+        GS4I_EACH_ROW(g, k, j, at, n) for (m = 0; m < n; m++) {
+            const int32_t parent = s->parent[0][at + (size_t)m];
+            if (parent >= 0) b[parent] += s->residual[at + (size_t)m];
+        }
+}
+
+/* z = (about the inverse of A) r, symmetric and positive; gives r.z */
+static double gs4i_cycle(gs4i_solver *s)
+{
+    static const gs4i_stage_fn down[] = { gs4i_stage_start, gs4i_stage_black, gs4i_stage_red, gs4i_stage_black, gs4i_stage_restrict };
+    static const gs4i_stage_fn down1[] = { gs4i_stage_start, gs4i_stage_black, gs4i_stage_red, gs4i_stage_black, gs4i_stage_residual };
+    static const gs4i_stage_fn up1[] = { gs4i_stage_collect, gs4i_stage_black, gs4i_stage_red, gs4i_stage_black, gs4i_stage_red };
+    static const gs4i_stage_fn up[] = { gs4i_stage_prolong, gs4i_stage_black, gs4i_stage_red, gs4i_stage_black, gs4i_stage_red, gs4i_stage_dot };
+    gs4i_sweep_run(s, 0, down, 5);
+    gs4i_sweep_run(s, 1, down1, 5);
+    if (s->graphs) { gs4i_restrict_groups(s); gs4i_graph_cycles(s); }
+    gs4i_sweep_run(s, 1, up1, 5);
+    gs4i_sweep_run(s, 0, up, 6);
+    return gs4i_total(s);
+}
+
+/* --- setup: memory ------------------------------------------------------------------------------------------ */
+
+#define GS4I_CHUNK ((size_t)1 << 20)
+
+typedef struct gs4i_clearing { char *at; size_t bytes; } gs4i_clearing;
+
+static void gs4i_clear_chunk(int index, void *context)
+{
+    const gs4i_clearing *c = (const gs4i_clearing *)context;
+    const size_t begin = (size_t)index * GS4I_CHUNK;
+    memset(c->at + begin, 0, c->bytes - begin < GS4I_CHUNK ? c->bytes - begin : GS4I_CHUNK);
+}
+
+/* In parallel: fresh pages cost more than all the rest of a setup. */
+static void gs4i_clear(gs4i_solver *s, void *at, size_t bytes)
+{
+    gs4i_clearing c;
+    c.at = (char *)at; c.bytes = bytes;
+    gs4i_parallel_for(s->tasks, (int)((bytes + GS4I_CHUNK - 1) / GS4I_CHUNK), gs4i_clear_chunk, &c);
+}
+
+static void gs4i_release(gs4i_memory *memory, gs4i_scratch *c)
+{
+    gs4i_free(memory, c->data, c->bytes, 1);
+    c->data = NULL; c->bytes = 0;
+}
+
+/* Exactly `bytes`, or what there is if that is more. What was there is lost, and zero if `fresh` or if it moved. */
+static int gs4i_reserve(gs4i_solver *s, gs4i_scratch *c, size_t bytes, int fresh)
+{
+    if (!c->data || c->bytes < bytes) {
+        gs4i_release(s->memory, c);
+        if (bytes > SIZE_MAX / 2) return GS4_ERROR_MEMORY;
+        c->data = s->memory->hook.alloc_fn(bytes ? bytes : 1, 64, s->memory->hook.user);
+        if (!c->data) return GS4_ERROR_MEMORY;
+        c->bytes = bytes ? bytes : 1;
+        s->memory->bytes += c->bytes;
+        fresh = 1;
+    }
+    if (fresh) gs4i_clear(s, c->data, bytes);
+    return GS4_OK;
+}
+
+/* The next `count` elements of an arena, or of none, to see how large it has to be. */
+static void *gs4i_carve(char *base, size_t *used, size_t count, size_t size)
+{
+    void *p = base ? base + *used : NULL;
+    *used += (count * size + 63) / 64 * 64;
+    return p;
+}
+
+static void gs4i_carve_two(char *base, size_t *used, size_t count, float **two)
+{
+    int c;
+    for (c = 0; c < 2; c++) two[c] = (float *)gs4i_carve(base, used, count, sizeof(float));
+}
+
+static void gs4i_shape_level(gs4i_masked *g, const int n[3])
+{
+    memset(g, 0, sizeof *g);
+    memcpy(g->n, n, sizeof g->n);
+    g->width = (n[0] + 1) / 2;
+    g->stride = ((size_t)g->width + GS4I_STRIP) / GS4I_STRIP * GS4I_STRIP;
+    g->plane = g->stride * (size_t)(n[1] + 1);
+    g->count = g->plane * (size_t)(n[2] + 2);
+}
+
+/* All arrays of both levels; gives their bytes. */
+static size_t gs4i_lay_out(gs4i_solver *s, char *base)
+{
+    size_t used = 0;
+    int l, c, a;
+    for (l = 0; l < 2; l++) {
+        gs4i_masked *g = &s->level[l];
+        gs4i_carve_two(base, &used, g->count, g->z);
+        gs4i_carve_two(base, &used, g->count, g->inverse);
+        for (c = 0; c < 2; c++) g->r[c] = (double *)gs4i_carve(base, &used, g->count, sizeof(double));
+        if (l == 0 && s->uniform) for (c = 0; c < 2; c++) g->degree[c] = (uint8_t *)gs4i_carve(base, &used, g->count, 1);
+        else for (a = 0; a < 3; a++) gs4i_carve_two(base, &used, g->count, g->w[a]);
+        if (l == 0 && !s->uniform && sizeof(gs4_real) == 8) for (a = 0; a < 3; a++) gs4i_carve_two(base, &used, g->count, g->w_low[a]);
+        if (l == 1 || !s->uniform || s->massive) gs4i_carve_two(base, &used, g->count, g->mass);
+        if (l == 0 && s->massive) gs4i_carve_two(base, &used, g->count, g->mass_low);
+    }
+    gs4i_carve_two(base, &used, s->level[0].count, s->p);
+    for (c = 0; c < 2; c++) s->x[c] = (double *)gs4i_carve(base, &used, s->level[0].count, sizeof(double));
+    s->residual = (float *)gs4i_carve(base, &used, s->level[1].count, sizeof(float));
+    for (c = 0; c < 2; c++) s->parent[c] = (int32_t *)gs4i_carve(base, &used, s->level[1].count, sizeof(int32_t));
+    return used;
+}
+
+/* Arrays of both levels; what a setup does not write is zero. */
+static int gs4i_reserve_levels(gs4i_solver *s)
+{
+    gs4i_masked *g = s->level;
+    const int shape[5] = { g->n[0], g->n[1], g->n[2], s->uniform, s->massive }, fresh = memcmp(shape, s->shape, sizeof shape) != 0;
+    int n[3], a, c;
+    for (a = 0; a < 3; a++) n[a] = (g->n[a] + 1) / 2;
+    gs4i_shape_level(&g[1], n);
+    memset(s->shape, 0, sizeof s->shape);
+    if (gs4i_reserve(s, &s->grid, gs4i_lay_out(s, NULL), fresh) != GS4_OK) return GS4_ERROR_MEMORY;
+    memcpy(s->shape, shape, sizeof shape);
+    gs4i_lay_out(s, (char *)s->grid.data);
+    for (c = 0; c < 2 && !fresh; c++) {
+        gs4i_clear(s, g[0].z[c], g[0].count * sizeof(float));
+        gs4i_clear(s, s->p[c], g[0].count * sizeof(float));
+        gs4i_clear(s, g[1].z[c], g[1].count * sizeof(float));
+        gs4i_clear(s, g[1].mass[c], g[1].count * sizeof(float));
+        for (a = 0; a < 3; a++) gs4i_clear(s, g[1].w[a][c], g[1].count * sizeof(float));
+    }
+    return GS4_OK;
+}
+
+/* --- setup: what is given ------------------------------------------------------------------------------------- */
+
+typedef struct gs4i_range { double low, high, least /* above 0 */, mass; int64_t unknowns; const char *fault; double value; } gs4i_range;
+typedef struct gs4i_setup { gs4i_solver *s; const gs4_poisson_desc *d; gs4i_range *seen; int32_t *counts; } gs4i_setup;
+
+#define GS4I_CONDUCTS(a, b) ((a) & (b) & GS4I_IS_OPEN && ((a) | (b)) & GS4I_IS_LIQUID)
+
+GS4I_INLINE const uint8_t *gs4i_kinds_of(const gs4i_solver *s, int j, int k)
+{
+    return s->kind + (size_t)(k + 1) * s->kind_plane + (size_t)(j + 1) * s->kind_row + 1;
+}
+
+static void gs4i_take_kinds(int k, void *context)
+{
+    const gs4i_setup *u = (const gs4i_setup *)context;
+    static const uint8_t bits[3] = { GS4I_IS_OPEN, GS4I_IS_OPEN | GS4I_IS_LIQUID, 0 };
+    const int *n = u->d->cells;
+    gs4i_range *seen = &u->seen[k];
+    int64_t unknowns = 0;
+    int i, j;
+    for (j = 0; j < n[1]; j++) {
+        const uint8_t *from = u->d->kind + ((size_t)k * (size_t)n[1] + (size_t)j) * (size_t)n[0];
+        uint8_t *to = u->s->kind + (gs4i_kinds_of(u->s, j, k) - u->s->kind);
+        for (i = 0; i < n[0]; i++) {
+            if (from[i] > GS4_CELL_SOLID) { seen->fault = "kind[] holds "; seen->value = from[i]; return; }
+            to[i] = bits[from[i]];
+            unknowns += from[i] == GS4_CELL_LIQUID;
+        }
+    }
+    seen->unknowns = unknowns;
+}
+
+static void gs4i_see_coefficient(gs4i_range *seen, double c)
+{
+    if (!(c >= 0 && c < (double)GS4I_HUGE)) { seen->fault = "coefficient[] holds "; seen->value = c; return; }
+    if (c > seen->high) seen->high = c;
+    if (c < seen->low) seen->low = c;
+    if (c > 0 && c < seen->least) seen->least = c;
+}
+
+/* Range of all coefficients and diagonals that matter; of faces those towards + */
+static void gs4i_see_plane(int k, void *context)
+{
+    const gs4i_setup *u = (const gs4i_setup *)context;
+    const gs4_poisson_desc *d = u->d;
+    const size_t nx = (size_t)d->cells[0], ny = (size_t)d->cells[1];
+    const size_t step[3] = { 1, u->s->kind_row, u->s->kind_plane };
+    gs4i_range *seen = &u->seen[k];
+    size_t i, j;
+    int a;
+    for (j = 0; j < ny; j++) {
+        const size_t row = (size_t)k * ny + j;
+        const size_t face[3] = { row * (nx + 1) + 1, ((size_t)k * (ny + 1) + j + 1) * nx, (row + ny) * nx };
+        const uint8_t *kind = gs4i_kinds_of(u->s, (int)j, k);
+        for (a = 0; a < 3; a++) {
+            if (!d->coefficient[a]) continue;
+            for (i = 0; i < nx; i++)
+                if (GS4I_CONDUCTS(kind[i], kind[i + step[a]])) gs4i_see_coefficient(seen, (double)d->coefficient[a][face[a] + i]);
+        }
+        for (i = 0; i < nx && d->diagonal; i++) if (kind[i] & GS4I_IS_LIQUID) {
+            const double m = (double)d->diagonal[row * nx + i];
+            if (!(m >= 0 && m < (double)GS4I_HUGE)) { seen->fault = "diagonal[] holds "; seen->value = m; return; }
+            if (m > seen->mass) seen->mass = m;
+        }
+        if (seen->fault) return;
+    }
+}
+
+static int gs4i_fault(gs4i_solver *s, const char *what, double value, const char *accepted)
+{
+    s->fault = what; s->fault_value = value; s->accepted = accepted;
+    return GS4_ERROR_ARGUMENT;
+}
+
+/* Scales, and whether one coefficient serves all faces: it does for most uses, and takes half the memory. */
+static int gs4i_choose_units(gs4i_solver *s, const gs4_poisson_desc *d, const gs4i_range *seen)
+{
+    const double h2 = (double)d->cell_size * (double)d->cell_size;
+    gs4i_range all;
+    int k, exponent = 0;
+    memset(&all, 0, sizeof all);
+    all.low = all.least = DBL_MAX;
+    if (!d->coefficient[0] || !d->coefficient[1] || !d->coefficient[2]) all.low = all.high = all.least = 1;
+    s->unknowns = 0;
+    for (k = 0; k < d->cells[2]; k++) {
+        if (seen[k].fault) return gs4i_fault(s, seen[k].fault, seen[k].value, "; it must be 0 or a finite number above that is not absurdly large");
+        if (seen[k].low < all.low) all.low = seen[k].low;
+        if (seen[k].high > all.high) all.high = seen[k].high;
+        if (seen[k].least < all.least) all.least = seen[k].least;
+        if (seen[k].mass > all.mass) all.mass = seen[k].mass;
+        s->unknowns += seen[k].unknowns;
+    }
+    all.mass *= h2;
+    s->massive = all.mass > 0;
+    s->uniform = all.high > 0 && all.low == all.high && all.mass < 1e9 * all.high;
+    if (all.high > 0 && all.least < 1e-30 * all.high) return gs4i_fault(s, "the smallest coefficient above 0, over the largest, is ", all.least / all.high, "; it must be at least 1e-30, use 0 for what does not conduct");
+    frexp(all.high > all.mass ? all.high : all.mass, &exponent);
+    s->unit = s->uniform ? 1 / all.high : ldexp(1, -exponent);
+    s->mass_unit = h2 * s->unit;
+    return GS4_OK;
+}
+
+/* Kinds, ranges, units, memory. */
+static int gs4i_take(gs4i_setup *u)
+{
+    gs4i_solver *s = u->s;
+    const int *n = u->d->cells;
+    size_t used = 0, rows;
+    char *base = NULL;
+    int k, l, pass;
+    gs4i_shape_level(&s->level[0], n);
+    s->kind_row = (size_t)n[0] + 2; s->kind_plane = s->kind_row * (size_t)(n[1] + 2);
+    if (gs4i_reserve(s, &s->kinds, s->kind_plane * (size_t)(n[2] + 2), 1) != GS4_OK) return GS4_ERROR_MEMORY;
+    s->kind = (uint8_t *)s->kinds.data;
+    for (pass = 0; pass < 2; pass++) {
+        used = 0;
+        for (l = 0; l < 2; l++) {
+            rows = (size_t)(l ? (n[1] + 1) / 2 : n[1]) * (size_t)(l ? (n[2] + 1) / 2 : n[2]);
+            s->span[l] = (int32_t *)gs4i_carve(base, &used, 2 * rows, sizeof(int32_t));
+        }
+        s->sums = (double *)gs4i_carve(base, &used, (size_t)n[2], sizeof(double));
+        s->given = (double *)gs4i_carve(base, &used, 3 * (size_t)n[2], sizeof(double));
+        s->zeros = (float *)gs4i_carve(base, &used, s->level[0].stride, sizeof(float));
+        u->seen = (gs4i_range *)gs4i_carve(base, &used, (size_t)n[2], sizeof(gs4i_range));
+        u->counts = (int32_t *)gs4i_carve(base, &used, (size_t)n[2] + 2, sizeof(int32_t));
+        if (!pass && gs4i_reserve(s, &s->planes, used, 1) != GS4_OK) return GS4_ERROR_MEMORY;
+        base = (char *)s->planes.data;
+    }
+    for (k = 0; k < n[2]; k++) u->seen[k].low = u->seen[k].least = DBL_MAX;
+    gs4i_parallel_for(s->tasks, n[2], gs4i_take_kinds, u);
+    for (k = 0; k < n[2]; k++) if (u->seen[k].fault) return gs4i_fault(s, u->seen[k].fault, u->seen[k].value, ", which is none of gs4_cell");
+    gs4i_parallel_for(s->tasks, n[2], gs4i_see_plane, u);
+    if (gs4i_choose_units(s, u->d, u->seen) != GS4_OK) return GS4_ERROR_ARGUMENT;
+    if (gs4i_reserve_levels(s) != GS4_OK) return GS4_ERROR_MEMORY;
+    for (l = 0; l < 2; l++) s->level[l].span = s->span[l];
+    return GS4_OK;
+}
+
+/* --- setup: both levels on grids ------------------------------------------------------------------------------- */
+
+/* Faces of cell i of a row: -x +x -y +y -z +z, 0 where they do not conduct; gives the kinds on their other sides. */
+typedef struct gs4i_rows { const uint8_t *kind; const gs4_real *face[6], *diagonal; ptrdiff_t beside[6], next[3]; double unit, mass_unit; } gs4i_rows;
+
+static void gs4i_open_row(gs4i_rows *q, const gs4i_solver *s, const gs4_poisson_desc *d, int j, int k)
+{
+    const size_t nx = (size_t)d->cells[0], ny = (size_t)d->cells[1], row = (size_t)k * ny + (size_t)j;
+    const size_t low[3] = { row * (nx + 1), ((size_t)k * (ny + 1) + (size_t)j) * nx, row * nx }, high[3] = { 1, nx, nx * ny };
+    const ptrdiff_t step[3] = { 1, (ptrdiff_t)s->kind_row, (ptrdiff_t)s->kind_plane };
+    int a;
+    q->kind = gs4i_kinds_of(s, j, k);
+    q->diagonal = d->diagonal ? d->diagonal + row * nx : NULL;
+    q->unit = s->unit; q->mass_unit = s->mass_unit;
+    for (a = 0; a < 3; a++) {
+        const gs4_real *c = d->coefficient[a];
+        q->face[2 * a] = c ? c + low[a] : NULL; q->face[2 * a + 1] = c ? c + low[a] + high[a] : NULL;
+        q->next[a] = (ptrdiff_t)high[a];
+        q->beside[2 * a] = -step[a]; q->beside[2 * a + 1] = step[a];
+    }
+}
+
+GS4I_INLINE double gs4i_face_of(const gs4i_rows *q, int i, int f)
+{
+    if (!GS4I_CONDUCTS(q->kind[i], q->kind[i + q->beside[f]])) return 0;
+    return q->face[f] ? (double)q->face[f][i] * q->unit : q->unit;
+}
+
+/* What a face adds to that of the coarse cells on its two sides: the face in series with half of the link that either cell has to the
+ * cell behind it in its coarse cell, if there is one. That is the conductance between their centres: half the face in the midst of
+ * things, 2/3 or all of it where a wall has left one layer, and at a door it stays what it is however coarse the level. Never less
+ * than half: a correction that is too small does less harm than one that is too large. */
+GS4I_INLINE float gs4i_series(float w, float behind, float other)
+{
+    const float half = 0.5f / w;
+    return 1 / (1 / w + (behind > w ? 0.5f / behind : behind > 0 ? half : 0) + (other > w ? 0.5f / other : other > 0 ? half : 0));
+}
+
+/* One row of level 0, and what its cells add to level 1. */
+static void gs4i_build_row(gs4i_solver *s, const gs4_poisson_desc *d, int j, int k)
+{
+    const gs4i_masked *g = &s->level[0], *h = &s->level[1];
+    const size_t row = gs4i_row_of(g, j, k), coarse = gs4i_row_of(h, j / 2, k / 2);
+    gs4i_rows q;
+    int i, f;
+    gs4i_open_row(&q, s, d, j, k);
+    for (i = 0; i < g->n[0]; i++) {
+        const int c = (i + j + k) & 1, up = (i / 2 + j / 2 + k / 2) & 1, liquid = q.kind[i] & GS4I_IS_LIQUID;
+        const size_t at = row + (size_t)(i / 2), to = coarse + (size_t)(i / 4);
+        const double mass = liquid && q.diagonal ? (double)q.diagonal[i] * q.mass_unit : 0;
+        double w[6], sum = mass, air = 0;
+        int degree = 0;
+        for (f = 0; f < 6; f++) {
+            w[f] = s->uniform ? GS4I_CONDUCTS(q.kind[i], q.kind[i + q.beside[f]]) : gs4i_face_of(&q, i, f);
+            sum += w[f];
+            degree += w[f] > 0;
+            if (liquid && !(q.kind[i + q.beside[f]] & GS4I_IS_LIQUID)) air += w[f];
+        }
+        g->inverse[c][at] = liquid && sum > 0 ? (float)(1 / sum) : 0;
+        if (g->degree[c]) g->degree[c][at] = (uint8_t)(liquid ? degree : 0);
+        else for (f = 0; f < 3; f++) {
+            g->w[f][c][at] = (float)w[2 * f + 1];
+            if (g->w_low[f][c]) g->w_low[f][c][at] = (float)(w[2 * f + 1] - (double)g->w[f][c][at]);
+        }
+        if (g->mass[c]) g->mass[c][at] = liquid || s->uniform ? (float)mass : -1;
+        if (g->mass_low[c]) g->mass_low[c][at] = liquid ? (float)(mass - (double)(float)mass) : 0;
+        if (!liquid) continue;
+        for (f = 0; f < 3; f++) {
+            const ptrdiff_t beyond = q.beside[2 * f + 1];
+            float behind = 0, other = 0;
+            if (!((f == 0 ? i : f == 1 ? j : k) & 1) || !(q.kind[i + beyond] & GS4I_IS_LIQUID) || !(w[2 * f + 1] > 0)) continue;
+            if (q.kind[i - beyond] & GS4I_IS_LIQUID) behind = (float)w[2 * f];
+            if (q.kind[i + 2 * beyond] & GS4I_IS_LIQUID) other = s->uniform ? 1 : q.face[2 * f + 1] ? (float)((double)q.face[2 * f + 1][i + q.next[f]] * q.unit) : (float)q.unit;
+            h->w[f][up][to] += gs4i_series((float)w[2 * f + 1], behind, other);
+        }
+        h->mass[up][to] += (float)(0.75 * air); h->z[up][to] += (float)(0.75 * air);      /* z: to the air alone, while setting up */
+        h->mass[up][to] += (float)mass;
+    }
+}
+
+/* First and last strip of a row with liquid. */
+static void gs4i_build_span(const gs4i_solver *s, int j, int k, int32_t span[2])
+{
+    const uint8_t *kind = gs4i_kinds_of(s, j, k);
+    int first = 0, last = s->level[0].n[0] - 1;
+    while (first <= last && !(kind[first] & GS4I_IS_LIQUID)) first++;
+    while (last >= first && !(kind[last] & GS4I_IS_LIQUID)) last--;
+    span[0] = first > last ? 0 : first / 2 / GS4I_STRIP * GS4I_STRIP;
+    span[1] = first > last ? 0 : (last / 2 / GS4I_STRIP + 1) * GS4I_STRIP;
+}
+
+/* A plane of level 1 and the two below it. */
+static void gs4i_build_planes(int K, void *context)
+{
+    const gs4i_setup *u = (const gs4i_setup *)context;
+    gs4i_solver *s = u->s;
+    const gs4i_masked *g = &s->level[0], *h = &s->level[1];
+    int j, k;
+    for (j = 0; j < h->n[1]; j++) { h->span[2 * (K * h->n[1] + j)] = INT32_MAX; h->span[2 * (K * h->n[1] + j) + 1] = 0; }
+    for (k = 2 * K; k < 2 * K + 2 && k < g->n[2]; k++)
+        for (j = 0; j < g->n[1]; j++) {
+            int32_t *span = g->span + 2 * ((size_t)k * (size_t)g->n[1] + (size_t)j), *wide = h->span + 2 * ((size_t)K * (size_t)h->n[1] + (size_t)(j / 2));
+            gs4i_build_row(s, u->d, j, k);
+            gs4i_build_span(s, j, k, span);
+            if (span[0] >= span[1]) continue;
+            if (span[0] / 2 / GS4I_STRIP * GS4I_STRIP < wide[0]) wide[0] = span[0] / 2 / GS4I_STRIP * GS4I_STRIP;
+            if ((span[1] / 2 + GS4I_STRIP - 1) / GS4I_STRIP * GS4I_STRIP > wide[1]) wide[1] = (span[1] / 2 + GS4I_STRIP - 1) / GS4I_STRIP * GS4I_STRIP;
+        }
+    for (j = 0; j < h->n[1]; j++) if (!h->span[2 * (K * h->n[1] + j) + 1]) h->span[2 * (K * h->n[1] + j)] = 0;
+}
+
+/* Sum of the faces of a cell of level 1. */
+static float gs4i_faces(const gs4i_masked *g, int c, size_t at, int t)
+{
+    return ((g->w[0][!c][at + (size_t)t - 1] + g->w[0][c][at]) + (g->w[1][!c][at - g->stride] + g->w[1][c][at]))
+         + (g->w[2][!c][at - g->plane] + g->w[2][c][at]);
+}
+
+static void gs4i_build_inverse(int k, void *context)
+{
+    const gs4i_masked *g = &((const gs4i_setup *)context)->s->level[1];
+    int j, c, m;
+    for (j = 0; j < g->n[1]; j++) for (c = 0; c < 2; c++) {
+        const size_t row = gs4i_row_of(g, j, k);
+        const int t = (c + j + k) & 1;
+        for (m = 0; m < g->width; m++) {
+            const float sum = g->mass[c][row + (size_t)m] + gs4i_faces(g, c, row + (size_t)m, t);
+            g->inverse[c][row + (size_t)m] = sum > 0 ? 1 / sum : 0;
+        }
+    }
+}
+
+/* Slabs of equal work for the tasks of a sweep: thick enough for its stages, at even planes. */
+static void gs4i_cut(gs4i_solver *s, int level, int slabs)
+{
+    const gs4i_masked *g = &s->level[level];
+    const size_t rows = (size_t)g->n[1];
+    double all = 0, done = 0;
+    size_t j;
+    int k, count = 1;
+    for (j = 0; j < rows * (size_t)g->n[2]; j++) all += g->span[2 * j + 1] - g->span[2 * j] + 1;
+    if (all < 16384) slabs = 1;
+    s->cut[level][0] = 0;
+    for (k = 0; k < g->n[2]; k++) {
+        if (count < slabs && !(k & 1) && done >= all * count / slabs && k - s->cut[level][count - 1] >= 16 && g->n[2] - k >= 16) s->cut[level][count++] = k;
+        for (j = (size_t)k * rows; j < (size_t)(k + 1) * rows; j++) done += g->span[2 * j + 1] - g->span[2 * j] + 1;
+    }
+    s->cut[level][count] = g->n[2];
+    s->slabs[level] = count;
+}
+
+/* --- setup: connected groups ------------------------------------------------------------------------------------ */
+
+/* Colours and places of the eight cells of level 1 in a block; number x + 2 y + 4 z. */
+GS4I_INLINE int gs4i_child_colour(int q) { return (q ^ (q >> 1) ^ (q >> 2)) & 1; }
+GS4I_INLINE size_t gs4i_child(const gs4i_masked *g, int I, int J, int K, int q) { return gs4i_row_of(g, 2 * J + (q >> 1 & 1), 2 * K + (q >> 2)) + (size_t)I; }
+
+/* Groups of a block: of each cell the first cell of its group, -1 without edges. */
+static void gs4i_group_block(const gs4i_masked *g, int I, int J, int K, int group[8])
+{
+    int q, a, i;
+    for (q = 0; q < 8; q++) group[q] = gs4i_faces(g, gs4i_child_colour(q), gs4i_child(g, I, J, K, q), q & 1) > 0 ? q : -1;
+    for (q = 0; q < 8; q++) for (a = 0; a < 3; a++) {
+        const int other = q | 1 << a;
+        int from, into;
+        if (other == q || !(g->w[a][gs4i_child_colour(q)][gs4i_child(g, I, J, K, q)] > 0)) continue;
+        from = group[q] > group[other] ? group[q] : group[other]; into = group[q] + group[other] - from;
+        for (i = 0; i < 8; i++) if (group[i] == from) group[i] = into;
+    }
+}
+
+static void gs4i_number_groups(int K, void *context)
+{
+    const gs4i_setup *u = (const gs4i_setup *)context;
+    gs4i_solver *s = u->s;
+    const gs4i_masked *g = &s->level[1];
+    int32_t *count = u->counts + 2 * K, number[8];
+    int group[8], I, J, q;
+    count[0] = count[1] = 0;
+    for (J = 0; J < (g->n[1] + 1) / 2; J++) for (I = 0; I < (g->n[0] + 1) / 2; I++) {
+        gs4i_group_block(g, I, J, K, group);
+        for (q = 0; q < 8; q++) {
+            if (group[q] == q) number[q] = count[(I + J + K) & 1]++;
+            if (2 * J + (q >> 1 & 1) < g->n[1] && 2 * K + (q >> 2) < g->n[2])
+                s->parent[gs4i_child_colour(q)][gs4i_child(g, I, J, K, q)] = group[q] < 0 ? -1 : number[group[q]];
+        }
+    }
+}
+
+/* Numbers of planes to numbers of the graph; what nodes have of their cells. */
+static void gs4i_fill_groups(int K, void *context)
+{
+    const gs4i_setup *u = (const gs4i_setup *)context;
+    gs4i_solver *s = u->s;
+    const gs4i_masked *g = &s->level[1];
+    gs4i_graph *up = &s->graph[0];
+    int I, J, q;
+    for (J = 0; J < (g->n[1] + 1) / 2; J++) for (I = 0; I < (g->n[0] + 1) / 2; I++)
+        for (q = 0; q < 8; q++) {
+            const int c = gs4i_child_colour(q);
+            const size_t at = gs4i_child(g, I, J, K, q);
+            int32_t *parent = &s->parent[c][at];
+            float mass;
+            if (2 * J + (q >> 1 & 1) >= g->n[1] || 2 * K + (q >> 2) >= g->n[2] || *parent < 0) continue;
+            *parent += u->counts[2 * K + ((I + J + K) & 1)];
+            mass = g->mass[c][at] - g->z[c][at];
+            up->air[*parent] += 0.75f * g->z[c][at];
+            up->mass[*parent] += mass > 0 ? mass : 0;
+            up->block[*parent] = (uint64_t)I | (uint64_t)J << 21 | (uint64_t)K << 42;
+        }
+}
+
+typedef struct gs4i_edge { int32_t from, to; float w; } gs4i_edge;
+
+/* Link of cell `bits` of a block to the other one along axis a in it. */
+GS4I_INLINE float gs4i_link(const gs4i_masked *g, int c, size_t at, int bits, int a)
+{
+    return !(bits >> a & 1) ? g->w[a][c][at] : g->w[a][!c][a == 0 ? at : at - (a == 1 ? g->stride : g->plane)];
+}
+
+/* Edges from the groups of a block to groups around, each once. */
+static int gs4i_block_edges(const gs4i_solver *s, int I, int J, int K, gs4i_edge *edge)
+{
+    const gs4i_masked *g = &s->level[1];
+    int q, a, e, count = 0;
+    for (q = 0; q < 8; q++) {
+        const int c = gs4i_child_colour(q);
+        const size_t at = gs4i_child(g, I, J, K, q);
+        if (2 * J + (q >> 1 & 1) >= g->n[1] || 2 * K + (q >> 2) >= g->n[2] || s->parent[c][at] < 0) continue;
+        for (a = 0; a < 3; a++) {
+            const int high = q >> a & 1;
+            const size_t step = a == 0 ? 1 : a == 1 ? g->stride : g->plane, beside = a ? (high ? at + step : at - step) : (high ? at + 1 : at - 1);
+            const float w = high ? g->w[a][c][at] : g->w[a][!c][beside];
+            if (!(w > 0)) continue;
+            for (e = 0; e < count && !(edge[e].from == s->parent[c][at] && edge[e].to == s->parent[!c][beside]); e++) {}
+            if (e == count) { edge[e].from = s->parent[c][at]; edge[e].to = s->parent[!c][beside]; edge[e].w = 0; count++; }
+            edge[e].w += gs4i_series(w, gs4i_link(g, c, at, q, a), gs4i_link(g, !c, beside, q ^ 1 << a, a));
+        }
+    }
+    return count;
+}
+
+static void gs4i_count_edges(int K, void *context)
+{
+    const gs4i_setup *u = (const gs4i_setup *)context;
+    const gs4i_masked *g = &u->s->level[1];
+    gs4i_edge edge[24];
+    int I, J, e;
+    for (J = 0; J < (g->n[1] + 1) / 2; J++) for (I = 0; I < (g->n[0] + 1) / 2; I++)
+        for (e = gs4i_block_edges(u->s, I, J, K, edge) - 1; e >= 0; e--) u->s->graph[0].start[edge[e].from + 1]++;
+}
+
+static void gs4i_fill_edges(int K, void *context)
+{
+    const gs4i_setup *u = (const gs4i_setup *)context;
+    const gs4i_masked *g = &u->s->level[1];
+    gs4i_graph *up = &u->s->graph[0];
+    gs4i_edge edge[24];
+    int I, J, e, f, count;
+    for (J = 0; J < (g->n[1] + 1) / 2; J++) for (I = 0; I < (g->n[0] + 1) / 2; I++) {
+        count = gs4i_block_edges(u->s, I, J, K, edge);
+        for (e = 0; e < count; e++) {
+            int32_t place = up->start[edge[e].from];
+            for (f = 0; f < e; f++) place += edge[f].from == edge[e].from;
+            up->to[place] = edge[e].to; up->w[place] = edge[e].w;
+        }
+    }
+}
+
+static int gs4i_reserve_nodes(gs4i_solver *s, gs4i_graph *g, int n, int reds)
+{
+    char *base = NULL;
+    size_t used;
+    int pass;
+    g->n = n; g->reds = reds;
+    for (pass = 0; pass < 2; pass++) {
+        float **const numbers[6] = { &g->inverse, &g->diagonal, &g->air, &g->mass, &g->b, &g->x };
+        int i;
+        used = 0;
+        for (i = 0; i < 6; i++) *numbers[i] = (float *)gs4i_carve(base, &used, (size_t)n, sizeof(float));
+        g->start = (int32_t *)gs4i_carve(base, &used, (size_t)n + 1, sizeof(int32_t));
+        g->parent = (int32_t *)gs4i_carve(base, &used, (size_t)n, sizeof(int32_t));
+        g->block = (uint64_t *)gs4i_carve(base, &used, (size_t)n, sizeof(uint64_t));
+        if (!pass && gs4i_reserve(s, &g->nodes, used, 1) != GS4_OK) return GS4_ERROR_MEMORY;
+        base = (char *)g->nodes.data;
+    }
+    return GS4_OK;
+}
+
+/* From the number of edges of node i in start[i + 1]. */
+static int gs4i_reserve_edges(gs4i_solver *s, gs4i_graph *g)
+{
+    size_t count, used = 0;
+    int i;
+    for (i = 0; i < g->n; i++) g->start[i + 1] += g->start[i];
+    count = (size_t)g->start[g->n];
+    if (gs4i_reserve(s, &g->edges, 2 * count * sizeof(float) + 128, 0) != GS4_OK) return GS4_ERROR_MEMORY;
+    g->to = (int32_t *)gs4i_carve((char *)g->edges.data, &used, count, sizeof(int32_t));
+    g->w = (float *)gs4i_carve((char *)g->edges.data, &used, count, sizeof(float));
+    return GS4_OK;
+}
+
+static void gs4i_finish_graph(gs4i_graph *g)
+{
+    int i, e;
+    for (i = 0; i < g->n; i++) {
+        float sum = g->air[i] + g->mass[i];
+        for (e = g->start[i]; e < g->start[i + 1]; e++) sum += g->w[e];
+        g->diagonal[i] = sum; g->inverse[i] = sum > 0 ? 1 / sum : 0;
+    }
+}
+
+/* Graph 0 from level 1. */
+static int gs4i_build_groups(gs4i_setup *u)
+{
+    gs4i_solver *s = u->s;
+    const int planes = (s->level[1].n[2] + 1) / 2;
+    int32_t reds = 0, nodes = 0, count;
+    int k, c;
+    gs4i_parallel_for(s->tasks, planes, gs4i_number_groups, u);
+    for (c = 0; c < 2; c++) {
+        for (k = 0; k < planes; k++) { count = u->counts[2 * k + c]; u->counts[2 * k + c] = nodes; nodes += count; }
+        if (c == 0) reds = nodes;
+    }
+    if (gs4i_reserve_nodes(s, &s->graph[0], nodes, reds) != GS4_OK) return GS4_ERROR_MEMORY;
+    gs4i_parallel_for(s->tasks, planes, gs4i_fill_groups, u);
+    gs4i_parallel_for(s->tasks, planes, gs4i_count_edges, u);
+    if (gs4i_reserve_edges(s, &s->graph[0]) != GS4_OK) return GS4_ERROR_MEMORY;
+    gs4i_parallel_for(s->tasks, planes, gs4i_fill_edges, u);
+    gs4i_finish_graph(&s->graph[0]);
+    s->graphs = 1;
+    for (c = 0; c < 2; c++) gs4i_clear(s, s->level[1].z[c], s->level[1].count * sizeof(float));
+    return GS4_OK;
+}
+
+#define GS4I_LOWEST_BITS ((uint64_t)1 | (uint64_t)1 << 21 | (uint64_t)1 << 42)
+
+/* Nodes of a graph joined by edges within a block of blocks; g->parent becomes a node of the next graph. */
+static void gs4i_join_nodes(gs4i_graph *g, int32_t *number, int *reds, int *blacks)
+{
+    int32_t *root = g->parent;
+    int i, e;
+    *reds = *blacks = 0;
+    for (i = 0; i < g->n; i++) root[i] = g->start[i] < g->start[i + 1] ? i : -1;
+    for (i = 0; i < g->n; i++) for (e = g->start[i]; e < g->start[i + 1]; e++) {
+        int32_t a = i, b = g->to[e];
+        if ((g->block[a] ^ g->block[b]) & ~GS4I_LOWEST_BITS) continue;
+        while (root[a] != a) a = root[a] = root[root[a]];
+        while (root[b] != b) b = root[b] = root[root[b]];
+        if (a < b) root[b] = a; else root[a] = b;
+    }
+    for (i = 0; i < g->n; i++) {
+        const uint64_t block = g->block[i] >> 1;
+        if (root[i] < 0) continue;
+        if (root[i] == i) number[i] = (block ^ block >> 21 ^ block >> 42) & 1 ? -1 - (*blacks)++ : (*reds)++;
+        else root[i] = root[root[i]];                       /* a root is before all that it holds */
+    }
+    for (i = 0; i < g->n; i++) if (root[i] >= 0) { const int32_t m = number[root[i]]; root[i] = m < 0 ? *reds - 1 - m : m; }
+}
+
+/* Axis along which the blocks of two joined nodes are neighbours. */
+GS4I_INLINE int gs4i_axis(uint64_t a, uint64_t b) { return (a ^ b) >> 42 ? 2 : (a ^ b) >> 21 ? 1 : 0; }
+
+/* Links of each node along each axis within its block of blocks. */
+static void gs4i_find_links(const gs4i_graph *g, float *link)
+{
+    int i, e;
+    memset(link, 0, 3 * (size_t)g->n * sizeof *link);
+    for (i = 0; i < g->n; i++) for (e = g->start[i]; e < g->start[i + 1]; e++)
+        if (g->parent[g->to[e]] == g->parent[i]) link[3 * (size_t)i + (size_t)gs4i_axis(g->block[i], g->block[g->to[e]])] += g->w[e];
+}
+
+/* The next graph from the last. */
+static int gs4i_coarsen_graph(gs4i_solver *s)
+{
+    gs4i_graph *g = &s->graph[s->graphs - 1], *up = &s->graph[s->graphs];
+    int32_t *first, *child, *place;
+    float *link;
+    int reds, blacks, i, j, e, pass;
+    if (gs4i_reserve(s, &s->labels, (6 * (size_t)g->n + 2) * sizeof(int32_t), 0) != GS4_OK) return GS4_ERROR_MEMORY;
+    first = (int32_t *)s->labels.data; child = first + g->n + 2; place = child + g->n;
+    gs4i_join_nodes(g, first, &reds, &blacks);
+    link = (float *)(place + g->n);
+    gs4i_find_links(g, link);
+    if (gs4i_reserve_nodes(s, up, reds + blacks, reds) != GS4_OK) return GS4_ERROR_MEMORY;
+    memset(first, 0, ((size_t)up->n + 2) * sizeof *first);
+    for (i = 0; i < g->n; i++) if (g->parent[i] >= 0) {
+        up->air[g->parent[i]] += 0.75f * g->air[i]; up->mass[g->parent[i]] += g->mass[i];
+        up->block[g->parent[i]] = (g->block[i] & ~GS4I_LOWEST_BITS) >> 1;
+        first[g->parent[i] + 2]++;
+    }
+    for (i = 0; i < up->n; i++) first[i + 2] += first[i + 1];
+    for (i = 0; i < g->n; i++) if (g->parent[i] >= 0) child[first[g->parent[i] + 1]++] = i;
+    for (pass = 0; pass < 2; pass++) {                      /* count edges, then fill them in */
+        int32_t next = 0;
+        for (i = 0; i < up->n; i++) place[i] = -1;
+        for (i = 0; i < up->n; i++) {
+            const int32_t begin = next;
+            for (j = first[i]; j < first[i + 1]; j++) for (e = g->start[child[j]]; e < g->start[child[j] + 1]; e++) {
+                const int32_t to = g->parent[g->to[e]];
+                const int axis = gs4i_axis(g->block[child[j]], g->block[g->to[e]]);
+                if (to == i) continue;
+                if (place[to] < begin) { place[to] = next++; if (pass) { up->to[place[to]] = to; up->w[place[to]] = 0; } }
+                if (pass) up->w[place[to]] += gs4i_series(g->w[e], link[3 * child[j] + axis], link[3 * g->to[e] + axis]);
+            }
+            if (!pass) up->start[i + 1] = next - begin;
+        }
+        if (!pass && gs4i_reserve_edges(s, up) != GS4_OK) return GS4_ERROR_MEMORY;
+    }
+    gs4i_finish_graph(up);
+    s->graphs++;
+    return GS4_OK;
+}
+
+/* Cholesky of the last graph; a pivot below 1e-6 of its diagonal belongs to a pocket without anything to hold it, and is skipped. */
+static int gs4i_factor(gs4i_solver *s)
+{
+    const gs4i_graph *g = &s->graph[s->graphs - 1];
+    const size_t n = (size_t)g->n;
+    double *L;
+    size_t i, j, k;
+    int e;
+    if (gs4i_reserve(s, &s->square, n * n * sizeof(double), 1) != GS4_OK) return GS4_ERROR_MEMORY;
+    s->matrix = L = (double *)s->square.data;
+    for (i = 0; i < n; i++) {
+        L[i * n + i] = (double)g->diagonal[i];
+        for (e = g->start[i]; e < g->start[i + 1]; e++) if ((size_t)g->to[e] < i) L[i * n + (size_t)g->to[e]] = -(double)g->w[e];
+    }
+    for (i = 0; i < n; i++) {
+        for (j = 0; j <= i; j++) {
+            double sum = L[i * n + j];
+            for (k = 0; k < j; k++) sum -= L[i * n + k] * L[j * n + k];
+            if (j < i) L[i * n + j] = L[j * n + j] > 0 ? sum / L[j * n + j] : 0;
+            else L[i * n + i] = sum > 1e-6 * (double)g->diagonal[i] ? sqrt(sum) : 0;
+        }
+    }
+    return GS4_OK;
+}
+
+/* --- setup: closed pockets ----------------------------------------------------------------------------------------- */
+
+/* Runs of liquid cells joined by faces that conduct; `pocket` is first a place in the list, and -1 - it where air or a diagonal
+ * holds the run. */
+static int gs4i_list_runs(gs4i_setup *u, gs4i_cells *run)
+{
+    const gs4i_solver *s = u->s;
+    gs4i_rows q;
+    int i, j, k, f, count = 0;
+    for (k = 0; k < s->level[0].n[2]; k++) for (j = 0; j < s->level[0].n[1]; j++) {
+        int open = 0;
+        gs4i_open_row(&q, s, u->d, j, k);
+        for (i = 0; i < s->level[0].n[0]; i++) {
+            if (!(q.kind[i] & GS4I_IS_LIQUID)) { open = 0; continue; }
+            if (open && !(gs4i_face_of(&q, i, 0) > 0)) open = 0;
+            if (!open && run) { run[count].row = k * s->level[0].n[1] + j; run[count].begin = i; run[count].pocket = count; run[count].sum = 0; }
+            if (!open) count++;
+            open = 1;
+            if (!run) continue;
+            run[count - 1].end = i + 1;
+            if (run[count - 1].sum > 0) continue;
+            if (q.diagonal && q.diagonal[i] > 0) run[count - 1].sum = 1;
+            for (f = 0; f < 6; f++)
+                if (!(q.kind[i + q.beside[f]] & GS4I_IS_LIQUID) && gs4i_face_of(&q, i, f) > 0) run[count - 1].sum = 1;
+        }
+    }
+    return count;
+}
+
+static int32_t gs4i_root(gs4i_cells *run, int32_t a)
+{
+    while (run[a].pocket != a) a = run[a].pocket = run[run[a].pocket].pocket;
+    return a;
+}
+
+/* Joins run a with those of the row before it along axis f / 2; `b` is the first that may touch it, and moves on. */
+static void gs4i_join_runs(gs4i_setup *u, gs4i_cells *run, int32_t a, int32_t *b, int row, int f)
+{
+    const int ny = u->s->level[0].n[1];
+    gs4i_rows q;
+    int32_t o;
+    int i;
+    while (*b < a && (run[*b].row < row || (run[*b].row == row && run[*b].end <= run[a].begin))) (*b)++;
+    gs4i_open_row(&q, u->s, u->d, run[a].row % ny, run[a].row / ny);
+    for (o = *b; o < a && run[o].row == row && run[o].begin < run[a].end; o++) {
+        const int begin = run[o].begin > run[a].begin ? run[o].begin : run[a].begin, end = run[o].end < run[a].end ? run[o].end : run[a].end;
+        for (i = begin; i < end && !(gs4i_face_of(&q, i, f) > 0); i++) {}
+        if (i < end) {
+            const int32_t r = gs4i_root(run, a), t = gs4i_root(run, o), low = r < t ? r : t, high = r < t ? t : r;
+            run[high].pocket = low;
+            if (run[high].sum > 0) run[low].sum = 1;
+        }
+    }
+}
+
+/* Which runs are in pockets that nothing holds: there the mean of x is free, and that of the right-hand side must vanish. */
+static int gs4i_find_pockets(gs4i_setup *u)
+{
+    gs4i_solver *s = u->s;
+    const int ny = s->level[0].n[1];
+    int count = gs4i_list_runs(u, NULL), kept = 0;
+    int32_t a, y = 0, z = 0;
+    gs4i_cells *run;
+    if (gs4i_reserve(s, &s->cells, (size_t)count * sizeof *run, 0) != GS4_OK) return GS4_ERROR_MEMORY;
+    s->runs = run = (gs4i_cells *)s->cells.data;
+    gs4i_list_runs(u, run);
+    for (a = 0; a < count; a++) {
+        if (run[a].row % ny) gs4i_join_runs(u, run, a, &y, run[a].row - 1, 2);
+        if (run[a].row >= ny) gs4i_join_runs(u, run, a, &z, run[a].row - ny, 4);
+    }
+    s->pockets = 0;
+    for (a = 0; a < count; a++) {
+        const int32_t r = gs4i_root(run, a);
+        if (r == a) { if (!(run[a].sum > 0)) s->pockets++; }
+        run[a].pocket = r;
+    }
+    if (gs4i_reserve(s, &s->labels, (size_t)(s->pockets ? 2 * s->pockets : 1) * sizeof(double), 1) != GS4_OK) return GS4_ERROR_MEMORY;
+    s->pocket = (double *)s->labels.data;
+    s->pockets = 0;
+    for (a = 0; a < count; a++) {                           /* a root comes before its runs; its `begin` of -1 - pocket would be lost */
+        if (run[a].pocket == a && !(run[a].sum > 0)) run[a].sum = -1 - s->pockets++;
+    }
+    for (a = 0; a < count; a++) if (run[run[a].pocket].sum < 0 && run[a].pocket != a) run[a].sum = run[run[a].pocket].sum; else if (run[a].pocket != a) run[a].sum = 1;
+    for (a = 0; a < count; a++) if (run[a].sum < 0) {
+        run[kept] = run[a]; run[kept].pocket = (int32_t)(-1 - run[a].sum);
+        s->pocket[2 * run[kept].pocket + 1] += run[kept].end - run[kept].begin;
+        kept++;
+    }
+    s->run_count = kept;
+    return GS4_OK;
+}
+
+/* Everything that depends on the matrix. The solver keeps nothing of `d`, and its memory from setup to setup. */
+static int gs4i_solver_setup(gs4i_solver *s, const gs4_poisson_desc *d, int slabs)
+{
+    gs4i_setup u;
+    int l;
+    memset(&u, 0, sizeof u);
+    u.s = s; u.d = d;
+    s->graphs = 0; s->fault = NULL;
+    if (gs4i_take(&u) != GS4_OK) return s->fault ? GS4_ERROR_ARGUMENT : GS4_ERROR_MEMORY;
+    gs4i_parallel_for(s->tasks, s->level[1].n[2], gs4i_build_planes, &u);
+    gs4i_parallel_for(s->tasks, s->level[1].n[2], gs4i_build_inverse, &u);
+    for (l = 0; l < 2; l++) gs4i_cut(s, l, slabs < 1 ? 1 : slabs > GS4I_SLABS ? GS4I_SLABS : slabs);
+    if (gs4i_build_groups(&u) != GS4_OK) return GS4_ERROR_MEMORY;
+    while (s->graph[s->graphs - 1].n > GS4I_DIRECT) if (gs4i_coarsen_graph(s) != GS4_OK) return GS4_ERROR_MEMORY;
+    if (gs4i_factor(s) != GS4_OK) return GS4_ERROR_MEMORY;
+    return gs4i_find_pockets(&u);
+}
+
+static void gs4i_solver_free(gs4i_solver *s)
+{
+    gs4i_scratch *const parts[6] = { &s->grid, &s->kinds, &s->planes, &s->cells, &s->labels, &s->square };
+    int i;
+    for (i = 0; i < 6; i++) gs4i_release(s->memory, parts[i]);
+    for (i = 0; i < GS4I_GRAPHS; i++) { gs4i_release(s->memory, &s->graph[i].nodes); gs4i_release(s->memory, &s->graph[i].edges); }
+}
+
+/* --- solving ------------------------------------------------------------------------------------------------------------- */
+
+typedef struct gs4i_given { gs4i_solver *s; const gs4_real *rhs; gs4_real *x; int guess; } gs4i_given;
+
+/* Largest right-hand side in liquid, x in air and x in liquid; infinity where one is not finite. */
+static void gs4i_see_given(int k, void *context)
+{
+    const gs4i_given *v = (const gs4i_given *)context;
+    const gs4i_solver *s = v->s;
+    const int *n = s->level[0].n;
+    double b = 0, air = 0, x = 0;
+    int i, j;
+    for (j = 0; j < n[1]; j++) {
+        const size_t row = ((size_t)k * (size_t)n[1] + (size_t)j) * (size_t)n[0];
+        const uint8_t *kind = gs4i_kinds_of(s, j, k);
+        for (i = 0; i < n[0]; i++) {
+            const double rhs = kind[i] & GS4I_IS_LIQUID ? fabs((double)v->rhs[row + (size_t)i]) : 0;
+            const double value = kind[i] & GS4I_IS_OPEN ? fabs((double)v->x[row + (size_t)i]) : 0;
+            if (!(rhs <= b)) b = rhs <= DBL_MAX ? rhs : HUGE_VAL;
+            if (kind[i] & GS4I_IS_LIQUID) { if (!(value <= x)) x = value <= DBL_MAX ? value : HUGE_VAL; }
+            else if (!(value <= air)) air = value <= DBL_MAX ? value : HUGE_VAL;
+        }
+    }
+    s->given[3 * k] = b; s->given[3 * k + 1] = air; s->given[3 * k + 2] = x;
+}
+
+/* Right-hand side into r, x into x: given values and, where `guess`, the guess; the rest 0. */
+static void gs4i_load_plane(int k, void *context)
+{
+    const gs4i_given *v = (const gs4i_given *)context;
+    const gs4i_solver *s = v->s;
+    const gs4i_masked *g = &s->level[0];
+    const double b = s->rhs_unit;
+    int i, j;
+    for (j = 0; j < g->n[1]; j++) {
+        const size_t row = ((size_t)k * (size_t)g->n[1] + (size_t)j) * (size_t)g->n[0];
+        const uint8_t *kind = gs4i_kinds_of(s, j, k);
+        const size_t at = gs4i_row_of(g, j, k);
+        for (i = 0; i < g->n[0]; i++) {
+            const int c = (i + j + k) & 1;
+            const uint8_t is = kind[i];
+            g->r[c][at + (size_t)(i / 2)] = is & GS4I_IS_LIQUID ? (double)v->rhs[row + (size_t)i] * b : 0;
+            if (v->guess >= 0)
+                s->x[c][at + (size_t)(i / 2)] = is == GS4I_IS_OPEN || (is && v->guess) ? (double)v->x[row + (size_t)i] * s->x_unit : 0;
+        }
+    }
+}
+
+static void gs4i_store_plane(int k, void *context)
+{
+    const gs4i_given *v = (const gs4i_given *)context;
+    const gs4i_solver *s = v->s;
+    const gs4i_masked *g = &s->level[0];
+    const double unit = 1 / s->x_unit;
+    int i, j;
+    for (j = 0; j < g->n[1]; j++) {
+        const uint8_t *kind = gs4i_kinds_of(s, j, k);
+        gs4_real *x = v->x + ((size_t)k * (size_t)g->n[1] + (size_t)j) * (size_t)g->n[0];
+        const size_t at = gs4i_row_of(g, j, k);
+        for (i = 0; i < g->n[0]; i++)
+            if (kind[i] & GS4I_IS_LIQUID) x[i] = (gs4_real)(s->x[(i + j + k) & 1][at + (size_t)(i / 2)] * unit);
+    }
+}
+
+/* Takes the mean of v off in every closed pocket; gives the largest one. */
+static double gs4i_take_means(gs4i_solver *s, double **v)
+{
+    double largest = 0;
+    int a, i, p;
+    for (p = 0; p < s->pockets; p++) s->pocket[2 * p] = 0;
+    for (a = 0; a < s->run_count; a++) {
+        const gs4i_cells *q = &s->runs[a];
+        const int j = q->row % s->level[0].n[1], k = q->row / s->level[0].n[1];
+        const size_t at = gs4i_row_of(&s->level[0], j, k);
+        for (i = q->begin; i < q->end; i++) s->pocket[2 * q->pocket] += v[(i + j + k) & 1][at + (size_t)(i / 2)];
+    }
+    for (p = 0; p < s->pockets; p++) {
+        s->pocket[2 * p] /= s->pocket[2 * p + 1];
+        if (fabs(s->pocket[2 * p]) > largest) largest = fabs(s->pocket[2 * p]);
+    }
+    for (a = 0; a < s->run_count; a++) {
+        const gs4i_cells *q = &s->runs[a];
+        const int j = q->row % s->level[0].n[1], k = q->row / s->level[0].n[1];
+        const size_t at = gs4i_row_of(&s->level[0], j, k);
+        for (i = q->begin; i < q->end; i++) v[(i + j + k) & 1][at + (size_t)(i / 2)] -= s->pocket[2 * q->pocket];
+    }
+    return largest;
+}
+
+/* r = b - A x with x as given (guess 0, 1) or as it is (-1); gives |r|. */
+static double gs4i_true_residual(gs4i_solver *s, gs4i_given *v, int guess, double *removed)
+{
+    static const gs4i_stage_fn defect[] = { gs4i_stage_defect };
+    double mean;
+    v->guess = guess;
+    gs4i_parallel_for(s->tasks, s->level[0].n[2], gs4i_load_plane, v);
+    mean = gs4i_take_means(s, s->level[0].r);
+    if (removed) *removed = mean / s->rhs_unit;
+    gs4i_sweep_run(s, 0, defect, 1);
+    return sqrt(gs4i_total(s));
+}
+
+typedef enum gs4i_end { GS4I_CONVERGED, GS4I_LIMIT, GS4I_STAGNATED, GS4I_BROKE_DOWN } gs4i_end;
+
+/* Conjugate gradients from r as it is until |r| <= goal; `norm` is |r| before and after. */
+static gs4i_end gs4i_iterate(gs4i_solver *s, double goal, int limit, int diagonal, double *norm, int *iterations)
+{
+    static const gs4i_stage_fn jacobi[] = { gs4i_stage_jacobi, gs4i_stage_dot }, direct[] = { gs4i_stage_direct, gs4i_stage_curvature };
+    static const gs4i_stage_fn update[] = { gs4i_stage_update };
+    const int patience = diagonal ? 200 : 10;
+    double last = 0, least = *norm, look = *norm;
+    int i;
+    for (i = 0; *norm > goal; i++) {
+        double rz, curvature;
+        if (*iterations >= limit) return GS4I_LIMIT;
+        if (i && i % patience == 0) { if (least > 0.9 * look) return GS4I_STAGNATED; look = least; }
+        if (diagonal) { gs4i_sweep_run(s, 0, jacobi, 2); rz = gs4i_total(s); } else rz = gs4i_cycle(s);
+        if (!(rz > 0 && rz <= DBL_MAX)) return GS4I_BROKE_DOWN;
+        s->beta = i ? (float)(rz / last) : 0;
+        last = rz;
+        gs4i_sweep_run(s, 0, direct, 2);
+        curvature = gs4i_total(s);
+        if (!(curvature > 0 && curvature <= DBL_MAX)) return GS4I_BROKE_DOWN;
+        s->alpha = rz / curvature;
+        gs4i_sweep_run(s, 0, update, 1);
+        *norm = sqrt(gs4i_total(s));
+        ++*iterations;
+        if (!(*norm <= DBL_MAX)) return GS4I_BROKE_DOWN;
+        if (*norm < least) least = *norm;
+    }
+    return GS4I_CONVERGED;
+}
+
+/* Scales, and |b| with what flows in from the air. 0: nothing to solve for. */
+static int gs4i_begin(gs4i_solver *s, gs4i_given *v, double *norm, int *guess, double *removed)
+{
+    double most[3] = { 0, 0, 0 }, b;
+    int k, i, exponent = 0;
+    gs4i_parallel_for(s->tasks, s->level[0].n[2], gs4i_see_given, v);
+    for (k = 0; k < s->level[0].n[2]; k++) for (i = 0; i < 3; i++) if (s->given[3 * k + i] > most[i]) most[i] = s->given[3 * k + i];
+    if (!(most[0] < (double)GS4I_HUGE)) return gs4i_fault(s, "the largest |rhs[]| in the liquid is ", most[0], "; all must be finite and not absurdly large");
+    if (!(most[1] < (double)GS4I_HUGE && most[2] < (double)GS4I_HUGE)) return gs4i_fault(s, "the largest |x[]| in liquid and air is ", most[1] > most[2] ? most[1] : most[2], "; all must be finite and not absurdly large");
+    b = most[0] * s->mass_unit > most[1] ? most[0] * s->mass_unit : most[1];
+    frexp(b, &exponent);
+    s->x_unit = ldexp(1, -exponent); s->rhs_unit = s->mass_unit * s->x_unit;
+    *guess = most[2] > 0;
+    *norm = gs4i_true_residual(s, v, 0, removed);
+    if (*norm <= 1e-13 * most[0] * s->rhs_unit * sqrt((double)s->unknowns)) *norm = 0;
+    return GS4_OK;
+}
+
+/* What a breakdown may have left that is not a number. */
+static void gs4i_clear_directions(gs4i_solver *s)
+{
+    int c;
+    for (c = 0; c < 2; c++) {
+        gs4i_clear(s, s->p[c], s->level[0].count * sizeof(float));
+        gs4i_clear(s, s->level[0].z[c], s->level[0].count * sizeof(float));
+        gs4i_clear(s, s->level[1].z[c], s->level[1].count * sizeof(float));
+    }
+}
+
+/* x: guess in the liquid and values in the air; out: the solution in the liquid, of mean 0 in closed pockets. */
+static int gs4i_solver_solve(gs4i_solver *s, const gs4_real *rhs, gs4_real *x, double tolerance, int limit, gs4_solve_stats *stats)
+{
+    gs4i_given v;
+    static const char *const sentence[4][2] = {
+        { "", "" }, { "the residual is ", " of the right-hand side after max_iterations; more of them, or a larger tolerance, would do" },
+        { "the residual stays at ", " of the right-hand side; a larger tolerance would do" },
+        { "the iteration broke down, twice; the residual is ", " of the right-hand side; less contrast of coefficient and diagonal would do" } };
+    gs4i_end end = GS4I_CONVERGED;
+    double size, norm, before = HUGE_VAL;
+    int guess, diagonal = 0, iterations = 0;
+    s->fault = NULL;
+    v.s = s; v.rhs = rhs; v.x = x; v.guess = 0;
+    if (gs4i_begin(s, &v, &size, &guess, &stats->removed_mean) != GS4_OK) return GS4_ERROR_ARGUMENT;
+    stats->pockets = s->pockets;
+    norm = size;
+    if (guess && size > 0) norm = gs4i_true_residual(s, &v, 1, NULL);
+    while (norm > tolerance * size) {                       /* until the true residual agrees */
+        if (norm > 0.9 * before) { end = GS4I_STAGNATED; break; }
+        before = norm;
+        end = gs4i_iterate(s, tolerance * size, limit, diagonal, &norm, &iterations);
+        norm = gs4i_true_residual(s, &v, -1, NULL);
+        if (end == GS4I_BROKE_DOWN && !diagonal) { diagonal = 1; before = HUGE_VAL; continue; }
+        if (end != GS4I_CONVERGED) break;
+    }
+    gs4i_take_means(s, s->x);
+    gs4i_parallel_for(s->tasks, s->level[0].n[2], gs4i_store_plane, &v);
+    stats->iterations = iterations;
+    stats->residual = size > 0 ? norm / size : 0;
+    if (norm <= tolerance * size) return GS4_OK;
+    s->fault = sentence[end][0]; s->accepted = sentence[end][1];
+    return GS4_ERROR_NOT_CONVERGED;
 }
 
 /* ==== [[kernel]] quadratic B-splines on 27 nodes =================================================== *
@@ -6002,20 +7620,143 @@ GS4_API int gs4_material_preset(const char *name, gs4_material *material)
 #pragma GCC pop_options
 #endif
 
+/* --- the elliptic solver by itself ------------------------------------------------------------------------ */
+
+struct gs4_poisson {
+    gs4i_memory memory; gs4i_tasks tasks;
+    gs4_poisson_desc desc;
+    gs4i_solver solver;
+    double setup_seconds;
+};
+
+static double gs4i_poisson_now(const gs4_poisson *p) { return p->desc.now ? p->desc.now(p->desc.now_user) : 0; }
+
+/* All but the arrays' contents; fills in the defaults. */
+static int gs4i_check_poisson(gs4_sim *fake, gs4_poisson_desc *d)
+{
+    static const char *const cells[3] = { "cells[0] is ", "cells[1] is ", "cells[2] is " };
+    int a;
+    for (a = 0; a < 3; a++)
+        if (d->cells[a] < 1 || d->cells[a] > 1 << 21) return gs4i_fail_value(fake, GS4_ERROR_ARGUMENT, cells[a], d->cells[a], "; it must be from 1 to 2097152");
+    if ((double)d->cells[1] * d->cells[2] > INT32_MAX || (double)d->cells[0] * d->cells[1] * d->cells[2] > 16.0 * INT32_MAX)
+        return gs4i_bad_argument(fake, "cells: more than 2^31 rows or 2^35 cells in all");
+    GS4I_TRY(gs4i_check(fake, "cell_size", d->cell_size, GS4I_POSITIVE));
+    if (d->cell_size < GS4I_C(1e-9) || d->cell_size > GS4I_C(1e9))
+        return gs4i_fail_value(fake, GS4_ERROR_ARGUMENT, "cell_size is ", (double)d->cell_size, "; it must be from 1e-9 to 1e9");
+    if (!d->kind) return gs4i_bad_argument(fake, "kind is NULL; it must be an array of gs4_cell");
+    GS4I_TRY(gs4i_check(fake, "tolerance", d->tolerance, GS4I_FRACTION));
+    if (d->max_iterations < 0) return gs4i_fail_value(fake, GS4_ERROR_ARGUMENT, "max_iterations is ", d->max_iterations, "; it must be 0 or above");
+    if (d->threads < 0 || d->threads > 1024) return gs4i_fail_value(fake, GS4_ERROR_ARGUMENT, "threads is ", d->threads, "; it must be from 0 to 1024");
+#ifndef GS4_PTHREADS
+    if (d->threads > 1 && !d->parallel_for)
+        return gs4i_fail_value(fake, GS4_ERROR_ARGUMENT, "threads is ", d->threads, "; more than 1 needs GS4_PTHREADS defined with the implementation, or parallel_for");
+#endif
+    if (!d->allocator.alloc_fn != !d->allocator.free_fn) return gs4i_bad_argument(fake, "allocator: both functions or neither");
+    if (d->threads == 0) d->threads = 1;
+    if (d->tolerance == 0) d->tolerance = sizeof(gs4_real) == 8 ? GS4I_C(1e-6) : GS4I_C(1e-4);
+    if (d->max_iterations == 0) d->max_iterations = 200;
+    return GS4_OK;
+}
+
+static int gs4i_init_poisson(gs4_sim *fake, gs4_poisson *p)
+{
+    const gs4_poisson_desc *d = &p->desc;
+    const double start = gs4i_poisson_now(p);
+    int r;
+    p->tasks.parallel_for = d->parallel_for; p->tasks.user = d->parallel_user;
+    p->solver.memory = &p->memory; p->solver.tasks = &p->tasks;
+#ifdef GS4_PTHREADS
+    if (d->threads > 1 && !d->parallel_for) {
+        p->tasks.pool = gs4i_pool_create(&p->memory, d->threads - 1);
+        if (!p->tasks.pool) return gs4i_fail(fake, GS4_ERROR_MEMORY, "the threads could not be started");
+    }
+#endif
+    r = gs4i_solver_setup(&p->solver, d, d->threads > 1 ? 2 * d->threads : d->parallel_for ? 8 : 1);
+    p->setup_seconds = gs4i_poisson_now(p) - start;
+    p->desc.kind = NULL; p->desc.diagonal = p->desc.coefficient[0] = p->desc.coefficient[1] = p->desc.coefficient[2] = NULL;
+    if (r == GS4_ERROR_MEMORY) return gs4i_fail_memory(fake);
+    return r == GS4_OK ? r : gs4i_fail_value(fake, r, p->solver.fault, p->solver.fault_value, p->solver.accepted);
+}
+
+GS4_API int gs4_poisson_create(const gs4_poisson_desc *desc, gs4_poisson **out)
+{
+    gs4_sim fake;
+    gs4_poisson *p;
+    gs4i_memory memory;
+    int result;
+    memset(&fake, 0, sizeof fake); memset(&memory, 0, sizeof memory);
+    if (out) *out = NULL;
+    if (!desc || !out) return gs4i_say(&fake, gs4i_bad_argument(&fake, "gs4_poisson_create needs a description and a place for the solver"));
+    gs4_poisson_desc d = *desc;
+    result = gs4i_check_poisson(&fake, &d);
+    if (result != GS4_OK) return gs4i_say(&fake, result);
+    memory.hook = d.allocator;
+    if (!memory.hook.alloc_fn) { memory.hook.alloc_fn = gs4i_default_alloc; memory.hook.free_fn = gs4i_default_free; }
+    p = (gs4_poisson *)gs4i_alloc(&memory, 1, sizeof *p);
+    if (!p) return gs4i_say(&fake, gs4i_fail_memory(&fake));
+    p->memory = memory; p->desc = d;
+    result = gs4i_init_poisson(&fake, p);
+    if (result == GS4_OK) { *out = p; return GS4_OK; }
+    gs4_poisson_destroy(p);
+    return gs4i_say(&fake, result);
+}
+
+GS4_API int gs4_poisson_solve(gs4_poisson *p, const gs4_real *rhs, gs4_real *x, gs4_solve_stats *stats)
+{
+    gs4_sim fake;
+    gs4_solve_stats local;
+    double start;
+    int r;
+    memset(&fake, 0, sizeof fake); memset(&local, 0, sizeof local);
+    if (stats) *stats = local;
+    if (!p || !rhs || !x) return gs4i_say(&fake, gs4i_bad_argument(&fake, "gs4_poisson_solve needs a solver, rhs and x"));
+    start = gs4i_poisson_now(p);
+    r = gs4i_solver_solve(&p->solver, rhs, x, (double)p->desc.tolerance, p->desc.max_iterations, &local);
+    local.setup_seconds = p->setup_seconds; local.solve_seconds = gs4i_poisson_now(p) - start;
+    local.memory_bytes = p->memory.bytes;
+    if (stats) *stats = local;
+    if (r == GS4_ERROR_ARGUMENT) return gs4i_say(&fake, gs4i_fail_value(&fake, r, p->solver.fault, p->solver.fault_value, p->solver.accepted));
+    if (r != GS4_OK) return gs4i_say(&fake, gs4i_fail_value(&fake, r, p->solver.fault, local.residual, p->solver.accepted));
+    return r;
+}
+
+GS4_API void gs4_poisson_destroy(gs4_poisson *p)
+{
+    gs4i_memory memory;
+    if (!p) return;
+    gs4i_solver_free(&p->solver);
+#ifdef GS4_PTHREADS
+    gs4i_pool_destroy(&p->memory, p->tasks.pool, p->desc.threads - 1);
+#endif
+    memory = p->memory;
+    gs4i_free(&memory, p, 1, sizeof *p);
+}
+
+#undef GS4I_AROUND
 #undef GS4I_BATCH_LOOP
 #undef GS4I_BLOCK_NODES
 #undef GS4I_C
 #undef GS4I_CHOOSE
 #undef GS4I_CHOOSE_INT
+#undef GS4I_CHUNK
+#undef GS4I_CONDUCTS
 #undef GS4I_DESTINATION
 #undef GS4I_DIFFERENCE
+#undef GS4I_DIRECT
 #undef GS4I_EACH
+#undef GS4I_EACH_ROW
 #undef GS4I_EPSILON
 #undef GS4I_EULER_SOUND_EIGENVALUE
 #undef GS4I_EULER_VISCOUS_EIGENVALUE
+#undef GS4I_FACE
+#undef GS4I_FACES
+#undef GS4I_FACES_OF
+#undef GS4I_GRAPHS
 #undef GS4I_GREATER
 #undef GS4I_HUGE
 #undef GS4I_INLINE
+#undef GS4I_IS_LIQUID
+#undef GS4I_IS_OPEN
 #undef GS4I_J_HIGH
 #undef GS4I_J_LOW
 #undef GS4I_LANE
@@ -6023,10 +7764,15 @@ GS4_API int gs4_material_preset(const char *name, gs4_material *material)
 #undef GS4I_LEADER
 #undef GS4I_LOAD
 #undef GS4I_LONG_ROWS
+#undef GS4I_LOWEST_BITS
+#undef GS4I_LOW_FACES
+#undef GS4I_LOW_FACES_OF
 #undef GS4I_MAD
+#undef GS4I_MASS
 #undef GS4I_MAX_PARTICLES
 #undef GS4I_MAX_STEPS
 #undef GS4I_MUL
+#undef GS4I_NEIGHBOURS
 #undef GS4I_NODE_REALS
 #undef GS4I_NO_HEAT
 #undef GS4I_NTH
@@ -6043,6 +7789,7 @@ GS4_API int gs4_material_preset(const char *name, gs4_material *material)
 #undef GS4I_ROW_STORE
 #undef GS4I_ROW_SUM
 #undef GS4I_SEEN
+#undef GS4I_SLABS
 #undef GS4I_SOUND_EIGENVALUE
 #undef GS4I_SPLAT_MAD
 #undef GS4I_SPLAT_MUL
@@ -6051,17 +7798,24 @@ GS4_API int gs4_material_preset(const char *name, gs4_material *material)
 #undef GS4I_SQRT
 #undef GS4I_STICKY_REACH
 #undef GS4I_STORE
+#undef GS4I_STRIP
+#undef GS4I_STRIPS
 #undef GS4I_SUM
 #undef GS4I_THREAD_LOCAL
 #undef GS4I_TILE
 #undef GS4I_TILE_REALS
+#undef GS4I_TIMES_UNIFORM
+#undef GS4I_TIMES_WEIGHTED
 #undef GS4I_TINY
 #undef GS4I_TO_REAL
 #undef GS4I_TRUNCATE
 #undef GS4I_TRY
+#undef GS4I_UNIFORM_MATRIX
 #undef GS4I_VECTORS
 #undef GS4I_VISCOUS_EIGENVALUE
 #undef GS4I_VISITED
+#undef GS4I_WEIGHTED_MATRIX
+#undef GS4I_WEIGHTS
 #undef GS4I_WIDE_MAX
 #undef GS4I_WIDE_MIN
 #undef GS4I_WIDTH

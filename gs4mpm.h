@@ -907,7 +907,7 @@ typedef struct gs4i_masked {
     int32_t *span;                      /* per row: first and last strip with liquid, in cells */
     float *z[2], *inverse[2];           /* correction; of the diagonal, 0 where there is no unknown */
     float *w[3][2], *w_low[3][2];       /* coefficient of the face towards +x +y +z, and what float leaves of it; NULL: all equal */
-    float *mass[2], *mass_low[2];       /* h^2 d; level 1: with the faces to the air; -1 in level 0 where w and no unknown */
+    float *mass[2], *mass_low[2];       /* h^2 d; level 1: with the faces to the air; level 0 where w: -1 without unknown */
     uint8_t *degree[2];                 /* where w is NULL: faces that conduct; 0 where there is no unknown */
     double *r[2];                       /* residual */
 } gs4i_masked;
@@ -1002,7 +1002,7 @@ static void gs4i_residual_uniform(float *GS4I_RESTRICT out, const float *GS4I_RE
     int m, l;
     GS4I_STRIPS(m, l, n) {
         const float around = (left[l] + right[l]) + (south[l] + north[l]) + (below[l] + above[l]);
-        out[l] = ((float)r[l] - ((float)degree[l] + mass[l]) * z[l]) + (degree[l] ? around : 0);
+        out[l] = degree[l] ? ((float)r[l] - ((float)degree[l] + mass[l]) * z[l]) + around : 0;
     }
 }
 
@@ -1765,7 +1765,7 @@ static void gs4i_build_row(gs4i_solver *s, const gs4_poisson_desc *d, int j, int
             g->w[f][c][at] = (float)w[2 * f + 1];
             if (g->w_low[f][c]) g->w_low[f][c][at] = (float)(w[2 * f + 1] - (double)g->w[f][c][at]);
         }
-        if (g->mass[c]) g->mass[c][at] = liquid || s->uniform ? (float)mass : -1;
+        if (g->mass[c]) g->mass[c][at] = (liquid && sum > 0) || s->uniform ? (float)mass : -1;
         if (g->mass_low[c]) g->mass_low[c][at] = liquid ? (float)(mass - (double)(float)mass) : 0;
         if (!liquid) continue;
         for (f = 0; f < 3; f++)

@@ -10,6 +10,7 @@
 #include "test_files.c"
 #include "test_stability.c"
 #include "test_stress.c"
+#include "test_poisson.c"
 
 int main(int count, char **values)
 {
@@ -34,6 +35,7 @@ int main(int count, char **values)
     run_errors();
     run_files();
     run_stress();
+    run_poisson();
     RUN(test_stability);
     RUN(test_extremes);
     RUN(test_order_as_printed);

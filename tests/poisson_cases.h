@@ -154,47 +154,93 @@ static poisson_case poisson_make(const char *name, int n)
     return p;
 }
 
-static size_t poisson_unknowns(const poisson_case *p)
-{
-    size_t i, n = 0;
-    for (i = 0; i < p->count; i++) n += p->kind[i] == GS4_CELL_LIQUID;
-    return n;
-}
-
-/* |rhs - A x| / |rhs with what flows in from the air| of any x, from the definition; the mean of rhs in the whole is taken off
- * where `closed`. The bound is what rounding x to gs4_real may add. */
-static double poisson_residual(const poisson_case *p, const gs4_real *x, int closed, double *bound)
+/* (A x)_i from the definition, with the x of the air; `diagonal` of A and sum |a_ij x_j| where asked for. */
+static double poisson_row(const poisson_case *p, const int i[3], const double *x, double *diagonal, double *size)
 {
     const int *n = p->desc.cells;
+    const size_t step[3] = { 1, (size_t)n[0], (size_t)n[0] * (size_t)n[1] };
+    const size_t at = (size_t)i[0] + (size_t)i[1] * step[1] + (size_t)i[2] * step[2];
     const double h2 = (double)p->desc.cell_size * (double)p->desc.cell_size;
-    double above = 0, below = 0, rounding = 0, mean = 0;
-    size_t at = 0;
-    int i[3], a, side;
-    for (at = 0; closed && at < p->count; at++) if (p->kind[at] == GS4_CELL_LIQUID) mean += (double)p->rhs[at];
-    mean /= (double)poisson_unknowns(p);
-    for (at = 0, i[2] = 0; i[2] < n[2]; i[2]++) for (i[1] = 0; i[1] < n[1]; i[1]++) for (i[0] = 0; i[0] < n[0]; i[0]++, at++) {
-        double ax = 0, b = (double)p->rhs[at] - mean, size = 0;
-        if (p->kind[at] != GS4_CELL_LIQUID) continue;
-        if (p->diagonal) ax += (double)p->diagonal[at] * (double)x[at];
-        for (a = 0; a < 3; a++) for (side = 0; side < 2; side++) {
-            const int q = i[a] + (side ? 1 : -1);
-            size_t m[3], face = 0, other = 0;
-            double c = 1;
-            int d;
-            if (q < 0 || q >= n[a]) continue;
-            for (d = 2; d >= 0; d--) {
-                m[d] = (size_t)(n[d] + (d == a));
-                face = face * m[d] + (size_t)(i[d] + (d == a && side));
-                other = other * (size_t)n[d] + (size_t)(d == a ? q : i[d]);
-            }
-            if (p->kind[other] == GS4_CELL_SOLID) continue;
-            if (p->coefficient[a]) c = (double)p->coefficient[a][face];
-            ax += c * ((double)x[at] - (double)x[other]) / h2;
-            size += c * (fabs((double)x[at]) + fabs((double)x[other])) / h2;
-            if (p->kind[other] == GS4_CELL_AIR) b += c * (double)x[other] / h2, ax += c * (double)x[other] / h2;
-        }
-        above += (b - ax) * (b - ax); below += b * b; rounding += size * size;
+    double d = p->diagonal ? (double)p->diagonal[at] : 0, sum = d * x[at], all = fabs(sum);
+    int a, side;
+    for (a = 0; a < 3; a++) for (side = 0; side < 2; side++) {
+        const size_t other = side ? at + step[a] : at - step[a];
+        const size_t m0 = (size_t)(n[0] + (a == 0)), m1 = (size_t)(n[1] + (a == 1));
+        const size_t face = (size_t)(i[0] + (a == 0 && side)) + m0 * ((size_t)(i[1] + (a == 1 && side)) + m1 * (size_t)(i[2] + (a == 2 && side)));
+        double c;
+        if ((side ? i[a] + 1 >= n[a] : i[a] == 0) || p->kind[other] == GS4_CELL_SOLID) continue;
+        c = (p->coefficient[a] ? (double)p->coefficient[a][face] : 1) / h2;
+        d += c; sum += c * (x[at] - x[other]); all += c * (fabs(x[at]) + fabs(x[other]));
     }
+    if (diagonal) *diagonal = d;
+    if (size) *size = all;
+    return sum;
+}
+
+#define POISSON_EACH(p, i, at) for (at = 0, i[2] = 0; i[2] < (p)->desc.cells[2]; i[2]++) for (i[1] = 0; i[1] < (p)->desc.cells[1]; i[1]++) \
+    for (i[0] = 0; i[0] < (p)->desc.cells[0]; i[0]++, at++) if ((p)->kind[at] == GS4_CELL_LIQUID)
+
+/* Takes the mean of v off in every part of the liquid with neither air nor diagonal, by flooding; gives their number. */
+static int poisson_take_means(const poisson_case *p, double *v)
+{
+    const int *n = p->desc.cells;
+    const size_t step[3] = { 1, (size_t)n[0], (size_t)n[0] * (size_t)n[1] };
+    size_t *queue = (size_t *)malloc((p->count + 1) * sizeof *queue), start, head, tail;
+    char *seen = (char *)calloc(p->count + 1, 1);
+    int pockets = 0;
+    if (!queue || !seen) exit(3);
+    for (start = 0; start < p->count; start++) {
+        int held = 0, a, side;
+        double sum = 0;
+        if (seen[start] || p->kind[start] != GS4_CELL_LIQUID) continue;
+        queue[0] = start; seen[start] = 1;
+        for (head = 0, tail = 1; head < tail; head++) {
+            const size_t at = queue[head];
+            const size_t i[3] = { at % (size_t)n[0], at / step[1] % (size_t)n[1], at / step[2] };
+            held |= p->diagonal && p->diagonal[at] > 0;
+            sum += v[at];
+            for (a = 0; a < 3; a++) for (side = 0; side < 2; side++) {
+                const size_t other = side ? at + step[a] : at - step[a];
+                const size_t m0 = (size_t)(n[0] + (a == 0)), m1 = (size_t)(n[1] + (a == 1));
+                const size_t face = i[0] + (a == 0 && side) + m0 * (i[1] + (a == 1 && side) + m1 * (i[2] + (a == 2 && side)));
+                if (side ? i[a] + 1 >= (size_t)n[a] : i[a] == 0) continue;
+                if (p->kind[other] == GS4_CELL_SOLID || (p->coefficient[a] && !(p->coefficient[a][face] > 0))) continue;
+                if (p->kind[other] == GS4_CELL_AIR) { held = 1; continue; }
+                if (!seen[other]) { seen[other] = 1; queue[tail++] = other; }
+            }
+        }
+        if (held) continue;
+        pockets++;
+        for (head = 0; head < tail; head++) v[queue[head]] -= sum / (double)tail;
+    }
+    free(queue); free(seen);
+    return pockets;
+}
+
+static double *poisson_doubles(const gs4_real *v, size_t n)
+{
+    double *d = (double *)malloc((n + 1) * sizeof *d);
+    size_t i;
+    if (!d) exit(3);
+    for (i = 0; i < n; i++) d[i] = v ? (double)v[i] : 0;
+    return d;
+}
+
+/* |rhs - A x| / |rhs with what flows in from the air|, means of pockets taken off; `bound`: what rounding x to gs4_real may add. */
+static double poisson_residual(const poisson_case *p, const gs4_real *x, double *bound)
+{
+    double *v = poisson_doubles(x, p->count), *b = poisson_doubles(p->rhs, p->count), *air = poisson_doubles(x, p->count);
+    double above = 0, below = 0, rounding = 0;
+    size_t at;
+    int i[3];
+    poisson_take_means(p, b);
+    for (at = 0; at < p->count; at++) if (p->kind[at] == GS4_CELL_LIQUID) air[at] = 0;
+    POISSON_EACH(p, i, at) {
+        double size;
+        const double r = b[at] - poisson_row(p, i, v, NULL, &size), whole = b[at] - poisson_row(p, i, air, NULL, NULL);
+        above += r * r; below += whole * whole; rounding += size * size;
+    }
+    free(v); free(b); free(air);
     if (bound) *bound = below > 0 ? sqrt(rounding / below) * (sizeof(gs4_real) == 8 ? 2.3e-16 : 1.2e-7) : 0;
     return below > 0 ? sqrt(above / below) : sqrt(above);
 }

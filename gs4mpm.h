@@ -42,9 +42,11 @@
  *                                                                [[particles]] the store, and how it is sorted
  *                                                                [[liquid]]    pressure, viscosity, presets
  *                                                                [[viscoelastic]] non-local stress
+ *                                                                [[heat]]      temperature, melting, flux
  *                                                                [[boundary]]  walls by images, bodies by nodes
  *                                                                [[state]]     what a simulation is
  *                                                                [[transfer]]  particles to nodes and back
+ *                                                                [[conduction]] heat from node to node
  *                                                                [[step]]      one step: read gs4i_step first
  *                                                                [[files]]     frames and checkpoints
  *                                                                [[public]]    every value checked, then the work
@@ -2830,6 +2832,9 @@ GS4I_INLINE void gs4i_gather_plane(const gs4_real *at, const gs4i_stencils *s, i
  * particle; then the same in lanes. */
 typedef struct gs4i_gathered { gs4_real value[4 * GS4I_BATCH], dx[4 * GS4I_BATCH], dy[4 * GS4I_BATCH], dz[4 * GS4I_BATCH]; } gs4i_gathered;
 
+/* Forces of a batch on its way to the nodes: the columns of -V sigma, and m g; four numbers a particle. */
+typedef struct gs4i_forces { gs4_real x[4 * GS4I_BATCH], y[4 * GS4I_BATCH], z[4 * GS4I_BATCH], weight[4 * GS4I_BATCH]; } gs4i_forces;
+
 /* Particle n: value = sum_i w_i f_i, dx = sum_i dw_i/dx f_i, ...; wx and dx the spread weights and derivatives along x */
 GS4I_INLINE void gs4i_gather_local(const gs4_real *at, const gs4i_stencils *s, int n, const gs4i_row *wx, const gs4i_row *dx, gs4i_gathered *g)
 {
@@ -3227,7 +3232,10 @@ typedef struct gs4i_rule {
     gs4_real dt, alpha_m, alpha_f, gamma;
     gs4i_reach reach;                   /* ahead = alpha_f dt: from t_n to the stage */
     gs4_real s;                         /* alpha_f gamma dt / alpha_m: weight of the new rate at the stage */
+    gs4_real before;                    /* y** = y + before r: alpha_f dt - s, 0 for symplectic Euler */
     gs4_real decay, damped;             /* k = 1 / flip_decay_time, 1/s; 1 / (1 + s k) */
+    gs4_real mixing;                    /* 1/s: at most, of temperatures, see [[heat]] */
+    gs4_real inv_area;                  /* 1 / h^2 */
     gs4_real fast_decay;                /* what is added to k where the grid sees little: c0 / h */
     gs4_real inv_full;                  /* 1 / mass of a node in the midst of the lightest material */
     gs4_real inv_alpha_m, next_shift;
@@ -3268,12 +3276,15 @@ typedef struct gs4i_particles {
     gs4_real *rate;                     /* 4: dv/dt, dJ/dt; NULL for symplectic Euler */
     gs4_real *affine[3];                /* 4 each: column j of the velocity gradient, dv_i/dx_j; NULL for GS4 */
     gs4_real *elastic; int elastic_reals;   /* 12: non-local stress xx yy zz xy xz yz (Pa) and its rate; 6 for Euler; 0: the scene has none */
+    gs4_real *heat; int with_heat;      /* 4: temperature, liquid fraction, rate of enthalpy over heat capacity, the same sharpened, see [[heat]]; 0: the scene has none */
+    uint8_t *liquid;                    /* 1 while liquid; with heat */
+    gs4_real *flux, *flux_rate; int with_flux;  /* 4 each: non-local heat flux (W/m^2), 0, and its rate; 0: the scene has none */
     gs4i_half *lag;                     /* 4: v - shift a - dx/dt, 0, see S2; NULL for symplectic Euler */
     uint32_t *id; uint8_t *material;
     uint32_t *order;                    /* scratch: block, then destination of each particle */
 } gs4i_particles;
 
-enum { GS4I_ARRAYS = 11 };
+enum { GS4I_ARRAYS = 15 };
 typedef struct gs4i_array { void **data; size_t size; int wanted; } gs4i_array;
 
 /* The arrays of a store with the size of one element, largest first: for growing, sorting, hashing, saving. */
@@ -3288,9 +3299,15 @@ static void gs4i_particle_arrays(gs4i_particles *p, gs4i_array out[GS4I_ARRAYS])
     out[7].data = (void **)&p->id;       out[7].size = sizeof(uint32_t);
     out[8].data = (void **)&p->material; out[8].size = 1;
     out[9].data = (void **)&p->elastic;  out[9].size = (size_t)p->elastic_reals * sizeof(gs4_real);
-    out[10].data = (void **)&p->order;   out[10].size = sizeof(uint32_t);
+    out[10].data = (void **)&p->heat;    out[10].size = 4 * sizeof(gs4_real);
+    out[11].data = (void **)&p->flux;    out[11].size = 4 * sizeof(gs4_real);
+    out[12].data = (void **)&p->flux_rate; out[12].size = 4 * sizeof(gs4_real);
+    out[13].data = (void **)&p->liquid;  out[13].size = 1;
+    out[14].data = (void **)&p->order;   out[14].size = sizeof(uint32_t);
     for (i = 0; i < GS4I_ARRAYS; i++) out[i].wanted = p->with_rates ? i > 2 : i != 5 && i != 6;
     out[9].wanted = p->elastic_reals > 0;
+    out[10].wanted = out[13].wanted = p->with_heat;
+    out[11].wanted = out[12].wanted = p->with_flux;
 }
 
 static void gs4i_particles_free(gs4i_memory *m, gs4i_particles *p)
@@ -3539,7 +3556,9 @@ typedef struct gs4i_law {
     gs4_real viscosity, sound_speed, density;   /* viscosity: the local part, F_v mu */
     gs4_real local, temperature;        /* F_v; K, where the scene has no heat: that of the air */
     gs4_real modulus, inv_lambda, stretch, nu, alpha;   /* non-local: G0; 1 / lambda_b; 2 lambda_b / lambda_0s; 2 / Q; all 0: none */
-    int varies;                         /* with the shear rate: Cross-WLF, or by viscosity_fn */
+    gs4_real capacity, conductivity, flux_time, fourier;    /* c; k; tau; F_T, 1 where tau is 0 */
+    gs4_real melting, latent;           /* T_m, above every temperature where it cannot melt; L / c, K */
+    int varies;                         /* with the shear rate or the temperature: Cross-WLF, or by viscosity_fn */
     gs4_viscosity_fn viscosity_fn; void *viscosity_user;
     gs4_material is;                    /* as described */
 } gs4i_law;
@@ -3554,6 +3573,7 @@ GS4I_INLINE void gs4i_pressure(const gs4i_wide *tait, const gs4i_wide *J, gs4i_w
 /* What the particles of a batch need of their materials. */
 typedef struct gs4i_batch_laws {
     gs4i_lanes inv_density, tait, viscosity, sound_speed;
+    gs4i_lanes temperature;             /* that of the air where the scene has no heat; else see gs4i_stage_temperature */
     const gs4i_law *of[GS4I_BATCH];
     int callbacks;                      /* some of those seen so far have one */
 } gs4i_batch_laws;
@@ -3568,6 +3588,7 @@ GS4I_INLINE void gs4i_take_laws(const gs4i_law *laws, const uint8_t *material, i
         l->of[b] = law; l->callbacks |= law->varies;
         GS4I_NTH(l->inv_density, b) = law->inv_density; GS4I_NTH(l->tait, b) = law->tait;
         GS4I_NTH(l->viscosity, b) = law->viscosity; GS4I_NTH(l->sound_speed, b) = law->sound_speed;
+        GS4I_NTH(l->temperature, b) = law->temperature;
     }
 }
 
@@ -3576,23 +3597,25 @@ static int gs4i_is_default_cross_wlf(const gs4_material *m)
     return m->cross_wlf.a == 0 && m->cross_wlf.n == 0 && m->cross_wlf.d1 == 0 && m->cross_wlf.a1 == 0 && m->cross_wlf.t1 == 0 && m->cross_wlf.t2 == 0;
 }
 
-/* Cross-WLF, Pa s: mu = mu0 / (1 + a (mu0 rate)^n), mu0 = d1 exp(-a1 (T - t1) / (T - t2)). */
+/* Cross-WLF, Pa s: mu = mu0 / (1 + a (mu0 rate)^n), mu0 = d1 exp(-a1 (T - t1) / (T - t2)); absurdly large, which is refused,
+ * where mu0 is, and from t2 down, where the law ends: a liquid would be a glass there. */
 static gs4_real gs4i_cross_wlf(const gs4_material *m, gs4_real temperature, gs4_real shear_rate)
 {
     const double T = (double)temperature, n = (double)m->cross_wlf.n;
     const double mu0 = (double)m->cross_wlf.d1 * exp(-(double)m->cross_wlf.a1 * (T - (double)m->cross_wlf.t1) / (T - (double)m->cross_wlf.t2));
+    if (!(mu0 < (double)GS4I_HUGE) || (m->cross_wlf.a1 > 0 && temperature <= m->cross_wlf.t2)) return GS4I_HUGE;
     return GS4I_C(mu0 / (1 + (double)m->cross_wlf.a * pow(mu0 * (double)shear_rate, n)));
 }
 
-/* Viscosity (Pa s, in all) of particle n at the shear rate sqrt(2 D:D). */
-static gs4_real gs4i_viscosity_of(const gs4i_law *law, gs4i_gradient L, int n)
+/* Viscosity (Pa s, in all) of particle n at the temperature T and the shear rate sqrt(2 D:D). */
+static gs4_real gs4i_viscosity_of(const gs4i_law *law, gs4_real T, gs4i_gradient L, int n)
 {
     gs4_real sum = 0, rate;
     int i, j;
     for (j = 0; j < 3; j++) for (i = 0; i < 3; i++) { const gs4_real d = GS4I_NTH(L[i][j], n) + GS4I_NTH(L[j][i], n); sum += d * d; }
     rate = GS4I_SQRT(GS4I_C(0.5) * sum);
     if (!law->varies) return law->is.viscosity;
-    return law->viscosity_fn ? law->viscosity_fn(law->temperature, rate, law->viscosity_user) : gs4i_cross_wlf(&law->is, law->temperature, rate);
+    return law->viscosity_fn ? law->viscosity_fn(T, rate, law->viscosity_user) : gs4i_cross_wlf(&law->is, T, rate);
 }
 
 /* What follows from the material alone: Cross-WLF constants of the paper where none are given, and both parts of viscosity. */
@@ -3616,6 +3639,10 @@ static void gs4i_set_law(gs4i_law *l, gs4_real temperature)
     l->stretch = m->liquid == GS4_POM_POM ? 2 * m->relaxation_time / m->stretch_time : 0;
     l->nu = m->liquid == GS4_POM_POM ? 2 / m->arms : 0;
     l->alpha = m->liquid == GS4_POM_POM ? m->anisotropy : 0;
+    l->capacity = m->heat_capacity; l->conductivity = m->conductivity;
+    l->flux_time = m->flux_relaxation_time; l->fourier = l->flux_time > 0 ? m->fourier_fraction : 1;
+    l->melting = m->can_melt ? m->melting_temperature : 4 * GS4I_HUGE;
+    l->latent = m->latent_heat > 0 ? m->latent_heat / m->heat_capacity : 0;
 }
 
 /* Six numbers of a symmetric tensor: xx yy zz xy xz yz. */
@@ -3627,7 +3654,7 @@ GS4I_INLINE void gs4i_liquid_stress(const gs4i_batch_laws *l, const gs4i_wide *J
     int b;
     GS4I_BATCH_LOOP(b) mu[b] = l->viscosity[b];
     for (b = 0; b < GS4I_BATCH && l->callbacks; b++)
-        if (l->of[b]->varies) GS4I_NTH(mu, b) = l->of[b]->local * gs4i_viscosity_of(l->of[b], L, b);
+        if (l->of[b]->varies) GS4I_NTH(mu, b) = l->of[b]->local * gs4i_viscosity_of(l->of[b], GS4I_NTH_CONST(l->temperature, b), L, b);
     GS4I_BATCH_LOOP(b) {
         gs4i_wide p;
         gs4i_pressure(&l->tait[b], &J[b], &p);
@@ -3687,7 +3714,7 @@ static int gs4i_preset(const char *name, gs4_material *m)
 
 /* What the particles of a batch need of their materials. */
 typedef struct gs4i_elastic_laws {
-    gs4i_lanes modulus, inv_lambda, stretch /* 2 r; 0: f = 1 */, nu, alpha;
+    gs4i_lanes modulus, inv_lambda, stretch /* 2 r; 0: f = 1 */, nu, alpha, temperature;
     const gs4i_law *of[GS4I_BATCH];
     int pom_pom, varies;                /* some of those seen so far are, or do */
 } gs4i_elastic_laws;
@@ -3701,6 +3728,7 @@ static const int gs4i_place[3][3] = { { GS4I_XX, GS4I_XY, GS4I_XZ }, { GS4I_XY, 
 static void gs4i_take_elastic_laws(const gs4i_batch_laws *laws, gs4i_elastic_laws *l)
 {
     int n;
+    memcpy(l->temperature, laws->temperature, sizeof l->temperature);
     for (n = 0; n < GS4I_BATCH; n++) {
         const gs4i_law *law = laws->of[n];
         if (law == l->of[n]) continue;
@@ -3961,7 +3989,7 @@ static void gs4i_moduli(const gs4i_elastic_laws *l, gs4i_gradient L, gs4i_lanes 
     memcpy(G, l->modulus, sizeof l->modulus);
     for (n = 0; n < GS4I_BATCH && l->varies; n++) {
         const gs4i_law *law = l->of[n];
-        if (law->varies && law->inv_lambda > 0) GS4I_NTH(G, n) = (1 - law->local) * gs4i_viscosity_of(law, L, n) * law->inv_lambda;
+        if (law->varies && law->inv_lambda > 0) GS4I_NTH(G, n) = (1 - law->local) * gs4i_viscosity_of(law, GS4I_NTH_CONST(l->temperature, n), L, n) * law->inv_lambda;
     }
 }
 
@@ -4062,6 +4090,198 @@ static void gs4i_store_elastic(gs4_real *to, int reals, int n, gs4i_elastic *e)
     for (b = 0; b < n; b++)
         for (part = 0; 4 * part < reals; part++)
             memcpy(to + reals * b + 4 * part, four[part] + 4 * b, (reals == 6 && part ? 2 : 4) * sizeof *to);
+}
+
+/* ==== [[heat]] temperature, melting and heat flux of particles ====================================== *
+ *
+ *     rho c dT/dt + div q = tau : D + sources,   q = -F_T k grad T + q_NL,   q_NL + t (dq_NL/dt - L q_NL) = -(1 - F_T) k grad T
+ *
+ * What a particle holds is enthalpy, H/c = T + (L/c) fraction: as heat comes in T rises to T_m, stays there while the liquid
+ * fraction of a material with latent heat goes from 0 to 1, and rises again; back the same way. The phase follows with
+ * hysteresis: liquid once the fraction has reached 1, solid once it is 0 again. With L = 0 both switch at T_m.
+ * Temperature and flux evolve by rule 1 of the manual. With k_eff = k (F_T t + s) / (t + s) the stage on the nodes is
+ *
+ *     (m c)_i (T~_i - T**_i) / s = sum_p [w_ip V tau:D + grad w_ip . V q** t / (t + s)] + (div k_eff grad T~)_i     ([[conduction]])
+ *
+ * and a particle takes the rate r = sum_i w_ip R_i, R = (T~ - T**) / s, so that what nodes gain particles gain: heat is conserved.
+ * There and back again a rate is smoothed, (1 + h^2/4 div grad) R of R, which would leave an error of first order in dt in
+ * T~_i = sum_p w (T + alpha_f dt r)_p + s (R_i - r): so r is there what gives R back, the sharpened rate sum_i w_ip (1 - h^2/4 div grad) R_i. */
+
+/* What the grid cannot see of the temperature of particles fades at the rate GS4I_MIXING k / (rho c h^2), as conduction over less than a cell has it
+ * (with a relaxation time t, the non-local part at most at 1/t), and not in less than flip_decay_time. It is taken from T** itself, T**_p less the
+ * gathered T** sharpened, in a form that conserves heat; not sharpened it would cool what the grid does see. */
+#define GS4I_MIXING GS4I_C(4.0)
+
+typedef struct gs4i_heat_laws {
+    gs4i_lanes capacity, conductivity, flux_time, fourier, heating /* 1: by viscosity */;
+    const gs4i_law *of[GS4I_BATCH];
+    int melts;                          /* some of those seen so far do */
+} gs4i_heat_laws;
+
+/* Of one batch: temperature (K), fraction, rate of H/c and the same sharpened (K/s); non-local flux (W/m^2) and its rate. */
+typedef struct gs4i_heat { gs4i_lanes T, fraction, rate, sharp, q[4], q_rate[4]; } gs4i_heat;
+
+static void gs4i_take_heat_laws(const gs4i_batch_laws *laws, gs4i_heat_laws *l)
+{
+    int n;
+    for (n = 0; n < GS4I_BATCH; n++) {
+        const gs4i_law *law = laws->of[n];
+        if (law == l->of[n]) continue;
+        l->of[n] = law; l->melts |= law->is.can_melt;
+        GS4I_NTH(l->capacity, n) = law->capacity; GS4I_NTH(l->conductivity, n) = law->conductivity;
+        GS4I_NTH(l->flux_time, n) = law->flux_time; GS4I_NTH(l->fourier, n) = law->fourier;
+        GS4I_NTH(l->heating, n) = law->is.viscous_heating ? GS4I_C(1) : GS4I_C(0);
+    }
+}
+
+GS4I_INLINE void gs4i_load_heat(const gs4i_particles *p, size_t i, int n, gs4i_heat *h)
+{
+    gs4i_lanes own[4];
+    gs4i_to_lanes(p->heat + 4 * i, n, own);
+    memcpy(h->T, own[0], sizeof h->T); memcpy(h->fraction, own[1], sizeof h->fraction);
+    memcpy(h->rate, own[2], sizeof h->rate); memcpy(h->sharp, own[3], sizeof h->sharp);
+    if (!p->with_flux) return;
+    gs4i_to_lanes(p->flux + 4 * i, n, h->q);
+    gs4i_to_lanes(p->flux_rate + 4 * i, n, h->q_rate);
+}
+
+GS4I_INLINE void gs4i_store_heat(const gs4i_particles *p, size_t i, int n, const gs4i_heat *h)
+{
+    gs4_real own[4 * GS4I_BATCH];
+    gs4i_from_lanes(h->T, h->fraction, h->rate, h->sharp, own);
+    memcpy(p->heat + 4 * i, own, 4 * (size_t)n * sizeof *own);
+    if (!p->with_flux) return;
+    gs4i_from_lanes(h->q[0], h->q[1], h->q[2], h->q[3], own);
+    memcpy(p->flux + 4 * i, own, 4 * (size_t)n * sizeof *own);
+    gs4i_from_lanes(h->q_rate[0], h->q_rate[1], h->q_rate[2], h->q_rate[3], own);
+    memcpy(p->flux_rate + 4 * i, own, 4 * (size_t)n * sizeof *own);
+}
+
+/* Add c * rise to the enthalpy. */
+GS4I_INLINE void gs4i_warm_one(const gs4i_law *law, gs4_real rise, gs4_real *T, gs4_real *fraction)
+{
+    const gs4_real at = law->melting, warm = *T + rise;
+    gs4_real above;
+    if ((*fraction <= 0 && warm <= at) || (*fraction >= 1 && warm >= at)) { *T = warm; return; }
+    above = (*T - at) + *fraction * law->latent + rise;
+    *fraction = above <= 0 ? GS4I_C(0) : above >= law->latent ? GS4I_C(1) : above / law->latent;
+    *T = above <= 0 ? at + above : above >= law->latent ? at + (above - law->latent) : at;
+}
+
+/* The same for a batch. */
+GS4I_INLINE void gs4i_warm(const gs4i_heat_laws *l, gs4i_lanes rise, gs4i_lanes T, gs4i_lanes fraction)
+{
+    int b;
+    if (!l->melts) { GS4I_BATCH_LOOP(b) T[b] += rise[b]; return; }
+    for (b = 0; b < GS4I_BATCH; b++) {
+        gs4_real own = GS4I_NTH(T, b), part = GS4I_NTH(fraction, b);
+        if (l->of[b]->is.can_melt) gs4i_warm_one(l->of[b], GS4I_NTH(rise, b), &own, &part);
+        else own += GS4I_NTH(rise, b);
+        GS4I_NTH(T, b) = own; GS4I_NTH(fraction, b) = part;
+    }
+}
+
+/* The temperature of H + ahead dH/dt, less s times the sharpened rate. */
+static void gs4i_temperature_ahead(const gs4i_heat_laws *l, const gs4i_heat *h, gs4_real ahead, gs4_real s, gs4i_lanes T)
+{
+    gs4i_lanes rise, fraction;
+    int b;
+    GS4I_BATCH_LOOP(b) rise[b] = ahead * h->rate[b] - s * h->sharp[b];
+    memcpy(T, h->T, sizeof h->T);
+    memcpy(fraction, h->fraction, sizeof fraction);
+    gs4i_warm(l, rise, T, fraction);
+}
+
+/* q** + s L q~, with q~ predicted: what the non-local flux brings to the stage. */
+static void gs4i_flux_before(const gs4i_heat *h, const gs4i_rule *rule, gs4i_gradient L, gs4i_lanes q[3])
+{
+    const gs4_real ahead = rule->reach.ahead, before = rule->before, s = rule->s;
+    gs4i_lanes at[3];
+    int b, c;
+    for (c = 0; c < 3; c++) GS4I_BATCH_LOOP(b) at[c][b] = h->q[c][b] + ahead * h->q_rate[c][b];
+    for (c = 0; c < 3; c++)
+        GS4I_BATCH_LOOP(b) q[c][b] = (h->q[c][b] + before * h->q_rate[c][b]) + s * (L[c][0][b] * at[0][b] + L[c][1][b] * at[1][b] + L[c][2][b] * at[2][b]);
+}
+
+/* Heat of a batch on its way to the nodes: (m c, m c T**, V / k_eff, V), and as forces: grad w . V q** t / (t + s) + w P,
+ * and w times the heat that mixes, W/K, see [[conduction]]. */
+typedef struct gs4i_heat_sent { gs4_real content[4 * GS4I_BATCH]; gs4i_forces source; } gs4i_heat_sent;
+
+/* `power` in W; volumes in m^3. */
+static void gs4i_send_heat(const gs4i_heat_laws *l, const gs4i_heat *h, const gs4i_rule *rule, gs4i_gradient L, const gs4i_wide *mass,
+                           gs4i_lanes volume, gs4i_lanes power, int with_flux, gs4i_heat_sent *to)
+{
+    gs4i_lanes T, capacity, content, resists, mixes, q[3], none;
+    const gs4i_wide least = (mass[0] - mass[0]) + GS4I_C(1e-15);
+    int b, c;
+    gs4i_temperature_ahead(l, h, rule->before + rule->s, rule->s, T);
+    GS4I_BATCH_LOOP(b) {
+        capacity[b] = mass[b] * l->capacity[b];
+        content[b] = capacity[b] * T[b];
+        mixes[b] = GS4I_MIXING * rule->inv_area * l->conductivity[b] * volume[b] / capacity[b];
+        mixes[b] = capacity[b] * mixes[b] * (l->fourier[b] + (GS4I_C(1) - l->fourier[b]) / (GS4I_C(1) + mixes[b] * l->flux_time[b]));
+        resists[b] = l->conductivity[b] * ((l->fourier[b] * l->flux_time[b] + rule->s) / (l->flux_time[b] + rule->s));
+        GS4I_WIDE_MAX(resists[b], resists[b], least);
+        resists[b] = volume[b] / resists[b];
+    }
+    gs4i_from_lanes(capacity, content, resists, volume, to->content);
+    memset(none, 0, sizeof none);
+    memset(q, 0, sizeof q);
+    if (with_flux) {
+        gs4i_flux_before(h, rule, L, q);
+        for (c = 0; c < 3; c++) GS4I_BATCH_LOOP(b) q[c][b] *= volume[b] * (l->flux_time[b] / (l->flux_time[b] + rule->s));
+    }
+    gs4i_from_lanes(q[0], none, none, none, to->source.x);
+    gs4i_from_lanes(q[1], none, none, none, to->source.y);
+    gs4i_from_lanes(q[2], none, none, none, to->source.z);
+    gs4i_from_lanes(power, mixes, none, none, to->source.weight);
+}
+
+/* S7: `from` is sum w (T~ - T**), the same sharpened, the rate of mixing, and times the temperature to mix to; `slope` the gradient of T~, read with a
+ * flux only. */
+static void gs4i_receive_heat(const gs4i_heat_laws *l, const gs4i_rule *rule, gs4i_lanes from[4], gs4i_lanes slope[3], gs4i_gradient L, int with_flux, gs4i_heat *h)
+{
+    gs4i_lanes gain, T, q[3];
+    int b, c;
+    gs4i_temperature_ahead(l, h, rule->before + rule->s, rule->s, T);
+    GS4I_BATCH_LOOP(b) {
+        const gs4i_wide change = ((from[0][b] * (1 / rule->s) - (from[2][b] * T[b] - from[3][b])) - h->rate[b]) * rule->inv_alpha_m;
+        gain[b] = rule->dt * h->rate[b] + rule->gamma * rule->dt * change;
+        h->rate[b] += change;
+        h->sharp[b] += (from[1][b] * (1 / rule->s) - h->sharp[b]) * rule->inv_alpha_m;
+    }
+    gs4i_warm(l, gain, h->T, h->fraction);
+    if (!with_flux) return;
+    gs4i_flux_before(h, rule, L, q);
+    for (c = 0; c < 3; c++)
+        GS4I_BATCH_LOOP(b) {
+            const gs4i_wide before = h->q[c][b] + rule->before * h->q_rate[c][b];
+            const gs4i_wide stage = (l->flux_time[b] * q[c][b] - rule->s * (GS4I_C(1) - l->fourier[b]) * l->conductivity[b] * slope[c][b])
+                                  / (l->flux_time[b] + rule->s);
+            const gs4i_wide change = ((stage - before) * (1 / rule->s) - h->q_rate[c][b]) * rule->inv_alpha_m;
+            h->q[c][b] += rule->dt * h->q_rate[c][b] + rule->gamma * rule->dt * change;
+            h->q_rate[c][b] += change;
+        }
+}
+
+/* Fraction and phase that belong to the temperature of particle i; at T_m itself those that are there stay. */
+static void gs4i_settle_phase(const gs4i_particles *p, size_t i, const gs4i_law *law)
+{
+    gs4_real *heat = p->heat + 4 * i;
+    if (!law->is.can_melt || heat[0] == law->melting) return;
+    heat[1] = GS4I_C(heat[0] > law->melting ? 1 : 0);
+    p->liquid[i] = heat[0] > law->melting;
+}
+
+/* Particle i begins at the temperature T. */
+static void gs4i_begin_heat(const gs4i_particles *p, size_t i, const gs4i_law *law, gs4_real T)
+{
+    gs4_real *heat = p->heat + 4 * i;
+    heat[0] = T; heat[2] = heat[3] = 0;
+    p->liquid[i] = !law->is.can_melt && law->is.solid == GS4_NO_SOLID;
+    heat[1] = GS4I_C(p->liquid[i]);
+    gs4i_settle_phase(p, i, law);
+    if (p->with_flux) { memset(p->flux + 4 * i, 0, 4 * sizeof *p->flux); memset(p->flux_rate + 4 * i, 0, 4 * sizeof *p->flux_rate); }
 }
 
 /* ==== [[boundary]] walls by images, bodies by nodes, what contact does to velocities =============== *
@@ -4624,7 +4844,20 @@ typedef struct gs4i_emitter {
     int begun;
 } gs4i_emitter;
 
-typedef enum gs4i_clock { GS4I_CLOCK_TRANSFER, GS4I_CLOCK_SORT, GS4I_CLOCK_TOTAL, GS4I_CLOCKS } gs4i_clock;
+/* Heat on nodes: only while a step is made, see [[conduction]]. */
+enum { GS4I_HEAT_T, GS4I_HEAT_K, GS4I_HEAT_FILL, GS4I_HEAT_MIX, GS4I_HEAT_DIAGONAL, GS4I_HEAT_RHS, GS4I_HEAT_X, GS4I_HEAT_FACES, GS4I_HEAT_FIELDS = GS4I_HEAT_FACES + 3 };
+typedef struct gs4i_conduction {
+    gs4_real *content, *source; int slots;  /* 4 a node: m c, m c T**, V / k_eff, V -> what gs4i_heat_back says; source (W), mixing (W/K), 0, 0 -> the same; NULL where there is none */
+    int heats;                          /* some material is heated by viscosity */
+    int low[3], size[3];                /* the box: its first node, and how many there are along each axis */
+    uint8_t *kind; gs4_real *field[GS4I_HEAT_FIELDS]; size_t room;  /* T**; K; m^3 of material per m^3; W/(m^3 K) of mixing; J/(m^3 K); J/m^3; T~ - T**; faces of each axis */
+    int exposed, linked;                /* air or a body is isothermal; or a wall */
+    double *outer, *wrapped;            /* with periodic walls: x, r, p, A p; and the links around, see gs4i_solve_periodic */
+    gs4i_solver solver;
+    int iterations; double residual;    /* of the last solve */
+} gs4i_conduction;
+
+typedef enum gs4i_clock { GS4I_CLOCK_SORT, GS4I_CLOCK_SOLVE, GS4I_CLOCK_TOTAL, GS4I_CLOCKS } gs4i_clock;
 
 struct gs4_sim {
     gs4_sim_desc desc;
@@ -4633,6 +4866,7 @@ struct gs4_sim {
     gs4i_grid grid;
     gs4i_particles particles;
     gs4i_boundary boundary;
+    gs4i_conduction conduction;
     gs4i_law *laws; int material_count, material_capacity;
     gs4i_emitter *emitters; int emitter_count, emitter_capacity;
     gs4i_report *reports; int report_capacity;      /* per occupied block */
@@ -4671,6 +4905,45 @@ static void gs4i_report_merge(gs4i_report *into, const gs4i_report *r)
     into->strayed += r->strayed; into->left += r->left;
     if (r->bad && !into->bad) { into->bad = r->bad; into->bad_id = r->bad_id; }
 }
+
+/* --- errors in words ------------------------------------------------------------------------------------ */
+
+static int gs4i_fail(gs4_sim *sim, int code, const char *what)
+{
+    gs4i_text t;
+    t.at = sim->error; t.left = sizeof sim->error;
+    gs4i_put(&t, what);
+    if (sim->desc.log) sim->desc.log(2, sim->error, sim->desc.log_user);
+    return code;
+}
+
+/* "<before><value><after>" */
+static int gs4i_fail_value(gs4_sim *sim, int code, const char *before, double value, const char *after)
+{
+    char line[320];
+    gs4i_text t;
+    t.at = line; t.left = sizeof line;
+    gs4i_put(&t, before); gs4i_put_real(&t, value); gs4i_put(&t, after);
+    return gs4i_fail(sim, code, line);
+}
+
+static int gs4i_fail_memory(gs4_sim *sim) { return gs4i_fail(sim, GS4_ERROR_MEMORY, "out of memory; nothing has changed"); }
+
+/* --- passes over nodes ----------------------------------------------------------------------------------- */
+
+enum { GS4I_GROUP = 16 };               /* blocks a task */
+
+typedef struct gs4i_node_pass {
+    gs4_sim *sim;
+    gs4_real lightest;                  /* nodes with less mass are empty: what they hold is below rounding */
+} gs4i_node_pass;
+
+GS4I_INLINE int gs4i_group_end(const gs4i_grid *g, int index)
+{
+    return (index + 1) * GS4I_GROUP < g->active ? (index + 1) * GS4I_GROUP : g->active;
+}
+
+static int gs4i_groups(const gs4_sim *sim) { return (sim->grid.active + GS4I_GROUP - 1) / GS4I_GROUP; }
 
 /* ==== [[transfer]] particles to nodes and back ===================================================== *
  *
@@ -4888,13 +5161,42 @@ static void gs4i_scatter_momentum(int index, void *context)
 
 /* --- S4, S5 ------------------------------------------------------------------------------------------ */
 
-/* Forces of a batch on its way to the nodes: the columns of -V sigma, and m g; four numbers a particle. */
-typedef struct gs4i_forces { gs4_real x[4 * GS4I_BATCH], y[4 * GS4I_BATCH], z[4 * GS4I_BATCH], weight[4 * GS4I_BATCH]; } gs4i_forces;
+/* tau:D (W) of particles that viscosity heats: the stress without the pressure, whose work compression gives back. */
+static void gs4i_take_power(const gs4i_heat_laws *h, const gs4i_batch_laws *l, const gs4i_wide *J, gs4i_gradient L, gs4i_symmetric sigma, gs4i_lanes volume, gs4i_lanes power)
+{
+    int b;
+    GS4I_BATCH_LOOP(b) {
+        gs4i_wide p;
+        gs4i_pressure(&l->tait[b], &J[b], &p);
+        power[b] = h->heating[b] * volume[b] * ((sigma[0][b] + p) * L[0][0][b] + (sigma[1][b] + p) * L[1][1][b] + (sigma[2][b] + p) * L[2][2][b]
+                 + sigma[3][b] * (L[0][1][b] + L[1][0][b]) + sigma[4][b] * (L[0][2][b] + L[2][0][b]) + sigma[5][b] * (L[1][2][b] + L[2][1][b]));
+    }
+}
+
+/* What a scene with heat needs on top, in both kernels that scatter stress. */
+typedef struct gs4i_warmth { gs4i_heat_laws laws; gs4i_heat h; gs4i_heat_sent sent; } gs4i_warmth;
+
+/* Laws see the temperature of the stage (Euler: of now). */
+static void gs4i_begin_warmth(const gs4i_particles *p, size_t i, int n, gs4_real ahead, gs4i_batch_laws *l, gs4i_warmth *w)
+{
+    gs4i_load_heat(p, i, n, &w->h);
+    gs4i_take_heat_laws(l, &w->laws);
+    gs4i_temperature_ahead(&w->laws, &w->h, ahead, 0, l->temperature);
+}
+
+static void gs4i_send_warmth(const gs4i_batch_laws *l, const gs4i_rule *rule, const gs4i_wide *mass, const gs4i_wide *J, gs4i_gradient L, gs4i_symmetric sigma, int with_flux, gs4i_warmth *w)
+{
+    gs4i_lanes volume, power;
+    int b;
+    GS4I_BATCH_LOOP(b) volume[b] = mass[b] * l->inv_density[b] * J[b];
+    gs4i_take_power(&w->laws, l, J, L, sigma, volume, power);
+    gs4i_send_heat(&w->laws, &w->h, rule, L, mass, volume, power, with_flux, &w->sent);
+}
 
 /* Volume and stress at the stage, J~ by rule 1, implicit in itself for known div v: (J~ - J**) / s = J~ div v. */
 GS4I_INLINE void gs4i_stage_forces(const gs4i_particles *p, size_t i, int n, const gs4i_batch *q, const gs4i_batch_laws *l, gs4i_elastic_laws *el,
                                    const gs4i_rule *rule, gs4i_gradient L, const gs4_real gravity[3], gs4i_forces *f, gs4i_lanes J, gs4i_lanes mu,
-                                   gs4i_seen *seen, gs4i_report *report)
+                                   gs4i_seen *seen, gs4i_report *report, gs4i_warmth *warmth)
 {
     gs4i_symmetric sigma;
     gs4i_lanes g[3], none;
@@ -4905,6 +5207,7 @@ GS4I_INLINE void gs4i_stage_forces(const gs4i_particles *p, size_t i, int n, con
     }
     gs4i_liquid_stress(l, J, L, sigma, mu);
     if (p->elastic_reals) gs4i_add_elastic(p, i, n, rule, l, el, L, sigma, seen, report);
+    if (warmth) gs4i_send_warmth(l, rule, q->x[3], J, L, sigma, p->with_flux, warmth);
     for (c = 0; c < 6; c++) GS4I_BATCH_LOOP(b) sigma[c][b] *= -q->x[3][b] * l->inv_density[b] * J[b];
     for (c = 0; c < 3; c++) GS4I_BATCH_LOOP(b) g[c][b] = q->x[3][b] * gravity[c];
     memset(none, 0, sizeof none);
@@ -4927,10 +5230,33 @@ GS4I_INLINE void gs4i_scatter_force(gs4_real *tile, const gs4i_stencils *s, int 
     gs4i_scatter_rows(tile + 4 * s->base[n], &p0, &p1, &p2, s, n);
 }
 
-/* S4 and S5: L~ = sum v_i (x) grad w, J~ and stress there, and f_i = - sum V sigma grad w + sum w m g. */
-static void gs4i_scatter_forces(int index, void *context)
+static void gs4i_clear_warmth(gs4i_warmth *w, gs4_real *content, gs4_real *source)
 {
-    const gs4i_pass *pass = (const gs4i_pass *)context;
+    memset(&w->laws, 0, sizeof w->laws);
+    memset(content, 0, GS4I_TILE_REALS * sizeof *content);
+    memset(source, 0, GS4I_TILE_REALS * sizeof *source);
+}
+
+/* What the particles of a batch give to the tiles of heat. */
+GS4I_INLINE void gs4i_scatter_warmth(const gs4_sim *sim, const gs4i_warmth *w, const gs4i_stencils *s, int n, gs4_real *content, gs4_real *source)
+{
+    int b;
+    for (b = 0; b < n; b++)
+        if (s->base[b] >= 0) {
+            gs4i_scatter_quad(content, s, b, w->sent.content + 4 * b);
+            if (sim->conduction.source) gs4i_scatter_force(source, s, b, &w->sent.source);
+        }
+}
+
+static void gs4i_add_warmth(const gs4_sim *sim, int o, const gs4_real *content, const gs4_real *source)
+{
+    gs4i_tile_add(&sim->grid, o, sim->reports[o].rows, content, sim->conduction.content);
+    if (sim->conduction.source) gs4i_tile_add(&sim->grid, o, sim->reports[o].rows, source, sim->conduction.source);
+}
+
+/* S4 and S5: L~ = sum v_i (x) grad w, J~ and stress there, and f_i = - sum V sigma grad w + sum w m g. */
+static void gs4i_scatter_stage(const gs4i_pass *pass, int index, int with_heat)
+{
     gs4_sim *sim = pass->sim;
     const gs4i_particles p = sim->particles;
     const gs4i_rule rule = sim->rule;
@@ -4941,11 +5267,13 @@ static void gs4i_scatter_forces(int index, void *context)
     gs4i_batch_laws laws;
     gs4i_elastic_laws elastic;
     gs4i_seen seen;
-    gs4_real nodes[GS4I_TILE_REALS], tile[GS4I_TILE_REALS];
+    gs4i_warmth warmth;
+    gs4_real nodes[GS4I_TILE_REALS], tile[GS4I_TILE_REALS], content[GS4I_TILE_REALS], source[GS4I_TILE_REALS];
     int row = 0;
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
     gs4i_tile_load(&sim->grid, o, report->rows, sim->grid.momentum, nodes);
     memset(tile, 0, sizeof tile);
+    if (with_heat) gs4i_clear_warmth(&warmth, content, source);
     memset(&laws, 0, sizeof laws);
     memset(&elastic, 0, sizeof elastic);
     gs4i_see_nothing(&seen);
@@ -4968,14 +5296,20 @@ static void gs4i_scatter_forces(int index, void *context)
         }
         gs4i_gradient_lanes(v.dx, v.dy, v.dz, n, L);
         gs4i_take_laws(sim->laws, p.material + i, n, &laws);
-        gs4i_stage_forces(&p, i, n, &q, &laws, &elastic, &rule, L, gravity, &f, J, mu, &seen, report);
+        if (with_heat) gs4i_begin_warmth(&p, i, n, rule.reach.ahead, &laws, &warmth);
+        gs4i_stage_forces(&p, i, n, &q, &laws, &elastic, &rule, L, gravity, &f, J, mu, &seen, report, with_heat ? &warmth : NULL);
         gs4i_see_liquids(&seen, &laws, J, mu);
         gs4i_check_liquids(report, J, mu, p.id + i, n);
         for (b = 0; b < n; b++) gs4i_scatter_force(tile, &s, b, &f);
+        if (with_heat) gs4i_scatter_warmth(sim, &warmth, &s, n, content, source);
     }
     gs4i_report_liquids(report, &seen);
     gs4i_tile_add(&sim->grid, o, report->rows, tile, sim->grid.force);
+    if (with_heat) gs4i_add_warmth(sim, o, content, source);
 }
+
+static void gs4i_scatter_forces(int index, void *context) { gs4i_scatter_stage((const gs4i_pass *)context, index, 0); }
+static void gs4i_scatter_forces_and_heat(int index, void *context) { gs4i_scatter_stage((const gs4i_pass *)context, index, 1); }
 
 /* --- S7 ---------------------------------------------------------------------------------------------- */
 
@@ -5089,6 +5423,18 @@ GS4I_INLINE int gs4i_has_left(const gs4i_grid *g, const gs4_real x[3])
           && x[2] >= g->origin.z && x[2] < g->origin.z + GS4I_C(g->cells[2]) * g->h);
 }
 
+/* In a mouth material is as warm as what it gives. */
+static void gs4i_hold_warmth(const gs4_sim *sim, size_t i, const gs4_real x[3])
+{
+    const gs4i_particles *p = &sim->particles;
+    int e;
+    for (e = 0; e < sim->emitter_count; e++) {
+        const gs4i_body *mouth = &sim->boundary.bodies[sim->emitters[e].body];
+        if (mouth->asleep || gs4i_body_distance(mouth, gs4i_vec3(x[0], x[1], x[2])) >= 0) continue;
+        gs4i_begin_heat(p, i, &sim->laws[p->material[i]], sim->emitters[e].is.fill.temperature);
+    }
+}
+
 /* Walls, bodies and mouths on each particle after the step. */
 static void gs4i_correct_contact(gs4_sim *sim, size_t i, int n, gs4i_stored *o, gs4i_gathered *L, gs4i_report *report)
 {
@@ -5103,6 +5449,7 @@ static void gs4i_correct_contact(gs4_sim *sim, size_t i, int n, gs4i_stored *o, 
             memset(L->dx + 4 * b, 0, 4 * sizeof *L->dx);
             memset(L->dy + 4 * b, 0, 4 * sizeof *L->dy);
             memset(L->dz + 4 * b, 0, 4 * sizeof *L->dz);
+            if (sim->particles.with_heat) gs4i_hold_warmth(sim, i + (size_t)b, o->x + 4 * b);
             if (elastic) memset(elastic + (size_t)sim->particles.elastic_reals * (size_t)b, 0, (size_t)sim->particles.elastic_reals * sizeof *elastic);
         }
         report->left += gs4i_has_left(&sim->grid, o->x + 4 * b);
@@ -5150,8 +5497,45 @@ static int gs4i_is_calm(const gs4i_pass *pass, int index)
     return 1;
 }
 
+static void gs4i_load_warmth(const gs4_sim *sim, int o, gs4i_warmth *w, gs4_real *nodes, gs4_real *slopes)
+{
+    memset(&w->laws, 0, sizeof w->laws);
+    gs4i_tile_load(&sim->grid, o, sim->reports[o].rows, sim->conduction.content, nodes);
+    if (sim->particles.with_flux) gs4i_tile_load(&sim->grid, o, sim->reports[o].rows, sim->conduction.source, slopes);
+}
+
+/* S7 of heat for particles i to i + n: `nodes` has rises, `slopes` what gives the gradients for the flux. */
+static void gs4i_gather_heat(const gs4_sim *sim, size_t i, int n, const gs4i_stencils *s, const gs4_real *nodes, const gs4_real *slopes, gs4i_batch_laws *l,
+                             gs4i_gradient L, gs4i_warmth *w)
+{
+    const gs4i_particles *p = &sim->particles;
+    gs4i_gathered g;
+    gs4i_lanes value[4], slope[3], column[4];
+    gs4_real rise[4 * GS4I_BATCH];
+    int b;
+    gs4i_load_heat(p, i, n, &w->h);
+    gs4i_take_heat_laws(l, &w->laws);
+    memset(slope, 0, sizeof slope);
+    for (b = 0; b < n; b++) {
+        gs4i_row x, d;
+        gs4i_x_weights(s, b, &x, &d);
+        gs4i_gather_value(nodes + 4 * s->base[b], s, b, &x, rise);
+        if (p->with_flux) gs4i_gather_local(slopes + 4 * s->base[b], s, b, &x, &d, &g);
+    }
+    gs4i_to_lanes(rise, n, value);
+    if (p->with_flux) {
+        gs4i_to_lanes(g.dx, n, column); memcpy(slope[0], column[0], sizeof slope[0]);
+        gs4i_to_lanes(g.dy, n, column); memcpy(slope[1], column[1], sizeof slope[1]);
+        gs4i_to_lanes(g.dz, n, column); memcpy(slope[2], column[2], sizeof slope[2]);
+    }
+    gs4i_receive_heat(&w->laws, &sim->rule, value, slope, L, p->with_flux, &w->h);
+    gs4i_store_heat(p, i, n, &w->h);
+    for (b = 0; b < n && w->laws.melts; b++)                /* hysteresis: in between the phase stays */
+        if (l->of[b]->is.can_melt && (GS4I_NTH(w->h.fraction, b) >= 1 || GS4I_NTH(w->h.fraction, b) <= 0)) p->liquid[i + (size_t)b] = GS4I_NTH(w->h.fraction, b) > 0;
+}
+
 /* S7: gather and correct. With `commit` 0 nothing is written: a rehearsal that only reports. */
-static void gs4i_correct(const gs4i_pass *pass, int index, int commit)
+static void gs4i_correct(const gs4i_pass *pass, int index, int commit, int with_heat)
 {
     gs4_sim *sim = pass->sim;
     const int o = pass->blocks[index], next = pass->blocks[index + 1 < pass->count ? index + 1 : index];
@@ -5164,7 +5548,8 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit)
     gs4i_elastic_laws elastic;
     gs4i_seen seen;
     gs4i_corrections k;
-    gs4_real u_nodes[GS4I_TILE_REALS], a_nodes[GS4I_TILE_REALS], j_nodes[GS4I_TILE_REALS];
+    gs4i_warmth warmth;
+    gs4_real u_nodes[GS4I_TILE_REALS], a_nodes[GS4I_TILE_REALS], j_nodes[GS4I_TILE_REALS], h_nodes[GS4I_TILE_REALS], slopes[GS4I_TILE_REALS];
     const int jumps = gs4i_load_jumps(grid, o, report->rows, j_nodes), edge = jumps || gs4i_at_edge(grid, o);
     gs4i_gathered u;
     gs4i_stored out;
@@ -5176,6 +5561,7 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit)
     memset(&laws, 0, sizeof laws);
     memset(&elastic, 0, sizeof elastic);
     memset(k.jump, 0, sizeof k.jump);
+    if (with_heat) gs4i_load_warmth(sim, o, &warmth, h_nodes, slopes);
     for (; i < end; i += GS4I_BATCH, row += 2) {
         const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
         gs4i_batch q;
@@ -5197,10 +5583,10 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit)
         gs4i_to_lanes(acc, n, k.A);
         if (jumps) gs4i_to_lanes(jump, n, k.jump);
         gs4i_correct_batch(rule, &k, &q);
-        if (p.elastic_reals) {
-            gs4i_take_laws(sim->laws, p.material + i, n, &laws);
-            gs4i_advance_elastic(&p, i, n, &rule, &laws, &elastic, k.L, report, commit);
-        }
+        if (p.elastic_reals || with_heat) gs4i_take_laws(sim->laws, p.material + i, n, &laws);
+        if (with_heat && laws.callbacks) gs4i_begin_warmth(&p, i, n, rule.reach.ahead, &laws, &warmth);
+        if (p.elastic_reals) gs4i_advance_elastic(&p, i, n, &rule, &laws, &elastic, k.L, report, commit);
+        if (with_heat && commit) gs4i_gather_heat(sim, i, n, &s, h_nodes, slopes, &laws, k.L, &warmth);
         if (!commit) { gs4i_judge(&q, k.L, p.position + 4 * i, n, grid->h, p.id + i, report); continue; }
         gs4i_pack_batch(&q, 1, &out);
         if (edge) gs4i_correct_contact(sim, i, n, &out, &u, report);
@@ -5212,13 +5598,20 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit)
 
 static void gs4i_correct_task(int index, void *context)
 {
-    gs4i_correct((const gs4i_pass *)context, index, 1);
+    gs4i_correct((const gs4i_pass *)context, index, 1, 0);
+}
+
+static void gs4i_correct_with_heat_task(int index, void *context)
+{
+    gs4i_correct((const gs4i_pass *)context, index, 1, 1);
 }
 
 static void gs4i_rehearse_task(int index, void *context)
 {
     const gs4i_pass *pass = (const gs4i_pass *)context;
-    if (!gs4i_is_calm(pass, index)) gs4i_correct(pass, index, 0);
+    if (gs4i_is_calm(pass, index)) return;
+    if (pass->sim->particles.with_heat) gs4i_correct(pass, index, 0, 1);
+    else gs4i_correct(pass, index, 0, 0);
 }
 
 /* --- symplectic Euler -------------------------------------------------------------------------------- */
@@ -5251,7 +5644,7 @@ typedef struct gs4i_affine_forces { gs4_real middle[4 * GS4I_BATCH], x[4 * GS4I_
 /* Momentum and impulse of stress and weight as one affine field: m (v + dt g) + (m C - dt V sigma 4/h^2) (x_i - x). */
 GS4I_INLINE void gs4i_affine_momentum(const gs4i_particles *p, size_t at, int n, const gs4i_rule *rule, const gs4i_batch *q, const gs4i_batch_laws *l,
                                       gs4i_elastic_laws *el, const gs4i_stencils *s, gs4i_gradient C, gs4_real h, const gs4_real fall[3],
-                                      gs4i_affine_forces *f, gs4i_lanes mu, gs4i_seen *seen, gs4i_report *report)
+                                      gs4i_affine_forces *f, gs4i_lanes mu, gs4i_seen *seen, gs4i_report *report, gs4i_warmth *warmth)
 {
     const gs4_real dt = rule->dt;
     gs4i_symmetric sigma;
@@ -5260,6 +5653,7 @@ GS4I_INLINE void gs4i_affine_momentum(const gs4i_particles *p, size_t at, int n,
     int b, i, j;
     gs4i_liquid_stress(l, q->v[3], C, sigma, mu);
     if (p->elastic_reals) gs4i_add_elastic(p, at, n, rule, l, el, C, sigma, seen, report);
+    if (warmth) gs4i_send_warmth(l, rule, q->x[3], q->v[3], C, sigma, p->with_flux, warmth);
     gs4i_affine_bound(C, dt, bound);
     GS4I_BATCH_LOOP(b) {
         bound[b] *= q->x[3][b] * h;
@@ -5304,9 +5698,8 @@ GS4I_INLINE void gs4i_scatter_affine(gs4_real *tile, const gs4i_stencils *s, int
 }
 
 /* Symplectic Euler, there: one affine scatter with stress (MLS-MPM). */
-static void gs4i_scatter_euler(int index, void *context)
+static void gs4i_scatter_affinely(const gs4i_pass *pass, int index, int with_heat)
 {
-    const gs4i_pass *pass = (const gs4i_pass *)context;
     gs4_sim *sim = pass->sim;
     const gs4i_particles p = sim->particles;
     const int o = pass->blocks[index];
@@ -5318,12 +5711,14 @@ static void gs4i_scatter_euler(int index, void *context)
     gs4i_batch_laws laws;
     gs4i_elastic_laws elastic;
     gs4i_seen seen;
-    gs4_real tile[GS4I_TILE_REALS];
+    gs4i_warmth warmth;
+    gs4_real tile[GS4I_TILE_REALS], content[GS4I_TILE_REALS], source[GS4I_TILE_REALS];
     int row = 0;
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
     uint64_t rows = 0;
     gs4i_report_clear(report);
     memset(tile, 0, sizeof tile);
+    if (with_heat) gs4i_clear_warmth(&warmth, content, source);
     memset(&laws, 0, sizeof laws);
     memset(&elastic, 0, sizeof elastic);
     gs4i_see_nothing(&seen);
@@ -5339,7 +5734,8 @@ static void gs4i_scatter_euler(int index, void *context)
         gs4i_stage_batch(&p, i, n, reach, &frame, &q, &s);
         gs4i_load_affine(&p, i, n, C);
         gs4i_take_laws(sim->laws, p.material + i, n, &laws);
-        gs4i_affine_momentum(&p, i, n, &sim->rule, &q, &laws, &elastic, &s, C, h, fall, &f, mu, &seen, report);
+        if (with_heat) gs4i_begin_warmth(&p, i, n, 0, &laws, &warmth);
+        gs4i_affine_momentum(&p, i, n, &sim->rule, &q, &laws, &elastic, &s, C, h, fall, &f, mu, &seen, report, with_heat ? &warmth : NULL);
         gs4i_see_liquids(&seen, &laws, q.v[3], mu);
         gs4i_check_liquids(report, q.v[3], mu, p.id + i, n);
         for (b = 0; b < n; b++) {
@@ -5347,11 +5743,16 @@ static void gs4i_scatter_euler(int index, void *context)
             rows |= gs4i_touched_rows(s.base[b]);
             gs4i_scatter_affine(tile, &s, b, &f);
         }
+        if (with_heat) gs4i_scatter_warmth(sim, &warmth, &s, n, content, source);
     }
     gs4i_report_liquids(report, &seen);
     report->rows = rows;
     gs4i_tile_add(&sim->grid, o, rows, tile, sim->grid.momentum);
+    if (with_heat) gs4i_add_warmth(sim, o, content, source);
 }
+
+static void gs4i_scatter_euler(int index, void *context) { gs4i_scatter_affinely((const gs4i_pass *)context, index, 0); }
+static void gs4i_scatter_euler_and_heat(int index, void *context) { gs4i_scatter_affinely((const gs4i_pass *)context, index, 1); }
 
 /* v = sum w v_i, C = sum v_i (x) grad w, J += dt J tr C, x += dt v. */
 GS4I_INLINE void gs4i_advect_batch(gs4_real dt, const gs4i_gathered *u, int n, gs4i_batch *q, gs4i_gradient C)
@@ -5365,7 +5766,7 @@ GS4I_INLINE void gs4i_advect_batch(gs4_real dt, const gs4i_gathered *u, int n, g
 }
 
 /* Symplectic Euler, and back. */
-static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit)
+static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, int with_heat)
 {
     gs4_sim *sim = pass->sim;
     const int o = pass->blocks[index], next = pass->blocks[index + 1 < pass->count ? index + 1 : index];
@@ -5377,7 +5778,8 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit)
     gs4i_batch_laws laws;
     gs4i_elastic_laws elastic;
     gs4i_seen seen;
-    gs4_real nodes[GS4I_TILE_REALS];
+    gs4i_warmth warmth;
+    gs4_real nodes[GS4I_TILE_REALS], h_nodes[GS4I_TILE_REALS], slopes[GS4I_TILE_REALS];
     int edge = gs4i_at_edge(grid, o), c;
     gs4i_gathered u;
     gs4i_stored out;
@@ -5388,6 +5790,7 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit)
     gs4i_see_nothing(&seen);
     memset(&laws, 0, sizeof laws);
     memset(&elastic, 0, sizeof elastic);
+    if (with_heat) gs4i_load_warmth(sim, o, &warmth, h_nodes, slopes);
     for (; i < end; i += GS4I_BATCH, row += 2) {
         const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
         gs4i_batch q;
@@ -5402,10 +5805,10 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit)
             gs4i_gather_local(nodes + 4 * s.base[b], &s, b, &w, &d, &u);
         }
         gs4i_advect_batch(sim->rule.dt, &u, n, &q, C);
-        if (p.elastic_reals) {
-            gs4i_take_laws(sim->laws, p.material + i, n, &laws);
-            gs4i_advance_elastic(&p, i, n, &sim->rule, &laws, &elastic, C, report, commit);
-        }
+        if (p.elastic_reals || with_heat) gs4i_take_laws(sim->laws, p.material + i, n, &laws);
+        if (with_heat && laws.callbacks) gs4i_begin_warmth(&p, i, n, 0, &laws, &warmth);
+        if (p.elastic_reals) gs4i_advance_elastic(&p, i, n, &sim->rule, &laws, &elastic, C, report, commit);
+        if (with_heat && commit) gs4i_gather_heat(sim, i, n, &s, h_nodes, slopes, &laws, C, &warmth);
         if (!commit) { gs4i_judge(&q, C, p.position + 4 * i, n, grid->h, p.id + i, report); continue; }
         gs4i_pack_batch(&q, 0, &out);
         if (edge) gs4i_correct_contact(sim, i, n, &out, &u, report);
@@ -5420,13 +5823,20 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit)
 
 static void gs4i_gather_euler_task(int index, void *context)
 {
-    gs4i_gather_euler((const gs4i_pass *)context, index, 1);
+    gs4i_gather_euler((const gs4i_pass *)context, index, 1, 0);
+}
+
+static void gs4i_gather_euler_with_heat_task(int index, void *context)
+{
+    gs4i_gather_euler((const gs4i_pass *)context, index, 1, 1);
 }
 
 static void gs4i_rehearse_euler_task(int index, void *context)
 {
     const gs4i_pass *pass = (const gs4i_pass *)context;
-    if (!gs4i_is_calm(pass, index)) gs4i_gather_euler(pass, index, 0);
+    if (gs4i_is_calm(pass, index)) return;
+    if (pass->sim->particles.with_heat) gs4i_gather_euler(pass, index, 0, 1);
+    else gs4i_gather_euler(pass, index, 0, 0);
 }
 
 /* Run a scattering kernel over all occupied blocks, colour after colour. */
@@ -5461,30 +5871,509 @@ static gs4i_report gs4i_all_reports(const gs4_sim *sim)
     return all;
 }
 
+/* ==== [[conduction]] heat from node to node ======================================================== *
+ *
+ * Unknown is the rise x = T~ - T** of every node with material, so that what the solver leaves undone is small against the
+ * heat that moves. Nodes are cells of a dense box around the material; between two of them conducts
+ *
+ *     c_f = s K_f fill_f,   K_f the harmonic mean of their conductivities, fill_f the mean of how full they are,
+ *
+ * which at a free surface fades with the material: insulated by nature. Isothermal: a wall at half a cell through
+ * the face; air and bodies through the area that a node shows, fill_i - fill_j towards each emptier neighbour j, at
+ * GS4I_SURFACE_DEPTH cells (less where it is oblique, by what the step to j is shorter), which puts them on the surface. Images mirror: evenly where a wall is insulated,
+ * oddly about its temperature where it is not. */
+
+#define GS4I_SURFACE_DEPTH GS4I_C(0.83)
+
+/* Fold what reached images back: content, and source where there is one. */
+static void gs4i_fold_heat(const gs4_sim *sim)
+{
+    const gs4i_boundary *b = &sim->boundary;
+    const gs4i_conduction *k = &sim->conduction;
+    int wall, i, a;
+    for (wall = 0; wall < 6; wall++) {
+        const int odd = sim->desc.wall_is_isothermal[wall];
+        const gs4_real twice = 2 * sim->desc.wall_temperature[wall];
+        for (i = 0; i < b->image_count[wall]; i++) {
+            const gs4_real *from = k->content + 4 * (size_t)b->images[wall][i].image;
+            gs4_real *to = k->content + 4 * (size_t)b->images[wall][i].mirror;
+            to[1] += odd ? twice * from[0] - from[1] : from[1];
+            for (a = 0; a < 4; a++) if (a != 1) to[a] += from[a];
+            if (k->source) {
+                from = k->source + 4 * (size_t)b->images[wall][i].image; to = k->source + 4 * (size_t)b->images[wall][i].mirror;
+                to[0] += odd ? -from[0] : from[0];
+                to[1] += from[1];
+            }
+        }
+    }
+}
+
+/* Images take what particles gather from their mirror nodes. */
+static void gs4i_fill_heat(const gs4_sim *sim)
+{
+    const gs4i_boundary *b = &sim->boundary;
+    const gs4i_conduction *k = &sim->conduction;
+    int wall, i, a;
+    for (wall = 5; wall >= 0; wall--) {
+        const gs4_real sign = GS4I_C(sim->desc.wall_is_isothermal[wall] ? -1 : 1), twice = sim->desc.wall_is_isothermal[wall] ? 2 * sim->desc.wall_temperature[wall] : 0;
+        for (i = 0; i < b->image_count[wall]; i++) {
+            const size_t from = 4 * (size_t)b->images[wall][i].mirror, to = 4 * (size_t)b->images[wall][i].image;
+            for (a = 0; a < 2; a++) k->content[to + (size_t)a] = sign * k->content[from + (size_t)a];
+            k->content[to + 2] = k->content[from + 2];
+            k->content[to + 3] = twice * k->content[from + 2] + sign * k->content[from + 3];
+            for (a = 0; a < 3 && sim->particles.with_flux; a++) k->source[to + (size_t)a] = twice + sign * k->source[from + (size_t)a];
+        }
+    }
+}
+
+/* Nodes that can be unknown along one axis: those of the domain, and behind an open wall those that exist. */
+static void gs4i_heat_range(const gs4_sim *sim, int axis, int *begin, int *end)
+{
+    *begin = sim->desc.walls[2 * axis] == GS4_WALL_OPEN ? -4 : 0;
+    *end = sim->grid.cells[axis] + (sim->desc.walls[2 * axis + 1] == GS4_WALL_OPEN ? 4 : 0);
+}
+
+/* The box of nodes that exist, and room for it. */
+static int gs4i_heat_box(gs4_sim *sim)
+{
+    gs4i_conduction *k = &sim->conduction;
+    gs4i_memory *m = &sim->memory;
+    int a, s, begin[3], end[3], high[3];
+    size_t cells = 1;
+    for (a = 0; a < 3; a++) { gs4i_heat_range(sim, a, &begin[a], &end[a]); k->low[a] = end[a]; high[a] = begin[a]; }
+    for (s = 0; s < sim->grid.active; s++) {
+        int at[3];
+        gs4i_block_coordinates(&sim->grid, sim->grid.block[s], at);
+        for (a = 0; a < 3; a++) {
+            const int first = 4 * (at[a] - 1);
+            k->low[a] = first < k->low[a] ? first : k->low[a];
+            high[a] = first + 4 > high[a] ? first + 4 : high[a];
+        }
+    }
+    for (a = 0; a < 3; a++) {
+        if (k->low[a] < begin[a] || sim->grid.periodic[a]) k->low[a] = begin[a];
+        if (high[a] > end[a] || sim->grid.periodic[a]) high[a] = end[a];
+        k->size[a] = high[a] - k->low[a];
+        cells *= (size_t)k->size[a] + 1;                    /* a face more than cells along each axis */
+    }
+    if (cells > k->room) {
+        gs4_real *reals;
+        uint8_t *kind;
+        double *outer = NULL;
+        const size_t room = cells + cells / 8;
+        const int periodic = sim->grid.periodic[0] || sim->grid.periodic[1] || sim->grid.periodic[2];
+        reals = (gs4_real *)gs4i_alloc(m, room, GS4I_HEAT_FIELDS * sizeof *reals);
+        kind = (uint8_t *)gs4i_alloc(m, room, 1);
+        if (periodic) outer = (double *)gs4i_alloc(m, room, 5 * sizeof *outer);
+        if (!reals || !kind || (periodic && !outer)) {
+            gs4i_free(m, outer, room, 5 * sizeof *outer);
+            gs4i_free(m, reals, room, GS4I_HEAT_FIELDS * sizeof *reals); gs4i_free(m, kind, room, 1);
+            return GS4_ERROR_MEMORY;
+        }
+        gs4i_free(m, k->field[0], k->room, GS4I_HEAT_FIELDS * sizeof *reals); gs4i_free(m, k->kind, k->room, 1);
+        gs4i_free(m, k->outer, k->room, 5 * sizeof *outer);
+        k->kind = kind; k->room = room; k->outer = outer; k->wrapped = outer ? outer + 4 * room : NULL;
+        for (a = 0; a < GS4I_HEAT_FIELDS; a++) k->field[a] = reals + room * (size_t)a;
+    }
+    return GS4_OK;
+}
+
+GS4I_INLINE size_t gs4i_heat_cell(const gs4i_conduction *k, int x, int y, int z)
+{
+    return ((size_t)z * (size_t)k->size[1] + (size_t)y) * (size_t)k->size[0] + (size_t)x;
+}
+
+/* Nodes of a group of blocks into the box: T**, conductivity, fill, m c per volume, sources. */
+static void gs4i_heat_nodes(int index, void *context)
+{
+    const gs4i_node_pass *pass = (const gs4i_node_pass *)context;
+    const gs4_sim *sim = pass->sim;
+    const gs4i_grid *g = &sim->grid;
+    const gs4i_conduction *k = &sim->conduction;
+    const gs4_real inv_cell = 1 / (g->h * g->h * g->h);
+    int s, i;
+    for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
+        int at[3];
+        gs4i_block_coordinates(g, g->block[s], at);
+        for (i = 0; i < GS4I_BLOCK_NODES; i++) {
+            const size_t node = 4 * ((size_t)s * GS4I_BLOCK_NODES + (size_t)i);
+            const gs4_real *q = k->content + node;
+            const int x = 4 * (at[0] - 1) + (i & 3) - k->low[0], y = 4 * (at[1] - 1) + (i >> 2 & 3) - k->low[1], z = 4 * (at[2] - 1) + (i >> 4) - k->low[2];
+            size_t cell;
+            if (x < 0 || y < 0 || z < 0 || x >= k->size[0] || y >= k->size[1] || z >= k->size[2]) continue;
+            if (!(g->momentum[node + 3] > pass->lightest) || !(q[0] > 0) || !(q[3] > 0)) continue;
+            cell = gs4i_heat_cell(k, x, y, z);
+            k->kind[cell] = GS4_CELL_LIQUID;
+            k->field[GS4I_HEAT_T][cell] = q[1] / q[0];
+            k->field[GS4I_HEAT_K][cell] = q[3] / q[2];      /* one behind the other, as heat goes where two materials meet */
+            k->field[GS4I_HEAT_FILL][cell] = q[3] * inv_cell;
+            k->field[GS4I_HEAT_MIX][cell] = gs4i_min((k->source ? k->source[node + 1] : GS4I_MIXING * q[3] * q[3] / q[2] * g->inv_h * g->inv_h) / q[0], sim->rule.mixing) * q[0] * inv_cell;
+            k->field[GS4I_HEAT_DIAGONAL][cell] = q[0] * inv_cell;
+            k->field[GS4I_HEAT_RHS][cell] = k->source ? k->source[node] * inv_cell * sim->rule.s : GS4I_C(0);
+        }
+    }
+}
+
+/* The temperature (K) that a node feels at its empty neighbour at p, if any: of a body there, or of the air. */
+static int gs4i_is_isothermal_at(const gs4_sim *sim, gs4_vec3 p, gs4_real *T)
+{
+    int b;
+    for (b = 0; b < sim->boundary.body_count; b++) {
+        const gs4i_body *body = &sim->boundary.bodies[b];
+        if (body->is_mouth || !(gs4i_body_distance(body, p) < GS4I_C(0.5) * sim->grid.h)) continue;
+        *T = body->is.temperature;
+        return body->is.is_isothermal;
+    }
+    *T = sim->desc.ambient_temperature;
+    return sim->desc.air_is_isothermal;
+}
+
+/* Faces of one plane of the box on the low sides of its cells, and on the far sides of the box. */
+static void gs4i_heat_faces(int z, void *context)
+{
+    const gs4_sim *sim = ((const gs4i_node_pass *)context)->sim;
+    const gs4i_conduction *k = &sim->conduction;
+    const gs4_real *K = k->field[GS4I_HEAT_K], *fill = k->field[GS4I_HEAT_FILL], s = sim->rule.s;
+    int axis, x, y;
+    for (axis = 0; axis < 3; axis++) {
+        const int nx = k->size[0] + (axis == 0), ny = k->size[1] + (axis == 1), n = k->size[axis];
+        gs4_real *face = k->field[GS4I_HEAT_FACES + axis] + (size_t)z * (size_t)ny * (size_t)nx;
+        if (z == k->size[2] && axis != 2) continue;
+        for (y = 0; y < ny; y++)
+            for (x = 0; x < nx; x++, face++) {
+                const int at = axis == 0 ? x : axis == 1 ? y : z;
+                size_t i, j;
+                *face = 0;
+                if ((at == 0 || at == n) && !sim->grid.periodic[axis]) continue;
+                i = gs4i_heat_cell(k, axis == 0 && x == n ? 0 : x, axis == 1 && y == n ? 0 : y, axis == 2 && z == n ? 0 : z);
+                j = gs4i_heat_cell(k, axis == 0 ? (x ? x : n) - 1 : x, axis == 1 ? (y ? y : n) - 1 : y, axis == 2 ? (z ? z : n) - 1 : z);
+                if (K[i] > 0 && K[j] > 0) *face = s * K[i] * (K[j] / (K[i] + K[j])) * (fill[i] + fill[j]);
+            }
+    }
+}
+
+/* How full the node `far` steps from cell `at` along a side is; nothing beyond the box. */
+GS4I_INLINE gs4_real gs4i_fill_beyond(const gs4i_conduction *k, const int at[3], int side, int far)
+{
+    int p[3];
+    p[0] = at[0]; p[1] = at[1]; p[2] = at[2];
+    p[side / 2] += side & 1 ? far : -far;
+    if (p[side / 2] < 0 || p[side / 2] >= k->size[side / 2]) return 0;
+    return k->field[GS4I_HEAT_FILL][gs4i_heat_cell(k, p[0], p[1], p[2])];
+}
+
+/* Links of one cell to isothermal walls, air and bodies: their sum, 1/h^2, and that of their temperatures. An area that is shown
+ * along several axes counts once: each by its share of the normal. */
+static gs4_real gs4i_isothermal_links(const gs4_sim *sim, const int at[3], gs4_real *warmth)
+{
+    const gs4i_conduction *k = &sim->conduction;
+    const gs4_real fill = k->field[GS4I_HEAT_FILL][gs4i_heat_cell(k, at[0], at[1], at[2])];
+    gs4_real shows[6], all = 0, T = 0;
+    int side, a;
+    *warmth = 0;
+    for (side = 0; side < 6; side++) {
+        const int next = at[side / 2] + k->low[side / 2] + (side & 1 ? 1 : -1);
+        shows[side] = 0;
+        if ((next < 0 || next >= sim->grid.cells[side / 2]) && sim->desc.walls[side] != GS4_WALL_OPEN) {
+            if (sim->desc.wall_is_isothermal[side]) { all += 2 * fill; *warmth += 2 * fill * sim->desc.wall_temperature[side]; }
+        } else if (k->exposed && gs4i_fill_beyond(k, at, side, 3) < GS4I_C(0.5))     /* not the noise of the inside */
+            shows[side] = gs4i_max(fill - gs4i_fill_beyond(k, at, side, 1), GS4I_C(0));
+    }
+    for (side = 0; side < 6; side++) {
+        gs4_real square = shows[side] * shows[side], cube = square * shows[side], p[3], norm, link;
+        if (!(shows[side] > 0)) continue;
+        for (a = 0; a < 3; a++) {
+            const gs4_real other = gs4i_max(shows[2 * a], shows[2 * a + 1]);
+            if (a != side / 2) { square += other * other; cube += other * other * other; }
+            p[a] = GS4I_C(at[a] + k->low[a]) + GS4I_C(0.5);
+        }
+        p[side / 2] += side & 1 ? GS4I_C(1) : GS4I_C(-1);
+        if (!gs4i_is_isothermal_at(sim, gs4i_add(sim->grid.origin, gs4i_scale(gs4i_vec3(p[0], p[1], p[2]), sim->grid.h)), &T)) continue;
+        norm = GS4I_SQRT(square);
+        link = shows[side] * (shows[side] / norm) / (GS4I_SURFACE_DEPTH - GS4I_C(0.5) * (1 - cube / (square * norm)));
+        all += link; *warmth += link * T;
+    }
+    return all;
+}
+
+/* One plane of the box: isothermal links, and the heat that flows into each cell at T**, J/m^3. */
+static void gs4i_heat_flows(int z, void *context)
+{
+    const gs4_sim *sim = ((const gs4i_node_pass *)context)->sim;
+    const gs4i_conduction *k = &sim->conduction;
+    const gs4_real *T = k->field[GS4I_HEAT_T], per_area = sim->grid.inv_h * sim->grid.inv_h;
+    const int nx = k->size[0], ny = k->size[1], nz = k->size[2];
+    const gs4_real *fx = k->field[GS4I_HEAT_FACES], *fy = k->field[GS4I_HEAT_FACES + 1], *fz = k->field[GS4I_HEAT_FACES + 2];
+    int x, y;
+    for (y = 0; y < ny; y++)
+        for (x = 0; x < nx; x++) {
+            const size_t i = gs4i_heat_cell(k, x, y, z);
+            const size_t ix = ((size_t)z * (size_t)ny + (size_t)y) * (size_t)(nx + 1) + (size_t)x, iy = ((size_t)z * (size_t)(ny + 1) + (size_t)y) * (size_t)nx + (size_t)x;
+            const size_t row = (size_t)nx, plane = row * (size_t)ny;
+            gs4_real flow;
+            if (k->kind[i] != GS4_CELL_LIQUID) continue;
+            flow = fx[ix] * (T[x ? i - 1 : i + row - 1] - T[i]) + fx[ix + 1] * (T[x < nx - 1 ? i + 1 : i + 1 - row] - T[i])
+                 + fy[iy] * (T[y ? i - row : i + plane - row] - T[i]) + fy[iy + row] * (T[y < ny - 1 ? i + row : i + row - plane] - T[i])
+                 + fz[i] * (T[z ? i - plane : i + plane * (size_t)(nz - 1)] - T[i]) + fz[i + plane] * (T[z < nz - 1 ? i + plane : i - plane * (size_t)(nz - 1)] - T[i]);
+            if (k->linked) {
+                int at[3];
+                gs4_real link, warmth;
+                at[0] = x; at[1] = y; at[2] = z;
+                link = gs4i_isothermal_links(sim, at, &warmth) * sim->rule.s * k->field[GS4I_HEAT_K][i];
+                k->field[GS4I_HEAT_DIAGONAL][i] += per_area * link;
+                flow += sim->rule.s * k->field[GS4I_HEAT_K][i] * warmth - link * T[i];
+            }
+            k->field[GS4I_HEAT_RHS][i] += per_area * flow;
+        }
+}
+
+/* Second differences along the three axes of a field at a cell, h^2 d2/da2; a neighbour counts by its share of `weight`. Beyond isothermal
+ * walls the field mirrors oddly, by `wall` of them (NULL: about 0). Their sum. */
+static gs4_real gs4i_second_differences(const gs4_sim *sim, const gs4_real *field, const gs4_real *weight, const gs4_real *wall, const int at[3], gs4_real difference[3])
+{
+    const gs4i_conduction *k = &sim->conduction;
+    const size_t i = gs4i_heat_cell(k, at[0], at[1], at[2]);
+    int side;
+    difference[0] = difference[1] = difference[2] = 0;
+    for (side = 0; side < 6; side++) {
+        const int axis = side / 2, n = k->size[axis], next = at[axis] + (side & 1 ? 1 : -1);
+        int to[3];
+        size_t j;
+        to[0] = at[0]; to[1] = at[1]; to[2] = at[2];
+        to[axis] = next >= 0 && next < n ? next : next < 0 ? n - 1 : 0;
+        if (to[axis] != next && !sim->grid.periodic[axis]) {
+            const int there = next + k->low[axis];
+            if ((there < 0 || there >= sim->grid.cells[axis]) && sim->desc.wall_is_isothermal[side]) difference[axis] += 2 * ((wall ? wall[side] : 0) - field[i]);
+            continue;
+        }
+        j = gs4i_heat_cell(k, to[0], to[1], to[2]);
+        difference[axis] += gs4i_min(weight[j] / weight[i], GS4I_C(1)) * (field[j] - field[i]);
+    }
+    return difference[0] + difference[1] + difference[2];
+}
+
+/* What particles gather, on the nodes of a group of blocks: the rise x, and sharpened; the rate of mixing, and times T** sharpened. For the flux
+ * T~ - h^2/4 div grad T~ + h^2/12 d2T~/da2 for each axis a, whose gradient there and back again gives what the faces of the box give. */
+static void gs4i_heat_back(int index, void *context)
+{
+    const gs4i_node_pass *pass = (const gs4i_node_pass *)context;
+    const gs4_sim *sim = pass->sim;
+    const gs4i_grid *g = &sim->grid;
+    const gs4i_conduction *k = &sim->conduction;
+    const gs4_real *X = k->field[GS4I_HEAT_X], *T = k->field[GS4I_HEAT_T], *fill = k->field[GS4I_HEAT_FILL], *mix = k->field[GS4I_HEAT_MIX], *wall = sim->desc.wall_temperature;
+    int s, i, a;
+    for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
+        int first[3];
+        gs4i_block_coordinates(g, g->block[s], first);
+        for (i = 0; i < GS4I_BLOCK_NODES; i++) {
+            const size_t node = 4 * ((size_t)s * GS4I_BLOCK_NODES + (size_t)i);
+            const gs4_real capacity = k->content[node] * g->inv_h * g->inv_h * g->inv_h;
+            gs4_real *q = k->content + node, *flux = sim->particles.with_flux ? k->source + node : NULL, x[3], t[3], sum;
+            size_t cell;
+            int at[3];
+            at[0] = 4 * (first[0] - 1) + (i & 3) - k->low[0]; at[1] = 4 * (first[1] - 1) + (i >> 2 & 3) - k->low[1]; at[2] = 4 * (first[2] - 1) + (i >> 4) - k->low[2];
+            memset(q, 0, 4 * sizeof *q);
+            if (flux) memset(flux, 0, 4 * sizeof *flux);
+            if (at[0] < 0 || at[1] < 0 || at[2] < 0 || at[0] >= k->size[0] || at[1] >= k->size[1] || at[2] >= k->size[2]) continue;
+            cell = gs4i_heat_cell(k, at[0], at[1], at[2]);
+            if (k->kind[cell] != GS4_CELL_LIQUID) continue;
+            q[0] = X[cell];
+            sum = gs4i_second_differences(sim, X, fill, NULL, at, x);
+            q[1] = X[cell] - GS4I_C(0.25) * sum;
+            if (mix[cell] > 0) {
+                q[2] = mix[cell] / capacity;
+                q[3] = q[2] * (T[cell] - GS4I_C(0.25) * gs4i_second_differences(sim, T, mix, wall, at, t));
+            }
+            if (!flux) continue;
+            sum += gs4i_second_differences(sim, T, fill, wall, at, t);
+            for (a = 0; a < 3; a++) flux[a] = T[cell] + X[cell] - GS4I_C(0.25) * sum + GS4I_C(1.0 / 12) * (t[a] + x[a]);
+        }
+    }
+}
+
+/* Where the faces of a cell are among those of their axis, in the order of gs4_sim_desc's walls. */
+GS4I_INLINE void gs4i_heat_faces_of(const gs4i_conduction *k, const int at[3], size_t face[6])
+{
+    const size_t nx = (size_t)k->size[0], ny = (size_t)k->size[1], x = (size_t)at[0], y = (size_t)at[1], z = (size_t)at[2];
+    face[0] = (z * ny + y) * (nx + 1) + x;   face[1] = face[0] + 1;
+    face[2] = (z * (ny + 1) + y) * nx + x;   face[3] = face[2] + nx;
+    face[4] = (z * ny + y) * nx + x;         face[5] = face[4] + nx * ny;
+}
+
+/* Adds the links around the periodic axes to the diagonal, and remembers them. */
+static void gs4i_wrap_diagonal(const gs4_sim *sim)
+{
+    const gs4i_conduction *k = &sim->conduction;
+    const gs4_real per_area = sim->grid.inv_h * sim->grid.inv_h;
+    size_t i = 0, face[6];
+    int at[3], side;
+    for (at[2] = 0; at[2] < k->size[2]; at[2]++)
+        for (at[1] = 0; at[1] < k->size[1]; at[1]++)
+            for (at[0] = 0; at[0] < k->size[0]; at[0]++, i++) {
+                const gs4_real before = k->field[GS4I_HEAT_DIAGONAL][i];
+                gs4i_heat_faces_of(k, at, face);
+                for (side = 0; side < 6; side++)
+                    if (at[side / 2] == (side & 1 ? k->size[side / 2] - 1 : 0)) k->field[GS4I_HEAT_DIAGONAL][i] += per_area * k->field[GS4I_HEAT_FACES + side / 2][face[side]];
+                k->wrapped[i] = (double)k->field[GS4I_HEAT_DIAGONAL][i] - (double)before;
+            }
+}
+
+/* --- periodic walls: conjugate gradients around the solver, which knows of none --------------------------- */
+
+/* out = A p with the links around the periodic axes, for one plane of the box. */
+typedef struct gs4i_heat_apply { const gs4_sim *sim; const double *p; double *out; } gs4i_heat_apply;
+
+static void gs4i_heat_apply_plane(int z, void *context)
+{
+    const gs4i_heat_apply *task = (const gs4i_heat_apply *)context;
+    const gs4_sim *sim = task->sim;
+    const gs4i_conduction *k = &sim->conduction;
+    const double per_area = (double)sim->grid.inv_h * (double)sim->grid.inv_h;
+    size_t face[6];
+    int at[3], side;
+    at[2] = z;
+    for (at[1] = 0; at[1] < k->size[1]; at[1]++)
+        for (at[0] = 0; at[0] < k->size[0]; at[0]++) {
+            const size_t i = gs4i_heat_cell(k, at[0], at[1], at[2]);
+            double flow = 0;
+            if (k->kind[i] != GS4_CELL_LIQUID) { task->out[i] = 0; continue; }
+            gs4i_heat_faces_of(k, at, face);
+            for (side = 0; side < 6; side++) {
+                int to[3];
+                to[0] = at[0]; to[1] = at[1]; to[2] = at[2];
+                to[side / 2] += side & 1 ? 1 : -1;
+                if (to[side / 2] < 0) to[side / 2] = k->size[side / 2] - 1; else if (to[side / 2] == k->size[side / 2]) to[side / 2] = 0;
+                flow += (double)k->field[GS4I_HEAT_FACES + side / 2][face[side]] * (task->p[gs4i_heat_cell(k, to[0], to[1], to[2])] - task->p[i]);
+            }
+            task->out[i] = ((double)k->field[GS4I_HEAT_DIAGONAL][i] - k->wrapped[i]) * task->p[i] - per_area * flow;
+        }
+}
+
+static double gs4i_heat_dot(const double *a, const double *b, size_t n)
+{
+    double sum = 0;
+    size_t i;
+    for (i = 0; i < n; i++) sum += a[i] * b[i];
+    return sum;
+}
+
+/* The links around count as links to 0 in the preconditioner, one solve without them: what is left has few eigenvalues far from 1. */
+static int gs4i_solve_periodic(gs4_sim *sim, double tolerance, gs4_solve_stats *stats)
+{
+    gs4i_conduction *k = &sim->conduction;
+    const size_t n = (size_t)k->size[0] * (size_t)k->size[1] * (size_t)k->size[2];
+    double *x = k->outer, *r = x + n, *p = r + n, *q = p + n, rz = 0, all;
+    gs4_real *rhs = k->field[GS4I_HEAT_RHS], *z = k->field[GS4I_HEAT_X];
+    gs4i_heat_apply apply;
+    size_t i;
+    int turn, iterations = 0, result = GS4_ERROR_NOT_CONVERGED;
+    apply.sim = sim; apply.p = p; apply.out = q;
+    for (i = 0; i < n; i++) { x[i] = p[i] = 0; r[i] = (double)rhs[i]; }
+    all = sqrt(gs4i_heat_dot(r, r, n));
+    stats->residual = 0;
+    for (turn = 0; turn < sim->desc.solver_max_iterations; turn++) {
+        double before = rz, step, left = sqrt(gs4i_heat_dot(r, r, n));
+        stats->residual = all > 0 ? left / all : 0;
+        if (left <= tolerance * all) { result = GS4_OK; break; }
+        for (i = 0; i < n; i++) { rhs[i] = GS4I_C(r[i]); z[i] = 0; }
+        result = gs4i_solver_solve(&k->solver, rhs, z, fmax(1e-3 * tolerance, 1e-11), sim->desc.solver_max_iterations, stats);
+        iterations += stats->iterations;
+        if (result != GS4_OK) break;
+        for (rz = 0, i = 0; i < n; i++) if (k->kind[i] == GS4_CELL_LIQUID) rz += r[i] * (double)z[i];
+        for (i = 0; i < n; i++) p[i] = (k->kind[i] == GS4_CELL_LIQUID ? (double)z[i] : 0) + (turn ? rz / before : 0) * p[i];
+        gs4i_parallel_for(&sim->tasks, k->size[2], gs4i_heat_apply_plane, &apply);
+        step = rz / gs4i_heat_dot(p, q, n);
+        for (i = 0; i < n; i++) { x[i] += step * p[i]; r[i] -= step * q[i]; }
+        result = GS4_ERROR_NOT_CONVERGED;
+    }
+    for (i = 0; i < n; i++) z[i] = GS4I_C(x[i]);
+    stats->iterations = iterations;
+    return result;
+}
+
+/* --- the solve --------------------------------------------------------------------------------------------- */
+
+static int gs4i_solve_heat(gs4_sim *sim)
+{
+    gs4i_conduction *k = &sim->conduction;
+    const double tolerance = (double)sim->desc.solver_tolerance;
+    gs4_poisson_desc d;
+    gs4_solve_stats stats;
+    int a, result;
+    memset(&d, 0, sizeof d); memset(&stats, 0, sizeof stats);
+    for (a = 0; a < 3; a++) { d.cells[a] = k->size[a]; d.coefficient[a] = k->field[GS4I_HEAT_FACES + a]; }
+    d.cell_size = sim->grid.h; d.kind = k->kind; d.diagonal = k->field[GS4I_HEAT_DIAGONAL];
+    k->solver.memory = &sim->memory; k->solver.tasks = &sim->tasks;
+    if (k->outer) gs4i_wrap_diagonal(sim);
+    result = gs4i_solver_setup(&k->solver, &d, sim->desc.threads > 1 ? 2 * sim->desc.threads : sim->desc.parallel_for ? 8 : 1);
+    if (result == GS4_ERROR_MEMORY) return gs4i_fail_memory(sim);
+    if (result == GS4_OK)
+        result = k->outer ? gs4i_solve_periodic(sim, tolerance, &stats)
+                          : gs4i_solver_solve(&k->solver, k->field[GS4I_HEAT_RHS], k->field[GS4I_HEAT_X], tolerance, sim->desc.solver_max_iterations, &stats);
+    k->iterations = stats.iterations; k->residual = stats.residual;
+    if (result == GS4_OK) return result;
+    if (result == GS4_ERROR_NOT_CONVERGED)
+        return gs4i_fail_value(sim, result, "the heat of the step did not converge: the residual is ", stats.residual, " of the heat that flows (solver_tolerance, solver_max_iterations); the step was not taken; a larger tolerance, more iterations or a smaller dt would do");
+    return gs4i_fail_value(sim, GS4_ERROR_UNSTABLE, k->solver.fault, k->solver.fault_value, " of the heat of the step, which is not finite or absurd; the step was not taken; smaller conductivities, temperatures or heat capacities would do");
+}
+
+static void gs4i_free_heat(gs4i_memory *m, gs4i_conduction *k)
+{
+    const size_t node = GS4I_NODE_REALS * sizeof(gs4_real), slots = (size_t)k->slots;
+    gs4i_free(m, k->content, slots, node); gs4i_free(m, k->source, slots, node);
+    gs4i_free(m, k->field[0], k->room, GS4I_HEAT_FIELDS * sizeof(gs4_real)); gs4i_free(m, k->kind, k->room, 1);
+    gs4i_free(m, k->outer, k->room, 5 * sizeof *k->outer);
+    k->solver.memory = m;
+    gs4i_solver_free(&k->solver);
+}
+
+/* Room for the heat of every node that exists. */
+static int gs4i_reserve_heat(gs4_sim *sim)
+{
+    gs4i_conduction *k = &sim->conduction;
+    gs4i_memory *m = &sim->memory;
+    const size_t node = GS4I_NODE_REALS * sizeof(gs4_real), slots = (size_t)sim->grid.capacity;
+    const int wants_source = sim->particles.with_flux || k->heats;
+    gs4_real *content, *source;
+    if (!sim->particles.with_heat || (k->slots >= sim->grid.active && (k->source || !wants_source))) return GS4_OK;
+    content = (gs4_real *)gs4i_alloc(m, slots, node);
+    source = wants_source ? (gs4_real *)gs4i_alloc(m, slots, node) : NULL;
+    if (!content || (wants_source && !source)) { gs4i_free(m, content, slots, node); return GS4_ERROR_MEMORY; }
+    gs4i_free(m, k->content, (size_t)k->slots, node); gs4i_free(m, k->source, (size_t)k->slots, node);
+    k->content = content; k->source = source; k->slots = sim->grid.capacity;
+    return GS4_OK;
+}
+
+/* T~ on the nodes. Nothing that lasts is written. */
+static int gs4i_conduct(gs4_sim *sim, gs4i_node_pass *nodes)
+{
+    gs4i_conduction *k = &sim->conduction;
+    const double start = gs4i_now(sim);
+    size_t cells;
+    int a, result;
+    gs4i_fold_heat(sim);
+    if (gs4i_heat_box(sim) != GS4_OK) return gs4i_fail_memory(sim);
+    cells = (size_t)k->size[0] * (size_t)k->size[1] * (size_t)k->size[2];
+    memset(k->kind, GS4_CELL_SOLID, cells);
+    for (a = GS4I_HEAT_T; a <= GS4I_HEAT_X; a++) memset(k->field[a], 0, cells * sizeof(gs4_real));
+    k->exposed = sim->desc.air_is_isothermal;
+    for (a = 0; a < sim->boundary.body_count; a++) k->exposed |= sim->boundary.bodies[a].is.is_isothermal;
+    k->linked = k->exposed;
+    for (a = 0; a < 6; a++) k->linked |= sim->desc.wall_is_isothermal[a];
+    gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_heat_nodes, nodes);
+    gs4i_parallel_for(&sim->tasks, k->size[2] + 1, gs4i_heat_faces, nodes);
+    gs4i_parallel_for(&sim->tasks, k->size[2], gs4i_heat_flows, nodes);
+    result = gs4i_solve_heat(sim);
+    if (result != GS4_OK) return result;
+    gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_heat_back, nodes);
+    gs4i_fill_heat(sim);
+    sim->seconds[GS4I_CLOCK_SOLVE] += gs4i_now(sim) - start;
+    return GS4_OK;
+}
+
 /* ==== [[step]] one step; the function to read first is gs4i_step, at the end of this section ======= */
 
 /* --- what can go wrong, in words -------------------------------------------------------------------- */
-
-static int gs4i_fail(gs4_sim *sim, int code, const char *what)
-{
-    gs4i_text t;
-    t.at = sim->error; t.left = sizeof sim->error;
-    gs4i_put(&t, what);
-    if (sim->desc.log) sim->desc.log(2, sim->error, sim->desc.log_user);
-    return code;
-}
-
-/* "<before><value><after>" */
-static int gs4i_fail_value(gs4_sim *sim, int code, const char *before, double value, const char *after)
-{
-    char line[320];
-    gs4i_text t;
-    t.at = line; t.left = sizeof line;
-    gs4i_put(&t, before); gs4i_put_real(&t, value); gs4i_put(&t, after);
-    return gs4i_fail(sim, code, line);
-}
-
-static int gs4i_fail_memory(gs4_sim *sim) { return gs4i_fail(sim, GS4_ERROR_MEMORY, "out of memory; nothing has changed"); }
 
 static int gs4i_fail_bad(gs4_sim *sim, const gs4i_report *r)
 {
@@ -5556,6 +6445,7 @@ static void gs4i_look_at_particles(const gs4_sim *sim, gs4i_report *r)
         if (!p->with_rates) gs4i_load_affine(p, (size_t)i, n, L);
         else memset(L, 0, sizeof L);
         gs4i_take_laws(sim->laws, p->material + i, n, &laws);
+        if (p->with_heat) { gs4i_lanes own[4]; gs4i_to_lanes(p->heat + 4 * (size_t)i, n, own); memcpy(laws.temperature, own[0], sizeof own[0]); }
         gs4i_liquid_stress(&laws, q.v[3], L, sigma, mu);
         gs4i_see_liquids(&seen, &laws, q.v[3], mu);
         gs4i_see_motion(&seen, q.v, L);
@@ -5598,10 +6488,14 @@ static gs4i_rule gs4i_make_rule(const gs4_sim *sim, gs4_real dt)
     k.reach.ahead = sim->particles.with_rates ? k.alpha_f * dt : GS4I_C(0);
     k.reach.shift = k.afresh ? GS4I_C(0) : sim->shift;
     k.next_shift = (k.gamma - GS4I_C(0.5)) * dt;
+    if (!sim->particles.with_rates) k.alpha_m = k.alpha_f = k.gamma = 1;                        /* of heat: backward Euler */
     k.s = k.alpha_f * k.gamma * dt / k.alpha_m;
+    k.before = sim->particles.with_rates ? k.reach.ahead - k.s : GS4I_C(0);
     k.decay = sim->desc.flip_decay_time > 0 && gs4i_finite(sim->desc.flip_decay_time)
             ? 1 / gs4i_max(sim->desc.flip_decay_time, GS4I_C(1e-6) * dt) : GS4I_C(0);    /* faster makes no difference */
     k.damped = 1 / (1 + k.s * k.decay);
+    k.inv_area = sim->grid.inv_h * sim->grid.inv_h;
+    k.mixing = sim->particles.with_rates ? gs4i_min(k.decay, GS4I_C(0.5) / k.s) : GS4I_C(0.5) / k.s;
     k.inv_alpha_m = 1 / k.alpha_m;
     k.fast_decay = 0; k.inv_full = 0;
     for (i = 0; i < sim->material_count; i++) {
@@ -5613,25 +6507,16 @@ static gs4i_rule gs4i_make_rule(const gs4_sim *sim, gs4_real dt)
 
 /* --- nodes -------------------------------------------------------------------------------------------- */
 
-enum { GS4I_GROUP = 16 };               /* blocks a task */
-
-typedef struct gs4i_node_pass {
-    gs4_sim *sim;
-    gs4_real lightest;                  /* nodes with less mass are empty: what they hold is below rounding */
-} gs4i_node_pass;
-
-GS4I_INLINE int gs4i_group_end(const gs4i_grid *g, int index)
-{
-    return (index + 1) * GS4I_GROUP < g->active ? (index + 1) * GS4I_GROUP : g->active;
-}
-
 static void gs4i_clear_nodes(int index, void *context)
 {
-    const gs4i_grid *g = &((const gs4i_node_pass *)context)->sim->grid;
+    const gs4_sim *sim = ((const gs4i_node_pass *)context)->sim;
+    const gs4i_grid *g = &sim->grid;
     int begin = index * GS4I_GROUP, end = gs4i_group_end(g, index);
     size_t bytes = (size_t)(end - begin) * GS4I_NODE_REALS * sizeof(gs4_real);
     memset(g->momentum + (size_t)begin * GS4I_NODE_REALS, 0, bytes);
     memset(g->force + (size_t)begin * GS4I_NODE_REALS, 0, bytes);
+    if (sim->particles.with_heat) memset(sim->conduction.content + (size_t)begin * GS4I_NODE_REALS, 0, bytes);
+    if (sim->conduction.source) memset(sim->conduction.source + (size_t)begin * GS4I_NODE_REALS, 0, bytes);
 }
 
 static void gs4i_clear_jumps(int index, void *context)
@@ -5794,8 +6679,6 @@ static void gs4i_node_spreads(int index, void *context)
 
 #define GS4I_TRY(call) do { int gs4i_r = (call); if (gs4i_r != GS4_OK) return gs4i_r; } while (0)
 
-static int gs4i_groups(const gs4_sim *sim) { return (sim->grid.active + GS4I_GROUP - 1) / GS4I_GROUP; }
-
 /* Everything whose size follows the blocks. */
 static int gs4i_after_occupy(gs4_sim *sim)
 {
@@ -5807,7 +6690,7 @@ static int gs4i_after_occupy(gs4_sim *sim)
         gs4i_free(m, sim->reports, (size_t)sim->report_capacity, sizeof *r);
         sim->reports = r; sim->report_capacity = sim->grid.occupied_capacity;
     }
-    return GS4_OK;
+    return gs4i_reserve_heat(sim) == GS4_OK ? GS4_OK : gs4i_fail_memory(sim);
 }
 
 /* S1: sort. */
@@ -5830,7 +6713,7 @@ static int gs4i_rasterise(gs4_sim *sim, gs4i_node_pass *nodes)
     for (tries = 0; tries < 2; tries++) {
         if (sim->unsorted || tries) GS4I_TRY(gs4i_bin(sim));
         gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_clear_nodes, nodes);
-        gs4i_scatter(sim, euler ? gs4i_scatter_euler : gs4i_scatter_momentum);
+        gs4i_scatter(sim, !euler ? gs4i_scatter_momentum : sim->particles.with_heat ? gs4i_scatter_euler_and_heat : gs4i_scatter_euler);
         if (!gs4i_all_reports(sim).strayed) return GS4_OK;
     }
     return gs4i_fail(sim, GS4_ERROR_UNSTABLE, "particles would move more than a cell beyond the domain in one step; the step was not taken");
@@ -5869,7 +6752,7 @@ static int gs4i_rehearse(gs4_sim *sim, gs4i_node_pass *nodes)
 
 /* --- mouths, leavers, time ---------------------------------------------------------------------------- */
 
-static int gs4i_add_one(gs4_sim *sim, gs4_vec3 x, gs4_vec3 v, gs4_real mass, int material)
+static int gs4i_add_one(gs4_sim *sim, gs4_vec3 x, gs4_vec3 v, gs4_real mass, int material, gs4_real temperature)
 {
     gs4i_particles *p = &sim->particles;
     size_t i = (size_t)p->count;
@@ -5880,6 +6763,7 @@ static int gs4i_add_one(gs4_sim *sim, gs4_vec3 x, gs4_vec3 v, gs4_real mass, int
     if (p->with_rates) { memset(p->rate + 4 * i, 0, 4 * sizeof(gs4_real)); memset(p->lag + 4 * i, 0, 4 * sizeof(gs4i_half)); }
     for (k = 0; k < 3 && p->affine[k]; k++) memset(p->affine[k] + 4 * i, 0, 4 * sizeof(gs4_real));
     if (p->elastic_reals) memset(p->elastic + (size_t)p->elastic_reals * i, 0, (size_t)p->elastic_reals * sizeof(gs4_real));
+    if (p->with_heat) gs4i_begin_heat(p, i, &sim->laws[material], temperature);
     p->id[i] = sim->next_id++;
     p->material[i] = (uint8_t)material;
     p->count++;
@@ -5939,7 +6823,7 @@ static int gs4i_mouth_points(gs4_sim *sim, gs4i_emitter *e, const double drift[3
         world = gs4i_vec3(GS4I_C(p[0] + travelled[0]), GS4I_C(p[1] + travelled[1]), GS4I_C(p[2] + travelled[2]));
         if (!gs4i_inside_domain(&sim->grid, world)) continue;
         n++;
-        if (emit && !gs4i_add_one(sim, world, e->is.fill.velocity, mass, e->is.fill.material)) return n;
+        if (emit && !gs4i_add_one(sim, world, e->is.fill.velocity, mass, e->is.fill.material, e->is.fill.temperature)) return n;
     }
     return n;
 }
@@ -6061,6 +6945,7 @@ static int gs4i_step(gs4_sim *sim, gs4_real dt)
 {
     const int euler = sim->desc.integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER;
     const double start = gs4i_now(sim);
+    const int heat = sim->particles.with_heat;
     gs4i_node_pass nodes;
     memset(&nodes, 0, sizeof nodes);
     nodes.sim = sim;
@@ -6073,16 +6958,18 @@ static int gs4i_step(gs4_sim *sim, gs4_real dt)
         if (gs4i_place_jumps(&sim->memory, &sim->boundary, &sim->grid) != GS4_OK) return gs4i_fail_memory(sim);
         gs4i_set_velocities(sim, &nodes);
         if (!euler) {
-            gs4i_scatter(sim, gs4i_scatter_forces);                                             /* S4, S5 */
+            gs4i_scatter(sim, heat ? gs4i_scatter_forces_and_heat : gs4i_scatter_forces);       /* S4, S5 */
             gs4i_fold_force(&sim->boundary, &sim->grid);
             gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_node_accelerations, &nodes);  /* S6 */
             gs4i_fill_images(&sim->boundary, &sim->grid, sim->grid.momentum);
             gs4i_fill_images(&sim->boundary, &sim->grid, sim->grid.force);
         }
         GS4I_TRY(gs4i_check_stage(sim));
+        if (heat) GS4I_TRY(gs4i_conduct(sim, &nodes));
         GS4I_TRY(gs4i_rehearse(sim, &nodes));
         if (!euler) gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_node_memories, &nodes);
-        gs4i_gather(sim, euler ? gs4i_gather_euler_task : gs4i_correct_task);                   /* S7 */
+        gs4i_gather(sim, euler ? heat ? gs4i_gather_euler_with_heat_task : gs4i_gather_euler_task
+                               : heat ? gs4i_correct_with_heat_task : gs4i_correct_task);       /* S7 */
     }
     gs4i_finish(sim);                                                                           /* S8 */
     sim->seconds[GS4I_CLOCK_TOTAL] += gs4i_now(sim) - start;
@@ -6151,7 +7038,7 @@ static int gs4i_file_close(gs4_sim *sim, gs4i_file *f)
 }
 
 /* Columns of a frame, in order. Frames are little-endian; on a big-endian machine numbers are turned round. */
-enum { GS4I_COLUMNS = 8 };
+enum { GS4I_COLUMNS = 10 };
 typedef struct gs4i_column { const char *name; const char *ply; const char *npy; const void *data; size_t size; int numbers; size_t stride; } gs4i_column;
 
 static int gs4i_columns(gs4_sim *sim, gs4i_column c[GS4I_COLUMNS])
@@ -6168,8 +7055,13 @@ static int gs4i_columns(gs4_sim *sim, gs4i_column c[GS4I_COLUMNS])
         { "id", "uint", "<u4", p->id, 4, 1, 4 },
         { "material", "uchar", "|u1", p->material, 1, 1, 1 } };
     const gs4i_column stress = { "stress", real_ply, real_npy, p->elastic, r, 6, (size_t)p->elastic_reals * r };
+    const gs4i_column temperature = { "temperature", real_ply, real_npy, p->heat, r, 1, 4 * r };
+    const gs4i_column fraction = { "liquid_fraction", real_ply, real_npy, p->heat ? p->heat + 1 : NULL, r, 1, 4 * r };
+    const gs4i_column flux = { "flux", real_ply, real_npy, p->flux, r, 3, 4 * r };
     for (; n < (int)(sizeof columns / sizeof columns[0]); n++) c[n] = columns[n];
     if (p->elastic_reals) c[n++] = stress;
+    if (p->with_heat) { c[n++] = temperature; c[n++] = fraction; }
+    if (p->with_flux) c[n++] = flux;
     if (p->count == 0) { int i; for (i = 0; i < n; i++) c[i].data = &sim->particles; }
     return n;
 }
@@ -6183,7 +7075,7 @@ static void gs4i_put_records(gs4i_file *f, const gs4i_column *c, int columns, in
     size_t used = 0, b;
     int i, k, e;
     for (i = 0; i < count; i++) {
-        if (used + 128 > sizeof buffer) { gs4i_file_put(f, buffer, used); used = 0; }
+        if (used + 256 > sizeof buffer) { gs4i_file_put(f, buffer, used); used = 0; }
         for (k = 0; k < columns; k++)
             for (e = 0; e < c[k].numbers; e++) {
                 const unsigned char *from = (const unsigned char *)c[k].data + (size_t)i * c[k].stride + (size_t)e * c[k].size;
@@ -6258,7 +7150,7 @@ typedef struct gs4i_head {
     double time, last_dt; uint64_t steps;
     uint32_t next_id; int32_t afresh, unsorted, unseen;
     double min_mass, fastest, shift;
-    int32_t particles, materials, bodies, emitters, active, occupied, elastic_reals;
+    int32_t particles, materials, bodies, emitters, active, occupied, elastic_reals, with_heat, with_flux;
     uint64_t split, bounded;
     gs4i_report worst;
 } gs4i_head;
@@ -6284,7 +7176,7 @@ static void gs4i_head_of(const gs4_sim *sim, gs4i_head *h)
     h->particles = sim->particles.count; h->materials = sim->material_count;
     h->bodies = sim->boundary.body_count; h->emitters = sim->emitter_count;
     h->active = sim->grid.active; h->occupied = sim->grid.occupied;
-    h->elastic_reals = sim->particles.elastic_reals; h->split = sim->split; h->bounded = sim->bounded;
+    h->elastic_reals = sim->particles.elastic_reals; h->with_heat = sim->particles.with_heat; h->with_flux = sim->particles.with_flux; h->split = sim->split; h->bounded = sim->bounded;
     h->worst = sim->worst;
 }
 
@@ -6329,7 +7221,8 @@ static int gs4i_check_head(gs4_sim *sim, const gs4i_head *h)
         || memcmp(h->gravity, own.gravity, sizeof h->gravity) || memcmp(h->rho, own.rho, sizeof h->rho)
         || memcmp(&h->decay, &own.decay, sizeof h->decay))
         return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint belongs to a simulation with another description");
-    if (h->materials != own.materials || h->bodies != own.bodies || h->emitters != own.emitters || h->elastic_reals != own.elastic_reals)
+    if (h->materials != own.materials || h->bodies != own.bodies || h->emitters != own.emitters || h->elastic_reals != own.elastic_reals
+        || h->with_heat != own.with_heat || h->with_flux != own.with_flux)
         return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint belongs to a scene with other materials, colliders or emitters: add the same ones, in the same order, before gs4_load");
     if (h->particles < 0 || h->active < 0 || h->occupied < 0 || h->particles > GS4I_MAX_PARTICLES || (size_t)h->active > sim->grid.table_count || h->occupied > h->active)
         return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint is damaged");
@@ -6468,6 +7361,7 @@ static void gs4i_release_state(gs4_sim *sim)
     gs4i_grid_free(m, &sim->grid);
     for (i = 0; i < 6; i++) gs4i_free(m, sim->boundary.images[i], (size_t)sim->boundary.image_capacity[i], sizeof(gs4i_image));
     gs4i_free(m, sim->reports, (size_t)sim->report_capacity, sizeof(gs4i_report));
+    gs4i_free_heat(m, &sim->conduction);
 }
 
 /* Make the state of the file beside the present one, and put it in its place when it is whole. */
@@ -6478,12 +7372,15 @@ static int gs4i_restore(gs4_sim *sim, const gs4i_head *h, const gs4i_pieces *p)
     int i, result;
     memset(&next.particles, 0, sizeof next.particles);
     next.particles.with_rates = sim->particles.with_rates; next.particles.elastic_reals = h->elastic_reals;
+    next.particles.with_heat = sim->particles.with_heat; next.particles.with_flux = sim->particles.with_flux;
     memset(&next.grid, 0, sizeof next.grid);
     memcpy(next.grid.cells, empty.cells, sizeof empty.cells); memcpy(next.grid.blocks, empty.blocks, sizeof empty.blocks);
     memcpy(next.grid.periodic, empty.periodic, sizeof empty.periodic);
     next.grid.h = empty.h; next.grid.inv_h = empty.inv_h; next.grid.origin = empty.origin; next.grid.table_count = empty.table_count;
     for (i = 0; i < 6; i++) { next.boundary.images[i] = NULL; next.boundary.image_count[i] = next.boundary.image_capacity[i] = 0; }
     next.reports = NULL; next.report_capacity = 0;
+    memset(&next.conduction, 0, sizeof next.conduction);
+    next.conduction.heats = sim->conduction.heats;
     result = gs4i_rebuild(&next, h, p);
     if (result != GS4_OK) {
         gs4i_release_state(&next);
@@ -6607,7 +7504,7 @@ static int gs4i_check_absent(gs4_sim *sim, const char *field, gs4_real value, co
     return gs4i_fail(sim, GS4_ERROR_ARGUMENT, line);
 }
 
-#define GS4I_NO_HEAT "this version has no heat, leave it 0"
+#define GS4I_NO_HEAT "no material so far conducts heat, melts or is heated by viscosity: add that material first, or leave it 0"
 
 static int gs4i_bad_argument(gs4_sim *sim, const char *what) { return gs4i_fail(sim, GS4_ERROR_ARGUMENT, what); }
 
@@ -6704,12 +7601,12 @@ static int gs4i_check_walls(gs4_sim *sim, const gs4_sim_desc *d)
         if ((int)d->walls[w] < 0 || d->walls[w] > GS4_WALL_PERIODIC) return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "walls[] holds ", (int)d->walls[w], ", which is none of gs4_wall");
         if ((d->walls[w] == GS4_WALL_PERIODIC) != (d->walls[w ^ 1] == GS4_WALL_PERIODIC))
             return gs4i_bad_argument(sim, "walls: both walls of an axis must be GS4_WALL_PERIODIC, or neither");
-        GS4I_TRY(gs4i_check_absent(sim, "wall_temperature", d->wall_temperature[w], GS4I_NO_HEAT));
-        GS4I_TRY(gs4i_check_absent(sim, "wall_is_isothermal", GS4I_C(d->wall_is_isothermal[w]), GS4I_NO_HEAT));
+        GS4I_TRY(gs4i_check(sim, "wall_temperature", d->wall_temperature[w], GS4I_FINITE));
+        if (d->wall_is_isothermal[w] && d->walls[w] >= GS4_WALL_OPEN) return gs4i_bad_argument(sim, "wall_is_isothermal: an open or periodic wall has no temperature, leave it 0");
     }
     if (!(gs4i_abs(d->ambient_temperature) < GS4I_HUGE))
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "ambient_temperature is ", (double)d->ambient_temperature, "; give a finite temperature, which viscosity laws see");
-    return gs4i_check_absent(sim, "air_is_isothermal", GS4I_C(d->air_is_isothermal), GS4I_NO_HEAT);
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "ambient_temperature is ", (double)d->ambient_temperature, "; give a finite temperature, which viscosity laws see in a scene without heat");
+    return GS4_OK;
 }
 
 /* All of a description; fills in the defaults. */
@@ -6771,8 +7668,8 @@ static int gs4i_check_viscoelastic(gs4_sim *sim, const gs4_material *m)
     return GS4_OK;
 }
 
-/* Viscosity at the temperature of the air, at rest and far from it, must be a number. */
-static int gs4i_check_cross_wlf(gs4_sim *sim, const gs4_material *m)
+/* In a scene without heat the viscosity at the temperature of the air, at rest and far from it, must be a number. */
+static int gs4i_check_cross_wlf(gs4_sim *sim, const gs4_material *m, int at_ambient)
 {
     gs4i_law l;
     int i;
@@ -6784,11 +7681,41 @@ static int gs4i_check_cross_wlf(gs4_sim *sim, const gs4_material *m)
     memset(&l, 0, sizeof l);
     l.is = *m;
     gs4i_set_law(&l, sim->desc.ambient_temperature);
-    for (i = -6; i <= 6; i += 2) {
+    for (i = -6; i <= 6 && at_ambient; i += 2) {
         const gs4_real mu = gs4i_cross_wlf(&l.is, l.temperature, GS4I_C(pow(10, i)));
         if (!(mu >= 0 && mu < GS4I_HUGE))
             return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "cross_wlf gives no finite viscosity at ambient_temperature ", (double)l.temperature, "; other constants would, or a temperature well above t2");
     }
+    return GS4_OK;
+}
+
+/* A scene carries heat from the first material on that conducts it, melts or is heated by viscosity. */
+static int gs4i_has_heat(const gs4_material *m) { return m->conductivity > 0 || m->can_melt || m->viscous_heating; }
+
+static int gs4i_check_heat(gs4_sim *sim, const gs4_material *m)
+{
+    GS4I_TRY(gs4i_check(sim, "heat_capacity", m->heat_capacity, GS4I_NOT_NEGATIVE));
+    GS4I_TRY(gs4i_check(sim, "conductivity", m->conductivity, GS4I_NOT_NEGATIVE));
+    GS4I_TRY(gs4i_check(sim, "flux_relaxation_time", m->flux_relaxation_time, GS4I_NOT_NEGATIVE));
+    GS4I_TRY(gs4i_check(sim, "fourier_fraction", m->fourier_fraction, GS4I_FRACTION));
+    GS4I_TRY(gs4i_check(sim, "melting_temperature", m->melting_temperature, GS4I_FINITE));
+    GS4I_TRY(gs4i_check(sim, "latent_heat", m->latent_heat, GS4I_NOT_NEGATIVE));
+    if (m->heat_capacity > 0 && (m->heat_capacity < GS4I_C(1e-9) || m->heat_capacity > GS4I_C(1e12)))
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "heat_capacity is ", (double)m->heat_capacity, "; it must be 0 (no heat) or from 1e-9 to 1e12 J/(kg K)");
+    if (m->conductivity > 0 && (m->conductivity < GS4I_C(1e-12) || m->conductivity > GS4I_C(1e12)))
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "conductivity is ", (double)m->conductivity, "; it must be 0 (insulating) or from 1e-12 to 1e12 W/(m K)");
+    if (m->flux_relaxation_time > 0 && (m->flux_relaxation_time < GS4I_C(1e-15) || m->flux_relaxation_time > GS4I_C(1e15)))
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "flux_relaxation_time is ", (double)m->flux_relaxation_time, "; it must be 0 (Fourier) or from 1e-15 to 1e15 s");
+    if (m->heat_capacity == 0 && (gs4i_has_heat(m) || sim->particles.with_heat))
+        return gs4i_bad_argument(sim, "heat_capacity is 0; every material of a scene with heat needs one above 0, J/(kg K)");
+    if (m->flux_relaxation_time > 0 && m->conductivity == 0)
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "flux_relaxation_time is ", (double)m->flux_relaxation_time, "; without conductivity there is no flux, leave it 0");
+    if (!m->can_melt) {
+        GS4I_TRY(gs4i_check_absent(sim, "latent_heat", m->latent_heat, "only a material that can_melt has one, leave it 0"));
+        return gs4i_check_absent(sim, "melting_temperature", m->melting_temperature, "only a material that can_melt has one, leave it 0");
+    }
+    if (!((double)m->latent_heat / (double)m->heat_capacity < (double)GS4I_HUGE))
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "latent_heat is ", (double)m->latent_heat, "; over heat_capacity it is absurdly large");
     return GS4_OK;
 }
 
@@ -6804,7 +7731,7 @@ static int gs4i_check_material(gs4_sim *sim, const gs4_material *m)
             const gs4_real *constants[6] = { &m->cross_wlf.a, &m->cross_wlf.n, &m->cross_wlf.d1, &m->cross_wlf.a1, &m->cross_wlf.t1, &m->cross_wlf.t2 };
             GS4I_TRY(gs4i_check_absent(sim, "cross_wlf", *constants[i], "only viscosity_law GS4_VISCOSITY_CROSS_WLF has constants, leave it 0"));
         }
-    else GS4I_TRY(gs4i_check_cross_wlf(sim, m));
+    else GS4I_TRY(gs4i_check_cross_wlf(sim, m, !gs4i_has_heat(m) && !sim->particles.with_heat));
     if (m->viscosity_law == GS4_VISCOSITY_CALLBACK && !m->viscosity_fn) return gs4i_bad_argument(sim, "viscosity_fn is missing; GS4_VISCOSITY_CALLBACK needs it");
     if (m->viscosity_law < GS4_VISCOSITY_CONSTANT || m->viscosity_law > GS4_VISCOSITY_CALLBACK)
         return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "viscosity_law is ", (int)m->viscosity_law, ", which is none of gs4_viscosity_law");
@@ -6825,14 +7752,7 @@ static int gs4i_check_material(gs4_sim *sim, const gs4_material *m)
     GS4I_TRY(gs4i_check_absent(sim, "shear_modulus", m->shear_modulus, "this version has no solids, leave it 0"));
     GS4I_TRY(gs4i_check_absent(sim, "yield_compression", m->yield_compression, "this version has no solids, leave it 0"));
     GS4I_TRY(gs4i_check_absent(sim, "yield_stretch", m->yield_stretch, "this version has no solids, leave it 0"));
-    GS4I_TRY(gs4i_check_absent(sim, "heat_capacity", m->heat_capacity, GS4I_NO_HEAT));
-    GS4I_TRY(gs4i_check_absent(sim, "conductivity", m->conductivity, GS4I_NO_HEAT));
-    GS4I_TRY(gs4i_check_absent(sim, "flux_relaxation_time", m->flux_relaxation_time, GS4I_NO_HEAT));
-    GS4I_TRY(gs4i_check_absent(sim, "fourier_fraction", m->fourier_fraction, GS4I_NO_HEAT));
-    GS4I_TRY(gs4i_check_absent(sim, "melting_temperature", m->melting_temperature, GS4I_NO_HEAT));
-    GS4I_TRY(gs4i_check_absent(sim, "latent_heat", m->latent_heat, GS4I_NO_HEAT));
-    GS4I_TRY(gs4i_check_absent(sim, "can_melt", GS4I_C(m->can_melt), GS4I_NO_HEAT));
-    return gs4i_check_absent(sim, "viscous_heating", GS4I_C(m->viscous_heating), GS4I_NO_HEAT);
+    return gs4i_check_heat(sim, m);
 }
 
 static int gs4i_check_fill(gs4_sim *sim, gs4_fill *f)
@@ -6844,7 +7764,8 @@ static int gs4i_check_fill(gs4_sim *sim, gs4_fill *f)
     if (f->spacing < GS4I_C(0.02) * sim->grid.h) return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "fill.spacing is ", (double)f->spacing, "; below a fiftieth of a cell it is absurdly small");
     GS4I_TRY(gs4i_check3(sim, "fill.velocity", f->velocity));
     GS4I_TRY(gs4i_check3(sim, "fill.angular_velocity", f->angular_velocity));
-    GS4I_TRY(gs4i_check_absent(sim, "fill.temperature", f->temperature, GS4I_NO_HEAT));
+    GS4I_TRY(gs4i_check(sim, "fill.temperature", f->temperature, GS4I_FINITE));
+    if (!sim->particles.with_heat) GS4I_TRY(gs4i_check_absent(sim, "fill.temperature", f->temperature, GS4I_NO_HEAT));
     return gs4i_check(sim, "fill.jitter", f->jitter, GS4I_FRACTION);
 }
 
@@ -7054,6 +7975,37 @@ static int gs4i_make_elastic(gs4_sim *sim)
     return GS4_OK;
 }
 
+/* From the first material with heat on particles carry a temperature, those that are there already that of the air; from the
+ * first with a flux relaxation time on, a flux. */
+static int gs4i_make_heat(gs4_sim *sim, const gs4_material *material)
+{
+    gs4i_particles *p = &sim->particles;
+    const size_t room = (size_t)p->capacity + 1, each = 4 * sizeof(gs4_real);
+    const int heat = !p->with_heat, flux = !p->with_flux && material->flux_relaxation_time > 0;
+    gs4_real *made[3] = { NULL, NULL, NULL };
+    uint8_t *liquid = NULL;
+    int i;
+    for (i = 0; i < sim->material_count; i++)
+        if (sim->laws[i].is.heat_capacity == 0)
+            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "heat_capacity of material ", i, " is 0; with this material the scene has heat, and every material needs one above 0");
+    if (p->capacity) {
+        if (heat) { made[0] = (gs4_real *)gs4i_alloc(&sim->memory, room, each); liquid = (uint8_t *)gs4i_alloc(&sim->memory, room, 1); }
+        if (flux) { made[1] = (gs4_real *)gs4i_alloc(&sim->memory, room, each); made[2] = (gs4_real *)gs4i_alloc(&sim->memory, room, each); }
+        if ((heat && (!made[0] || !liquid)) || (flux && (!made[1] || !made[2]))) {
+            for (i = 0; i < 3; i++) gs4i_free(&sim->memory, made[i], room, each);
+            gs4i_free(&sim->memory, liquid, room, 1);
+            return gs4i_fail_memory(sim);
+        }
+    }
+    if (heat) { p->heat = made[0]; p->liquid = liquid; p->with_heat = 1; }
+    for (i = 0; i < p->count && heat; i++) gs4i_begin_heat(p, (size_t)i, &sim->laws[p->material[i]], sim->desc.ambient_temperature);
+    for (i = 0; i < 4 * p->count && flux; i++) made[1][i] = made[2][i] = 0;
+    if (flux) { p->flux = made[1]; p->flux_rate = made[2]; p->with_flux = 1; }
+    sim->conduction.heats |= material->viscous_heating != 0;
+    sim->unsorted = 1;                                      /* nodes need room for it, too */
+    return GS4_OK;
+}
+
 GS4_API int gs4_add_material(gs4_sim *sim, const gs4_material *material)
 {
     if (!sim) return GS4_ERROR_ARGUMENT;
@@ -7062,6 +8014,7 @@ GS4_API int gs4_add_material(gs4_sim *sim, const gs4_material *material)
     if (sim->material_count == 256) return gs4i_bad_argument(sim, "there are 256 materials already, which is all there can be");
     GS4I_TRY(gs4i_grow(sim, (void **)&sim->laws, sim->material_count, &sim->material_capacity, sizeof *sim->laws));
     if (material->liquid != GS4_NEWTONIAN && gs4i_make_elastic(sim) != GS4_OK) return gs4i_fail_memory(sim);
+    if (gs4i_has_heat(material)) GS4I_TRY(gs4i_make_heat(sim, material));
     sim->laws[sim->material_count++].is = *material;
     gs4i_set_laws(sim);
     return sim->material_count - 1;
@@ -7086,7 +8039,7 @@ static void gs4i_fill_one(gs4_sim *sim, gs4_vec3 x, gs4_vec3 centre, const gs4_f
     const size_t i = (size_t)sim->particles.count;
     const gs4_vec3 v = gs4i_add(f->velocity, gs4i_cross(w, gs4i_sub(x, centre)));
     int k;
-    if (!gs4i_add_one(sim, x, v, mass, f->material)) return;
+    if (!gs4i_add_one(sim, x, v, mass, f->material, f->temperature)) return;
     for (k = 0; k < 3 && sim->particles.affine[k]; k++) memcpy(sim->particles.affine[k] + 4 * i, C[k], sizeof C[k]);
     gs4i_note_speed(sim, gs4i_length(v));
 }
@@ -7275,8 +8228,7 @@ static int gs4i_check_collider(gs4_sim *sim, gs4_collider *c)
     GS4I_TRY(gs4i_check3(sim, "velocity", c->velocity));
     GS4I_TRY(gs4i_check3(sim, "angular_velocity", c->angular_velocity));
     GS4I_TRY(gs4i_check3(sim, "pivot", c->pivot));
-    GS4I_TRY(gs4i_check_absent(sim, "temperature", c->temperature, GS4I_NO_HEAT));
-    return gs4i_check_absent(sim, "is_isothermal", GS4I_C(c->is_isothermal), GS4I_NO_HEAT);
+    return gs4i_check(sim, "temperature", c->temperature, GS4I_FINITE);
 }
 
 GS4_API int gs4_add_collider(gs4_sim *sim, const gs4_collider *collider)
@@ -7381,10 +8333,12 @@ static int gs4i_check_edit(gs4_sim *sim)
         const gs4_real *x = p->position + 4 * (size_t)i, *v = p->velocity + 4 * (size_t)i;
         int good = gs4i_inside_domain(&sim->grid, gs4i_vec3(x[0], x[1], x[2]));
         for (c = 0; c < 3; c++) good = good && gs4i_finite(x[c]) && gs4i_finite(v[c]) && v[c] < GS4I_HUGE && v[c] > -GS4I_HUGE;
+        if (p->with_heat) good = good && gs4i_abs(p->heat[4 * (size_t)i]) < GS4I_HUGE;
         if (!good)
             return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "an edit has left particle ", (double)p->id[i], " outside of the grid or with a number that is not finite; edit it again");
         fastest = gs4i_max(fastest, gs4i_length(gs4i_vec3(v[0], v[1], v[2])));
     }
+    for (i = 0; i < p->count && p->with_heat; i++) gs4i_settle_phase(p, (size_t)i, &sim->laws[p->material[i]]);
     gs4i_note_speed(sim, fastest);
     sim->edited = 0;
     return GS4_OK;
@@ -7453,8 +8407,10 @@ static gs4_real *gs4i_field_data(const gs4_sim *sim, gs4_field field, int *compo
     case GS4_FIELD_VOLUME_RATIO: return sim->particles.velocity + 3;
     case GS4_FIELD_MASS:         return sim->particles.position + 3;
     case GS4_FIELD_STRESS:       *components = 6; return sim->particles.elastic_reals ? sim->particles.elastic : NULL;
-    case GS4_FIELD_DEFORMATION: case GS4_FIELD_TEMPERATURE:
-    case GS4_FIELD_LIQUID_FRACTION: case GS4_FIELD_FLUX: break;     /* no scene of this version has them */
+    case GS4_FIELD_TEMPERATURE:  return sim->particles.heat;
+    case GS4_FIELD_LIQUID_FRACTION: return sim->particles.heat ? sim->particles.heat + 1 : NULL;
+    case GS4_FIELD_FLUX:         *components = 3; return sim->particles.flux;
+    case GS4_FIELD_DEFORMATION: break;                      /* no scene of this version has it */
     }
     return NULL;
 }
@@ -7473,10 +8429,10 @@ GS4_API gs4_view gs4_particles(const gs4_sim *sim, gs4_field field)
 GS4_API gs4_edit gs4_edit_particles(gs4_sim *sim, gs4_field field)
 {
     gs4_edit e;
-    int components;
-    e.data = field == GS4_FIELD_POSITION || field == GS4_FIELD_VELOCITY ? gs4i_field_data(sim, field, &components) : NULL;
+    int components = 0;
+    e.data = field == GS4_FIELD_POSITION || field == GS4_FIELD_VELOCITY || field == GS4_FIELD_TEMPERATURE ? gs4i_field_data(sim, field, &components) : NULL;
     e.count = e.data ? sim->particles.count : 0;
-    e.components = e.data ? 3 : 0;
+    e.components = e.data ? components : 0;
     e.stride = e.data ? 4 : 0;
     if (e.data) sim->edited = sim->afresh = sim->unsorted = sim->unseen = 1;
     return e;
@@ -7498,6 +8454,7 @@ GS4_API gs4_stats gs4_get_stats(gs4_sim *sim)
     s.active_cells = sim->grid.active * GS4I_BLOCK_NODES;
     s.memory_bytes = sim->memory.bytes;
     s.min_volume_ratio = s.max_volume_ratio = 1;
+    s.heat_iterations = sim->conduction.iterations; s.solver_residual = sim->conduction.residual;
     for (i = 0; i < (size_t)sim->particles.count; i++) {
         const gs4_real *x = sim->particles.position + 4 * i, *v = sim->particles.velocity + 4 * i;
         const double m = (double)x[3], J = (double)v[3], v2 = (double)v[0] * (double)v[0] + (double)v[1] * (double)v[1] + (double)v[2] * (double)v[2];
@@ -7508,6 +8465,13 @@ GS4_API gs4_stats gs4_get_stats(gs4_sim *sim)
             s.angular_momentum[c] += m * ((double)x[c1] * (double)v[c2] - (double)x[c2] * (double)v[c1]);
         }
         s.kinetic_energy += 0.5 * m * v2;
+        if (sim->particles.heat) {
+            const gs4i_law *law = &sim->laws[sim->particles.material[i]];
+            const double T = (double)sim->particles.heat[4 * i], fraction = (double)sim->particles.heat[4 * i + 1];
+            s.thermal_energy += m * (double)law->capacity * (T + (law->latent > 0 ? fraction * (double)law->latent : 0));
+            if (i == 0 || T < s.min_temperature) s.min_temperature = T;
+            if (i == 0 || T > s.max_temperature) s.max_temperature = T;
+        }
         s.volume += m * J / (double)sim->laws[sim->particles.material[i]].density;
         if (sqrt(v2) > s.max_speed) s.max_speed = sqrt(v2);
         if (i == 0 || J < s.min_volume_ratio) s.min_volume_ratio = J;
@@ -7515,7 +8479,8 @@ GS4_API gs4_stats gs4_get_stats(gs4_sim *sim)
     }
     s.seconds_total = sim->seconds[GS4I_CLOCK_TOTAL];
     s.seconds_sort = sim->seconds[GS4I_CLOCK_SORT];
-    s.seconds_transfer = s.seconds_total - s.seconds_sort;      /* stress is evaluated within the transfers */
+    s.seconds_solve = sim->seconds[GS4I_CLOCK_SOLVE];
+    s.seconds_transfer = s.seconds_total - s.seconds_sort - s.seconds_solve;    /* stress is evaluated within the transfers */
     return s;
 }
 
@@ -7537,6 +8502,8 @@ GS4_API uint64_t gs4_state_hash(const gs4_sim *sim)
             h = gs4i_hash_bytes(h, p->lag + 4 * i, 3 * sizeof(gs4i_half));
         }
         if (p->elastic_reals) h = gs4i_hash_bytes(h, p->elastic + (size_t)p->elastic_reals * i, (size_t)p->elastic_reals * sizeof(gs4_real));
+        if (p->with_heat) h = gs4i_hash_bytes(h ^ p->liquid[i], p->heat + 4 * i, 4 * sizeof(gs4_real));
+        if (p->with_flux) { h = gs4i_hash_bytes(h, p->flux + 4 * i, 3 * sizeof(gs4_real)); h = gs4i_hash_bytes(h, p->flux_rate + 4 * i, 3 * sizeof(gs4_real)); }
         sum += h;
     }
     for (s = 0; sim->grid.memory && s < sim->grid.active; s++)
@@ -7595,6 +8562,7 @@ static int gs4i_make_point_batch(gs4_sim *fake, const gs4_material *material, co
     gs4i_set_law(&q->law, point->temperature);
     for (n = 0; n < GS4I_BATCH; n++) {
         q->laws.of[n] = &q->law;
+        GS4I_NTH(q->laws.temperature, n) = q->law.temperature;
         for (i = 0; i < 9; i++) GS4I_NTH(q->L[i / 3][i % 3], n) = L[i];
         for (i = 0; i < 6; i++) { GS4I_NTH(q->e.s[i], n) = point->stress[i]; GS4I_NTH(q->e.rate[i], n) = point->stress_rate[i]; }
     }
@@ -7637,7 +8605,7 @@ GS4_API int gs4_point_stress(const gs4_material *material, const gs4_point *poin
     gs4_real mu;
     if (r == GS4_OK && !cauchy) r = gs4i_bad_argument(&fake, "cauchy is NULL");
     if (r != GS4_OK) return gs4i_say(&fake, r);
-    mu = q.law.local * gs4i_viscosity_of(&q.law, q.L, 0);
+    mu = q.law.local * gs4i_viscosity_of(&q.law, q.law.temperature, q.L, 0);
     for (i = 0; i < 3; i++)
         for (j = i; j < 3; j++)
             cauchy[gs4i_place[i][j]] = mu * (velocity_gradient[3 * i + j] + velocity_gradient[3 * j + i]) + (q.law.inv_lambda > 0 ? point->stress[gs4i_place[i][j]] : 0);
@@ -7806,6 +8774,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_MASS
 #undef GS4I_MAX_PARTICLES
 #undef GS4I_MAX_STEPS
+#undef GS4I_MIXING
 #undef GS4I_MUL
 #undef GS4I_NEIGHBOURS
 #undef GS4I_NODE_REALS
@@ -7835,7 +8804,9 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_STORE
 #undef GS4I_STRIP
 #undef GS4I_STRIPS
+#undef GS4I_STRONG
 #undef GS4I_SUM
+#undef GS4I_SURFACE_DEPTH
 #undef GS4I_THREAD_LOCAL
 #undef GS4I_TILE
 #undef GS4I_TILE_REALS

@@ -6,6 +6,7 @@
 #include "test_order.c"
 #include "test_physics.c"
 #include "test_viscoelastic.c"
+#include "test_heat.c"
 #include "test_errors.c"
 #include "test_files.c"
 #include "test_stability.c"
@@ -32,6 +33,16 @@ int main(int count, char **values)
     RUN(test_channel_overshoot);
     RUN(test_stress_is_paid_for_where_it_is);
     RUN(test_drop_draws_back);
+    RUN(test_heat_modes);
+    RUN(test_heat_order_in_time);
+    RUN(test_heat_stiff);
+    RUN(test_heat_pulse);
+    RUN(test_heat_surface);
+    RUN(test_heat_walls);
+    RUN(test_heat_stefan);
+    RUN(test_heat_conserved);
+    RUN(test_heat_cycles);
+    RUN(test_heat_of_viscosity);
     run_errors();
     run_files();
     run_stress();

@@ -59,7 +59,9 @@ static int err_view_is_finite(gs4_view v)
 static int err_is_finite(const gs4_sim *sim)
 {
     return err_view_is_finite(gs4_particles(sim, GS4_FIELD_POSITION)) && err_view_is_finite(gs4_particles(sim, GS4_FIELD_VELOCITY))
-        && err_view_is_finite(gs4_particles(sim, GS4_FIELD_VOLUME_RATIO)) && err_view_is_finite(gs4_particles(sim, GS4_FIELD_MASS));
+        && err_view_is_finite(gs4_particles(sim, GS4_FIELD_VOLUME_RATIO)) && err_view_is_finite(gs4_particles(sim, GS4_FIELD_MASS))
+        && err_view_is_finite(gs4_particles(sim, GS4_FIELD_TEMPERATURE)) && err_view_is_finite(gs4_particles(sim, GS4_FIELD_LIQUID_FRACTION))
+        && err_view_is_finite(gs4_particles(sim, GS4_FIELD_FLUX));
 }
 
 /* A few steps of half the limit and one gs4_advance: each is taken, or refused with a sentence; all stays finite. */
@@ -188,9 +190,9 @@ static void test_errors_desc(void)
         ERR_FIELD(gs4_sim_desc, rho_inf, "rho_inf", ERR_REAL), ERR_FIELD(gs4_sim_desc, rho_inf_spurious, "rho_inf_spurious", ERR_REAL),
         ERR_FIELD(gs4_sim_desc, flip_decay_time, "flip_decay_time", ERR_REAL),
         ERR_FIELD(gs4_sim_desc, walls[0], "walls", ERR_INT), ERR_FIELD(gs4_sim_desc, walls[3], "walls", ERR_INT), ERR_FIELD(gs4_sim_desc, walls[5], "walls", ERR_INT),
-        ERR_FIELD(gs4_sim_desc, wall_temperature[0], "wall_temperature", ERR_LATER), ERR_FIELD(gs4_sim_desc, wall_temperature[5], "wall_temperature", ERR_LATER),
-        ERR_FIELD(gs4_sim_desc, wall_is_isothermal[0], "wall_is_isothermal", ERR_LATER_INT), ERR_FIELD(gs4_sim_desc, wall_is_isothermal[5], "wall_is_isothermal", ERR_LATER_INT),
-        ERR_FIELD(gs4_sim_desc, ambient_temperature, "ambient_temperature", ERR_REAL), ERR_FIELD(gs4_sim_desc, air_is_isothermal, "air_is_isothermal", ERR_LATER_INT),
+        ERR_FIELD(gs4_sim_desc, wall_temperature[0], "wall_temperature", ERR_REAL), ERR_FIELD(gs4_sim_desc, wall_temperature[5], "wall_temperature", ERR_REAL),
+        ERR_FIELD(gs4_sim_desc, wall_is_isothermal[0], "wall_is_isothermal", ERR_INT), ERR_FIELD(gs4_sim_desc, wall_is_isothermal[5], "wall_is_isothermal", ERR_INT),
+        ERR_FIELD(gs4_sim_desc, ambient_temperature, "ambient_temperature", ERR_REAL), ERR_FIELD(gs4_sim_desc, air_is_isothermal, "air_is_isothermal", ERR_INT),
         ERR_FIELD(gs4_sim_desc, cfl, "cfl", ERR_REAL), ERR_FIELD(gs4_sim_desc, max_dt, "max_dt", ERR_REAL),
         ERR_FIELD(gs4_sim_desc, solver_tolerance, "solver_tolerance", ERR_REAL), ERR_FIELD(gs4_sim_desc, solver_max_iterations, "solver_max_iterations", ERR_INT),
         ERR_FIELD(gs4_sim_desc, max_particles, "max_particles", ERR_INT), ERR_FIELD(gs4_sim_desc, threads, "threads", ERR_INT) };
@@ -215,11 +217,13 @@ static void test_errors_material(void)
         ERR_FIELD(gs4_material, bulk_modulus, "bulk_modulus", ERR_REAL), ERR_FIELD(gs4_material, sound_speed, "sound_speed", ERR_REAL),
         ERR_FIELD(gs4_material, incompressible, "incompressible", ERR_LATER_INT), ERR_FIELD(gs4_material, solid, "solid", ERR_LATER_INT),
         ERR_FIELD(gs4_material, shear_modulus, "shear_modulus", ERR_LATER), ERR_FIELD(gs4_material, yield_compression, "yield_compression", ERR_LATER),
-        ERR_FIELD(gs4_material, yield_stretch, "yield_stretch", ERR_LATER), ERR_FIELD(gs4_material, heat_capacity, "heat_capacity", ERR_LATER),
-        ERR_FIELD(gs4_material, conductivity, "conductivity", ERR_LATER), ERR_FIELD(gs4_material, flux_relaxation_time, "flux_relaxation_time", ERR_LATER),
-        ERR_FIELD(gs4_material, fourier_fraction, "fourier_fraction", ERR_LATER), ERR_FIELD(gs4_material, melting_temperature, "melting_temperature", ERR_LATER),
-        ERR_FIELD(gs4_material, latent_heat, "latent_heat", ERR_LATER), ERR_FIELD(gs4_material, can_melt, "can_melt", ERR_LATER_INT),
-        ERR_FIELD(gs4_material, viscous_heating, "viscous_heating", ERR_LATER_INT) };
+        ERR_FIELD(gs4_material, yield_stretch, "yield_stretch", ERR_LATER), ERR_FIELD(gs4_material, heat_capacity, "heat_capacity", ERR_REAL),
+        ERR_FIELD(gs4_material, flux_relaxation_time, "flux_relaxation_time", ERR_LATER), ERR_FIELD(gs4_material, fourier_fraction, "fourier_fraction", ERR_REAL),
+        ERR_FIELD(gs4_material, melting_temperature, "melting_temperature", ERR_LATER), ERR_FIELD(gs4_material, latent_heat, "latent_heat", ERR_LATER) };
+    static const err_field warm[] = { ERR_FIELD(gs4_material, heat_capacity, "heat_capacity", ERR_REAL), ERR_FIELD(gs4_material, conductivity, "conductivity", ERR_REAL),
+        ERR_FIELD(gs4_material, flux_relaxation_time, "flux_relaxation_time", ERR_REAL), ERR_FIELD(gs4_material, fourier_fraction, "fourier_fraction", ERR_REAL),
+        ERR_FIELD(gs4_material, melting_temperature, "melting_temperature", ERR_REAL), ERR_FIELD(gs4_material, latent_heat, "latent_heat", ERR_REAL),
+        ERR_FIELD(gs4_material, can_melt, "can_melt", ERR_INT), ERR_FIELD(gs4_material, viscous_heating, "viscous_heating", ERR_INT) };
     static const err_field pom_pom[] = {
         ERR_FIELD(gs4_material, liquid, "liquid", ERR_INT), ERR_FIELD(gs4_material, viscosity, "viscosity", ERR_REAL),
         ERR_FIELD(gs4_material, local_fraction, "local_fraction", ERR_REAL), ERR_FIELD(gs4_material, relaxation_time, "relaxation_time", ERR_REAL),
@@ -233,6 +237,10 @@ static void test_errors_material(void)
     err_try_all(ERR_MATERIAL, &m, sizeof m, fields, ERR_COUNT(fields));
     m.liquid = GS4_POM_POM; m.local_fraction = (gs4_real)0.1; m.relaxation_time = 1; m.stretch_time = (gs4_real)0.5; m.anisotropy = (gs4_real)0.1; m.arms = 4;
     err_try_all(ERR_MATERIAL, &m, sizeof m, pom_pom, ERR_COUNT(pom_pom));
+    m = err_material();
+    m.heat_capacity = 1000; m.conductivity = 1; m.flux_relaxation_time = (gs4_real)0.1; m.fourier_fraction = (gs4_real)0.5;
+    m.can_melt = 1; m.melting_temperature = 1; m.latent_heat = (gs4_real)1e5; m.viscous_heating = 1;
+    err_try_all(ERR_MATERIAL, &m, sizeof m, warm, ERR_COUNT(warm));
     m = err_material();
     m.viscosity_law = GS4_VISCOSITY_CROSS_WLF;
     m.cross_wlf.a = 1; m.cross_wlf.n = (gs4_real)0.5; m.cross_wlf.d1 = 10; m.cross_wlf.a1 = 1; m.cross_wlf.t1 = 1; m.cross_wlf.t2 = -50;
@@ -272,7 +280,7 @@ static void test_errors_collider(void)
     static const err_field fields[] = {
         ERR_SHAPE(gs4_collider), ERR_FIELD(gs4_collider, contact, "contact", ERR_INT), ERR_FIELD(gs4_collider, friction, "friction", ERR_REAL),
         ERR_VEC(gs4_collider, velocity, "velocity"), ERR_VEC(gs4_collider, angular_velocity, "angular_velocity"), ERR_VEC(gs4_collider, pivot, "pivot"),
-        ERR_FIELD(gs4_collider, temperature, "temperature", ERR_LATER), ERR_FIELD(gs4_collider, is_isothermal, "is_isothermal", ERR_LATER_INT) };
+        ERR_FIELD(gs4_collider, temperature, "temperature", ERR_REAL), ERR_FIELD(gs4_collider, is_isothermal, "is_isothermal", ERR_INT) };
     gs4_collider c;
     int kind;
     memset(&c, 0, sizeof c);

@@ -1,0 +1,354 @@
+/* Heat in material at rest and in motion, melting and freezing. */
+
+typedef struct heat_bar { int n; double F, tau, conductivity, dt, time; gs4_integrator integrator; double rho, spurious; int periodic; } heat_bar;
+
+/* T = cos x, q_NL = 0 at the start in a bar with insulated ends at 0 and pi (periodic: 0 and 2 pi), density and capacity 1: amplitudes of
+ * T and of the non-local flux at `time`. */
+static void heat_mode(const heat_bar *b, double *a, double *flux)
+{
+    const double length = acos(-1.0) * (b->periodic ? 2 : 1);
+    gs4_sim_desc d = scene_cube(b->n);
+    gs4_material m = scene_liquid(1, 0, 1e-3);
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    double norm = 0;
+    gs4_sim *sim;
+    gs4_view x, q;
+    gs4_edit T;
+    int i, steps = (int)(b->time / b->dt + 0.5);
+    d.cells[1] = d.cells[2] = 4; d.cell_size = (gs4_real)(length / b->n);
+    d.rho_inf = (gs4_real)b->rho; d.rho_inf_spurious = (gs4_real)b->spurious; d.integrator = b->integrator;
+    if (sizeof(gs4_real) == 8) d.solver_tolerance = (gs4_real)1e-9;
+    if (b->periodic) d.walls[0] = d.walls[1] = GS4_WALL_PERIODIC;
+    m.heat_capacity = 1; m.conductivity = (gs4_real)b->conductivity; m.flux_relaxation_time = (gs4_real)b->tau; m.fourier_fraction = (gs4_real)b->F;
+    sim = physics_create(&d, &m);
+    CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(length, 1e6, 1e6)), &f), GS4_OK);
+    x = gs4_particles(sim, GS4_FIELD_POSITION); T = gs4_edit_particles(sim, GS4_FIELD_TEMPERATURE);
+    for (i = 0; i < T.count; i++) T.data[(size_t)i * (size_t)T.stride] = (gs4_real)cos((double)x.data[(size_t)i * (size_t)x.stride]);
+    for (i = 0; i < steps; i++) CHECK_RESULT(sim, gs4_step(sim, (gs4_real)b->dt), GS4_OK);
+    x = gs4_particles(sim, GS4_FIELD_POSITION); q = gs4_particles(sim, GS4_FIELD_FLUX);
+    T = gs4_edit_particles(sim, GS4_FIELD_TEMPERATURE);
+    *a = *flux = 0;
+    for (i = 0; i < T.count; i++) {
+        const double at_x = (double)x.data[(size_t)i * (size_t)x.stride];
+        *a += (double)T.data[(size_t)i * (size_t)T.stride] * cos(at_x); norm += cos(at_x) * cos(at_x);
+        if (q.data) *flux += (double)q.data[(size_t)i * (size_t)q.stride] * sin(at_x);
+    }
+    *a /= norm; *flux /= norm;
+    gs4_destroy(sim);
+}
+
+/* a' = -F kappa a - b, tau b' = (1 - F) kappa a - b, by many steps of a Taylor series of fourth order. */
+static void heat_mode_exact(double F, double tau, double conductivity, double time, double *a, double *b)
+{
+    const int steps = 20000;
+    const double h = time / steps;
+    int i, order;
+    *a = 1; *b = 0;
+    if (tau == 0) { *a = exp(-conductivity * time); return; }
+    for (i = 0; i < steps; i++) {
+        double da = *a, db = *b, sum_a = *a, sum_b = *b;
+        for (order = 1; order <= 4; order++) {
+            const double na = -F * conductivity * da - db, nb = ((1 - F) * conductivity * da - db) / tau;
+            da = na * h / order; db = nb * h / order;
+            sum_a += da; sum_b += db;
+        }
+        *a = sum_a; *b = sum_b;
+    }
+}
+
+/* Fourier, Cattaneo (a wave where 4 kappa tau > 1) and mixed: spatial order >= 1.8. The exact solution agrees with rows of the shared reference, which was
+ * made independently. */
+static void test_heat_modes(void)
+{
+    static const double cases[4][2] = { { 1, 0 }, { 0, 1 }, { 0.5, 1 }, { 0, 10 } };
+    static const double reference[4][2] = { { 0.3678794411714423, 0 }, { 0.6597001533917017, 0.533507195114693 },
+        { 0.4824163053713996, 0.219334403297799 }, { 0.9520249000369154, 0.09358471268634983 } };       /* heat_modes.csv: kappa 1, k 1, b0 0, t 1 */
+    int c, i;
+    for (c = 0; c < 4; c++)
+        for (i = 0; i < (test_slow || c == 1 ? 2 : 1); i++) {
+            heat_bar bar = { c == 2 ? 16 : 8, cases[c][0], cases[c][1], 1, i ? 0.005 : 0.02, 1, physics_integrators[i], 0, 0, c == 2 };
+            double exact, exact_flux, coarse, fine, flux;
+            heat_mode_exact(bar.F, bar.tau, 1, 1, &exact, &exact_flux);
+            CHECK_CLOSE(exact, reference[c][0], 1e-12); CHECK_CLOSE(exact_flux, reference[c][1], 1e-12);
+            heat_mode(&bar, &coarse, &flux);
+            bar.n *= 2; if (i) bar.dt /= 4;
+            heat_mode(&bar, &fine, &flux);
+            if (test_filter[0]) printf("F %g tau %g, %s: error %.2e, %.2e with twice the cells, flux %.2e\n", bar.F, bar.tau, i ? "Euler" : "GS4", coarse - exact, fine - exact, flux - exact_flux);
+            CHECK(fabs(fine - exact) < 0.007);
+            CHECK(log2(fabs(coarse - exact) / fabs(fine - exact)) > 1.8);
+            CHECK_CLOSE(flux, exact_flux, 0.002);
+        }
+}
+
+/* Second order in time for any member of the family that the explicit scheme takes, against a step 16 times smaller. */
+static void test_heat_order_in_time(void)
+{
+    static const double members[5][2] = { { 0, 0 }, { 0.5, 0 }, { 1, 0 }, { 0.5, 0.5 }, { 1, 0.9 } };
+    static const double kinds[3][2] = { { 1, 0 }, { 0, 1 }, { 0.5, 0.3 } };
+    int c, k;
+    if (sizeof(gs4_real) != 8) return;
+    for (c = 0; c < 5; c += test_slow ? 1 : 4)
+        for (k = 0; k < 3; k++) {
+            heat_bar bar = { 16, kinds[k][0], kinds[k][1], 1, 0.04, 0.4, GS4_INTEGRATOR_GS4, members[c][0], members[c][1], 0 };
+            double a[3], flux[3];
+            heat_mode(&bar, &a[0], &flux[0]);
+            bar.dt = 0.02; heat_mode(&bar, &a[1], &flux[1]);
+            bar.dt = 0.04 / 32; heat_mode(&bar, &a[2], &flux[2]);
+            if (test_filter[0]) printf("%.9f %.9f %.9f ", a[0], a[1], a[2]);
+            if (test_filter[0]) printf("(%g, %g) F %g tau %g: order %.2f, of the flux %.2f\n", bar.rho, bar.spurious, bar.F, bar.tau,
+                log2((a[0] - a[2]) / (a[1] - a[2])), bar.tau > 0 ? log2((flux[0] - flux[2]) / (flux[1] - flux[2])) : 0);
+            CHECK(log2(fabs(a[0] - a[2]) / fabs(a[1] - a[2])) > 1.9);
+            if (bar.tau > 0) CHECK(log2(fabs(flux[0] - flux[2]) / fabs(flux[1] - flux[2])) > 1.9);
+        }
+}
+
+/* Diffusion numbers to 1e9 and relaxation times from 1e-12 to 1e6 s: never above the start. */
+static void test_heat_stiff(void)
+{
+    static const double cases[7][3] = { { 1, 0, 1e7 }, { 1, 0, 1 }, { 0, 1e-12, 1 }, { 0.5, 1e-12, 1e7 }, { 0, 1e6, 1 }, { 0, 1e6, 1e9 }, { 0.3, 1, 1e-9 } };
+    int c, i;
+    for (c = 0; c < 7; c++)
+        for (i = 0; i < 2; i++) {
+            heat_bar bar = { 8, cases[c][0], cases[c][1], cases[c][2], 10, 100, GS4_INTEGRATOR_GS4, i ? 0.9 : 0, i ? 0.5 : 0, 0 };
+            double a, flux;
+            heat_mode(&bar, &a, &flux);
+            if (test_filter[0]) printf("F %g tau %g k %g: %.3g %.3g\n", bar.F, bar.tau, bar.conductivity, a, flux);
+            CHECK(fabs(a) <= 1.0001);
+        }
+}
+
+/* A Gaussian pulse spreads (shared reference heat_pulse: width 0.1 at the start, kappa 1, t 0.1), one-dimensional. */
+static void test_heat_pulse(void)
+{
+    static const double reference[4][2] = { { 0, 0.21821789023599 }, { 0.25, 0.188045609346 }, { 0.5, 0.12033216553018 }, { 1, 0.020176966452446 } };
+    const int n = 128;
+    gs4_sim_desc d = scene_cube(n);
+    gs4_material m = scene_liquid(1, 0, 1e-3);
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    gs4_sim *sim;
+    gs4_view x, v;
+    gs4_edit T;
+    int i, r;
+    d.cells[1] = d.cells[2] = 4; d.cell_size = (gs4_real)(4.0 / n); d.origin = at(-2, 0, 0);
+    m.heat_capacity = 1; m.conductivity = 1;
+    sim = physics_create(&d, &m);
+    CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(-2, 0, 0), at(2, 1e6, 1e6)), &f), GS4_OK);
+    x = gs4_particles(sim, GS4_FIELD_POSITION); T = gs4_edit_particles(sim, GS4_FIELD_TEMPERATURE);
+    for (i = 0; i < T.count; i++) { const double X = (double)x.data[(size_t)i * (size_t)x.stride]; T.data[(size_t)i * (size_t)T.stride] = (gs4_real)exp(-50 * X * X); }
+    for (i = 0; i < 50; i++) CHECK_RESULT(sim, gs4_step(sim, (gs4_real)0.002), GS4_OK);
+    x = gs4_particles(sim, GS4_FIELD_POSITION); v = gs4_particles(sim, GS4_FIELD_TEMPERATURE);
+    for (r = 0; r < 4; r++) {
+        double near = 0, far = 0;                           /* the two particles on both sides */
+        for (i = 0; i < v.count; i++) {
+            const double to = (double)x.data[(size_t)i * (size_t)x.stride] - reference[r][0];
+            if (to > 0 && to < 1.0 / 64) near = (double)v.data[(size_t)i * (size_t)v.stride];
+            if (to < 0 && to > -1.0 / 64) far = (double)v.data[(size_t)i * (size_t)v.stride];
+        }
+        CHECK_CLOSE(0.5 * (near + far), reference[r][1], 0.002);
+    }
+    gs4_destroy(sim);
+}
+
+/* A ball of radius 1 and temperature 1 in air at 0: mean temperature at some times, in all over m c. */
+static void heat_ball(int n, double *mean)
+{
+    static const double times[3] = { 0.03, 0.1, 0.2 };
+    gs4_sim_desc d = scene_cube(2 * n + 8);
+    gs4_material m = scene_liquid(1, 0, 1e-5);
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    gs4_sim *sim;
+    double centre, time = 0;
+    int r, i;
+    d.cell_size = (gs4_real)(1.0 / n); d.air_is_isothermal = 1;
+    centre = 0.5 * (2 * n + 8) / n + 0.3 / n;
+    m.heat_capacity = 1; m.conductivity = 1;
+    f.temperature = 1;
+    sim = physics_create(&d, &m);
+    CHECK_RESULT(sim, gs4_add_particles(sim, gs4_sphere(at(centre, centre, centre), 1), &f), GS4_OK);
+    for (r = 0; r < 3; r++) {
+        const int steps = 10 * (r + 1);
+        for (i = 0; i < steps; i++) CHECK_RESULT(sim, gs4_step(sim, (gs4_real)((times[r] - time) / steps)), GS4_OK);
+        time = times[r];
+        mean[r] = gs4_get_stats(sim).thermal_energy / gs4_get_stats(sim).mass;
+    }
+    gs4_destroy(sim);
+}
+
+/* Free surfaces at the temperature of the air, against the series (shared reference heat_sphere). */
+static void test_heat_surface(void)
+{
+    static const double reference[3] = { 0.503676985716496, 0.2295212619740368, 0.08450443389231788 };
+    double coarse[3], fine[3];
+    int r;
+    heat_ball(6, coarse);
+    heat_ball(12, fine);
+    for (r = 0; r < 3; r++) {
+        if (test_filter[0]) printf("mean %.4f and %.4f, exact %.4f\n", coarse[r], fine[r], reference[r]);
+        CHECK(fabs(fine[r] / reference[r] - 1) < 0.045);
+        CHECK(fabs(fine[r] / reference[r] - 1) < 0.6 * fabs(coarse[r] / reference[r] - 1));
+    }
+}
+
+/* A bar between walls at 1 and 3: the straight line, in the midst and at the ends; and beside a material that conducts 1000 times better,
+ * the temperature where they meet, which is nearly that of the wall behind the better one. */
+static void test_heat_walls(void)
+{
+    gs4_sim_desc d = scene_cube(16);
+    gs4_material m = scene_liquid(1, 0, 1e-3), better;
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    gs4_sim *sim;
+    gs4_view x, T;
+    double worst = 0;
+    int i, two;
+    d.cells[1] = d.cells[2] = 4;
+    d.wall_is_isothermal[0] = d.wall_is_isothermal[1] = 1; d.wall_temperature[0] = 1; d.wall_temperature[1] = 3;
+    m.heat_capacity = 1; m.conductivity = 1;
+    better = m; better.conductivity = 1000;
+    for (two = 0; two < 2; two++) {
+        sim = physics_create(&d, &m);
+        if (two) CHECK_RESULT(sim, gs4_add_material(sim, &better), GS4_OK);
+        f.temperature = 2; f.material = 0;
+        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(two ? 0.5 : 1, 1, 1)), &f), GS4_OK);
+        f.material = 1;
+        if (two) CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0.5, 0, 0), at(1, 1, 1)), &f), GS4_OK);
+        for (i = 0; i < 60; i++) CHECK_RESULT(sim, gs4_step(sim, (gs4_real)0.1), GS4_OK);
+        x = gs4_particles(sim, GS4_FIELD_POSITION); T = gs4_particles(sim, GS4_FIELD_TEMPERATURE);
+        for (worst = 0, i = 0; i < T.count; i++) {
+            const double X = (double)x.data[(size_t)i * (size_t)x.stride], there = (double)T.data[(size_t)i * (size_t)T.stride];
+            const double exact = !two ? 1 + 2 * X : X > 0.5 ? 3 - (1 - X) * 2 * 2 / 1001 : 1 + X * 2 * 2 * 1000 / 1001;
+            worst = fmax(worst, fabs(there - exact));
+        }
+        if (test_filter[0]) printf("worst error %.2e\n", worst);
+        CHECK(worst < (two ? 0.13 : sizeof(gs4_real) == 8 ? 1e-4 : 1e-3));      /* two: half a cell of the step from 1 to 1000 */
+        gs4_destroy(sim);
+    }
+}
+
+/* A bar that melts from its hot end (hot > 0) or freezes from its cold one: the front over its exact place 2 lambda sqrt(t). */
+static double heat_front(int n, double hot, double cold, double lambda, double until, double number)
+{
+    gs4_sim_desc d = scene_cube(n);
+    gs4_material m = scene_liquid(1, 0, 1e-5);
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    const double time = until * until / (4 * lambda * lambda);
+    const int steps = (int)(time * n * n / number) + 1;
+    gs4_sim *sim;
+    gs4_view q;
+    double front = 0;
+    int i;
+    d.cells[1] = d.cells[2] = 4;
+    d.wall_is_isothermal[0] = 1; d.wall_temperature[0] = hot > 0 ? 1 : -1;
+    m.heat_capacity = 1; m.conductivity = 1; m.can_melt = 1; m.latent_heat = (gs4_real)(1 / fabs(hot));
+    sim = physics_create(&d, &m);
+    f.temperature = (gs4_real)(cold == 0 ? (hot < 0 ? 1e-9 : 0) : -cold / hot);
+    CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1, 1, 1)), &f), GS4_OK);
+    for (i = 0; i < steps; i++) CHECK_RESULT(sim, gs4_step(sim, (gs4_real)(time / steps)), GS4_OK);
+    q = gs4_particles(sim, GS4_FIELD_LIQUID_FRACTION);
+    for (i = 0; i < q.count; i++) front += (double)q.data[(size_t)i * (size_t)q.stride] / q.count;
+    gs4_destroy(sim);
+    return (hot > 0 ? front : 1 - front) / until;
+}
+
+/* Stefan's problem, melting and freezing, Stefan numbers 0.01 to 10, one and two phases (shared reference stefan_front: lambda). */
+static void test_heat_stefan(void)
+{
+    static const double cases[6][4] = { { 1, 0, 0.620062633313595496, 0.5 }, { -1, 0, 0.620062633313595496, 0.5 }, { 10, 0, 1.25697212127920327, 0.5 },
+        { 0.1, 0, 0.220016272742937856, 0.5 }, { 1, 1, 0.377759788203411083, 0.3 }, { 0.01, 0, 0.0705932765604293144, 0.5 } };
+    int c;
+    for (c = 0; c < (test_slow ? 6 : 4); c++) {
+        const double number = c == 5 ? 10 : c == 3 ? 8 : 2;
+        const double fine = heat_front(test_slow ? 64 : 32, cases[c][0], cases[c][1], cases[c][2], cases[c][3], number);
+        const double coarse = heat_front(test_slow ? 32 : 16, cases[c][0], cases[c][1], cases[c][2], cases[c][3], number);
+        if (test_filter[0]) printf("Ste %g, %g: front %.4f and %.4f of the exact one\n", cases[c][0], cases[c][1], coarse, fine);
+        CHECK(fabs(fine - 1) < (test_slow ? 0.02 : 0.03));
+        CHECK(fabs(fine - 1) < 0.75 * fabs(coarse - 1) || fabs(fine - 1) < 2e-3);
+    }
+}
+
+/* A hot drop falls on a cold pool in an insulated box, and what is solid melts: heat stays. */
+static void test_heat_conserved(void)
+{
+    int i, c;
+    for (c = 0; c < 2; c++) {
+        gs4_sim_desc d = scene_cube(12);
+        gs4_material m = scene_liquid(1000, 1, 10);
+        gs4_fill f = scene_fill(at(0, 0, 0));
+        gs4_sim *sim;
+        double before, after;
+        const int steps = test_slow ? 1000 : 200;
+        d.gravity = at(0, -9.81, 0); d.integrator = physics_integrators[c];
+        d.solver_tolerance = (gs4_real)(sizeof(gs4_real) == 8 ? 1e-8 : 1e-5);
+        m.heat_capacity = 2000; m.conductivity = 50; m.can_melt = 1; m.melting_temperature = 20; m.latent_heat = 2e4; m.flux_relaxation_time = (gs4_real)0.01; m.fourier_fraction = (gs4_real)0.3;
+        sim = physics_create(&d, &m);
+        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1, 0.3, 1)), &f), GS4_OK);
+        f.temperature = 60; f.velocity = at(0.2, -1, 0.1);
+        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_sphere(at(0.5, 0.6, 0.5), (gs4_real)0.2), &f), GS4_OK);
+        before = gs4_get_stats(sim).thermal_energy;
+        for (i = 0; i < steps; i++) CHECK_RESULT(sim, gs4_step(sim, (gs4_real)0.5 * gs4_stable_dt(sim)), GS4_OK);
+        after = gs4_get_stats(sim).thermal_energy;
+        if (test_filter[0]) printf("heat %.9g after, %.9g before, t %g, %g to %g K\n", after, before, gs4_get_stats(sim).time, gs4_get_stats(sim).min_temperature, gs4_get_stats(sim).max_temperature);
+        CHECK_CLOSE(after / before, 1, sizeof(gs4_real) == 8 ? 1e-6 : 2e-5);
+        gs4_destroy(sim);
+    }
+}
+
+/* Through T_m and back again and again: nothing is lost, and the phase has its hysteresis. */
+static void test_heat_cycles(void)
+{
+    gs4_sim_desc d = scene_cube(8);
+    gs4_material m = scene_liquid(1, 0, 1e-3);
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    gs4_sim *sim;
+    gs4_edit T;
+    gs4_view v;
+    double before, sum = 0;
+    int i, k;
+    if (sizeof(gs4_real) == 8) d.solver_tolerance = (gs4_real)1e-9;
+    m.heat_capacity = 1; m.conductivity = 1; m.can_melt = 1; m.latent_heat = 2; m.melting_temperature = 0;
+    sim = physics_create(&d, &m);
+    f.temperature = -1;
+    CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1, 1, 1)), &f), GS4_OK);
+    v = gs4_particles(sim, GS4_FIELD_LIQUID_FRACTION);
+    for (i = 0; i < v.count; i++) sum += (double)v.data[(size_t)i * (size_t)v.stride];
+    CHECK(sum == 0);
+    T = gs4_edit_particles(sim, GS4_FIELD_TEMPERATURE);
+    for (i = 0; i < T.count; i++) T.data[(size_t)i * (size_t)T.stride] = (gs4_real)(i % 3 ? -1 : 6);
+    for (k = 0; k < 40; k++) {
+        before = gs4_get_stats(sim).thermal_energy;
+        if (k) {
+            T = gs4_edit_particles(sim, GS4_FIELD_TEMPERATURE);
+            for (i = 0; i < T.count; i++) T.data[(size_t)i * (size_t)T.stride] += (gs4_real)(k % 2 ? 2 : -2);
+            CHECK_RESULT(sim, gs4_step(sim, (gs4_real)1e-6), GS4_OK);
+            before = gs4_get_stats(sim).thermal_energy;
+        } else { CHECK_RESULT(sim, gs4_step(sim, (gs4_real)1e-6), GS4_OK); before = gs4_get_stats(sim).thermal_energy; }
+        for (i = 0; i < 5; i++) CHECK_RESULT(sim, gs4_step(sim, (gs4_real)0.02), GS4_OK);
+        CHECK_CLOSE(gs4_get_stats(sim).thermal_energy, before, sizeof(gs4_real) == 8 ? 1e-9 : 2e-5);
+    }
+    gs4_destroy(sim);
+}
+
+/* A shear wave stops: what it loses the liquid gains. */
+static void test_heat_of_viscosity(void)
+{
+    const double k = 2 * acos(-1.0);
+    gs4_sim_desc d = scene_cube(24);
+    gs4_material m = scene_liquid(1, 0.1, 5);
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    gs4_sim *sim;
+    gs4_edit v;
+    gs4_view x;
+    double before;
+    int i;
+    for (i = 0; i < 6; i++) d.walls[i] = GS4_WALL_PERIODIC;
+    d.cells[0] = d.cells[2] = 4; d.flip_decay_time = (gs4_real)INFINITY;
+    m.heat_capacity = 1; m.viscous_heating = 1;
+    sim = physics_create(&d, &m);
+    CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1, 1, 1)), &f), GS4_OK);
+    x = gs4_particles(sim, GS4_FIELD_POSITION); v = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
+    for (i = 0; i < v.count; i++) v.data[(size_t)i * (size_t)v.stride] = (gs4_real)(0.1 * sin(k * (double)x.data[(size_t)i * (size_t)x.stride + 1]));
+    before = gs4_get_stats(sim).kinetic_energy;
+    CHECK(physics_run(sim, 0.5) == 0);
+    if (test_filter[0]) printf("kinetic %.4g -> %.4g, heat %.4g\n", before, gs4_get_stats(sim).kinetic_energy, gs4_get_stats(sim).thermal_energy);
+    CHECK_CLOSE(gs4_get_stats(sim).thermal_energy / (before - gs4_get_stats(sim).kinetic_energy), 1, 0.03);
+    gs4_destroy(sim);
+}

@@ -3557,7 +3557,7 @@ typedef struct gs4i_law {
     gs4_real local, temperature;        /* F_v; K, where the scene has no heat: that of the air */
     gs4_real modulus, inv_lambda, stretch, nu, alpha;   /* non-local: G0; 1 / lambda_b; 2 lambda_b / lambda_0s; 2 / Q; all 0: none */
     gs4_real capacity, conductivity, flux_time, fourier;    /* c; k; tau; F_T, 1 where tau is 0 */
-    gs4_real melting, latent;           /* T_m, above every temperature where it cannot melt; L / c, K */
+    gs4_real melting, latent;           /* T_m, beyond every temperature where the phase is fixed; L / c, K */
     int varies;                         /* with the shear rate or the temperature: Cross-WLF, or by viscosity_fn */
     gs4_viscosity_fn viscosity_fn; void *viscosity_user;
     gs4_material is;                    /* as described */
@@ -3641,7 +3641,7 @@ static void gs4i_set_law(gs4i_law *l, gs4_real temperature)
     l->alpha = m->liquid == GS4_POM_POM ? m->anisotropy : 0;
     l->capacity = m->heat_capacity; l->conductivity = m->conductivity;
     l->flux_time = m->flux_relaxation_time; l->fourier = l->flux_time > 0 ? m->fourier_fraction : 1;
-    l->melting = m->can_melt ? m->melting_temperature : 4 * GS4I_HUGE;
+    l->melting = m->can_melt ? m->melting_temperature : m->solid == GS4_NO_SOLID ? -4 * GS4I_HUGE : 4 * GS4I_HUGE;
     l->latent = m->latent_heat > 0 ? m->latent_heat / m->heat_capacity : 0;
 }
 
@@ -4113,7 +4113,7 @@ static void gs4i_store_elastic(gs4_real *to, int reals, int n, gs4i_elastic *e)
 #define GS4I_MIXING GS4I_C(4.0)
 
 typedef struct gs4i_heat_laws {
-    gs4i_lanes capacity, conductivity, flux_time, fourier, heating /* 1: by viscosity */;
+    gs4i_lanes capacity, conductivity, flux_time, fourier, melting, heating /* 1: by viscosity */;
     const gs4i_law *of[GS4I_BATCH];
     int melts;                          /* some of those seen so far do */
 } gs4i_heat_laws;
@@ -4129,7 +4129,7 @@ static void gs4i_take_heat_laws(const gs4i_batch_laws *laws, gs4i_heat_laws *l)
         if (law == l->of[n]) continue;
         l->of[n] = law; l->melts |= law->is.can_melt;
         GS4I_NTH(l->capacity, n) = law->capacity; GS4I_NTH(l->conductivity, n) = law->conductivity;
-        GS4I_NTH(l->flux_time, n) = law->flux_time; GS4I_NTH(l->fourier, n) = law->fourier;
+        GS4I_NTH(l->flux_time, n) = law->flux_time; GS4I_NTH(l->fourier, n) = law->fourier; GS4I_NTH(l->melting, n) = law->melting;
         GS4I_NTH(l->heating, n) = law->is.viscous_heating ? GS4I_C(1) : GS4I_C(0);
     }
 }
@@ -4171,8 +4171,13 @@ GS4I_INLINE void gs4i_warm_one(const gs4i_law *law, gs4_real rise, gs4_real *T, 
 /* The same for a batch. */
 GS4I_INLINE void gs4i_warm(const gs4i_heat_laws *l, gs4i_lanes rise, gs4i_lanes T, gs4i_lanes fraction)
 {
-    int b;
-    if (!l->melts) { GS4I_BATCH_LOOP(b) T[b] += rise[b]; return; }
+    int b, plain = 1;
+    GS4I_BATCH_LOOP(b) {
+        const gs4i_wide warm = T[b] + rise[b];
+        const gs4i_wide_mask stays = ((fraction[b] <= GS4I_C(0)) & (warm <= l->melting[b])) | ((fraction[b] >= GS4I_C(1)) & (warm >= l->melting[b]));
+        plain &= gs4i_all(&stays);
+    }
+    if (plain) { GS4I_BATCH_LOOP(b) T[b] += rise[b]; return; }
     for (b = 0; b < GS4I_BATCH; b++) {
         gs4_real own = GS4I_NTH(T, b), part = GS4I_NTH(fraction, b);
         if (l->of[b]->is.can_melt) gs4i_warm_one(l->of[b], GS4I_NTH(rise, b), &own, &part);
@@ -6132,22 +6137,20 @@ static void gs4i_heat_flows(int z, void *context)
 static gs4_real gs4i_second_differences(const gs4_sim *sim, const gs4_real *field, const gs4_real *weight, const gs4_real *wall, const int at[3], gs4_real difference[3])
 {
     const gs4i_conduction *k = &sim->conduction;
-    const size_t i = gs4i_heat_cell(k, at[0], at[1], at[2]);
-    int side;
-    difference[0] = difference[1] = difference[2] = 0;
-    for (side = 0; side < 6; side++) {
-        const int axis = side / 2, n = k->size[axis], next = at[axis] + (side & 1 ? 1 : -1);
-        int to[3];
-        size_t j;
-        to[0] = at[0]; to[1] = at[1]; to[2] = at[2];
-        to[axis] = next >= 0 && next < n ? next : next < 0 ? n - 1 : 0;
-        if (to[axis] != next && !sim->grid.periodic[axis]) {
-            const int there = next + k->low[axis];
-            if ((there < 0 || there >= sim->grid.cells[axis]) && sim->desc.wall_is_isothermal[side]) difference[axis] += 2 * ((wall ? wall[side] : 0) - field[i]);
-            continue;
-        }
-        j = gs4i_heat_cell(k, to[0], to[1], to[2]);
-        difference[axis] += gs4i_min(weight[j] / weight[i], GS4I_C(1)) * (field[j] - field[i]);
+    const size_t i = gs4i_heat_cell(k, at[0], at[1], at[2]), step[3] = { 1, (size_t)k->size[0], (size_t)k->size[0] * (size_t)k->size[1] };
+    const gs4_real inverse = 1 / weight[i];
+    int axis, end;
+    for (axis = 0; axis < 3; axis++) {
+        const size_t round = step[axis] * (size_t)(k->size[axis] - 1);
+        size_t to[2];
+        difference[axis] = 0;
+        to[0] = at[axis] > 0 ? i - step[axis] : i + round;
+        to[1] = at[axis] < k->size[axis] - 1 ? i + step[axis] : i - round;
+        for (end = 0; end < 2; end++)
+            if (at[axis] == (end ? k->size[axis] - 1 : 0) && !sim->grid.periodic[axis]) {
+                const int side = 2 * axis + end, there = at[axis] + k->low[axis] + (end ? 1 : -1);
+                if ((there < 0 || there >= sim->grid.cells[axis]) && sim->desc.wall_is_isothermal[side]) difference[axis] += 2 * ((wall ? wall[side] : 0) - field[i]);
+            } else difference[axis] += gs4i_min(weight[to[end]] * inverse, GS4I_C(1)) * (field[to[end]] - field[i]);
     }
     return difference[0] + difference[1] + difference[2];
 }

@@ -9,6 +9,7 @@
 #include "test_errors.c"
 #include "test_files.c"
 #include "test_stability.c"
+#include "test_solid.c"
 #include "test_stress.c"
 
 int main(int count, char **values)
@@ -31,6 +32,7 @@ int main(int count, char **values)
     RUN(test_channel_overshoot);
     RUN(test_stress_is_paid_for_where_it_is);
     RUN(test_drop_draws_back);
+    run_solid();
     run_errors();
     run_files();
     run_stress();

@@ -2689,11 +2689,11 @@ GS4I_INLINE void gs4i_left_cauchy_green(gs4i_wide F[3][3], gs4i_wide B[6])
 }
 
 /* Is a symmetric matrix positive definite? By its leading minors. */
-GS4I_INLINE gs4i_wide_mask gs4i_is_positive(const gs4i_wide s[6])
+GS4I_INLINE void gs4i_is_positive(const gs4i_wide s[6], gs4i_wide_mask *positive)
 {
     const gs4i_wide minor = s[0] * s[1] - s[3] * s[3];
     const gs4i_wide det = s[2] * minor - s[4] * (s[4] * s[1] - s[3] * s[5]) - s[5] * (s[0] * s[5] - s[3] * s[4]);
-    return (s[0] > GS4I_C(0)) & (minor > GS4I_C(0)) & (det > GS4I_C(0));
+    *positive = (s[0] > GS4I_C(0)) & (minor > GS4I_C(0)) & (det > GS4I_C(0));
 }
 
 /* S4: F at the stage, in its place, for n particles of the batch. */
@@ -2744,7 +2744,7 @@ static int gs4i_fit_volume(const gs4i_solid_laws *l, gs4i_matrix F, const gs4i_w
         const gs4i_wide_mask solid = l->modulus[b] > GS4I_C(0);
         const gs4i_wide zero = J[b] - J[b], one = zero + GS4I_C(1);
         gs4i_wide f[3][3], C[3][3], ratio, scale, low[6], high[6];
-        gs4i_wide_mask good;
+        gs4i_wide_mask good, below;
         gs4i_matrix_wide(F, b, f);
         gs4i_cofactors(f, C, &ratio);
         ratio = J[b] / ratio;
@@ -2758,7 +2758,8 @@ static int gs4i_fit_volume(const gs4i_solid_laws *l, gs4i_matrix F, const gs4i_w
         gs4i_left_cauchy_green(f, low);
         for (c = 0; c < 6; c++) high[c] = -low[c];
         for (c = 0; c < 3; c++) { low[c] -= l->low[b] * l->low[b]; high[c] += l->high[b] * l->high[b]; }
-        good = (gs4i_is_positive(low) & gs4i_is_positive(high) & (low[0] + low[1] + low[2] < GS4I_C(64))) | (l->modulus[b] <= GS4I_C(0));
+        gs4i_is_positive(low, &good); gs4i_is_positive(high, &below);
+        good = (good & below & (low[0] + low[1] + low[2] < GS4I_C(64))) | (l->modulus[b] <= GS4I_C(0));
         all &= gs4i_all(&good);
         GS4I_CHOOSE(verdict[b], good, one, zero);
     }

@@ -68,7 +68,8 @@
  *     dF/dt = L F,   neo-Hookean: s_F = (G/J) dev(B),   fixed-corotated: s_F = (2 G/J) dev(B - V)                     (6)
  * the pressure is (3) with the same J, viscosity damps (Kelvin-Voigt). Where it yields, the singular values of F are clamped to
  * [1 - yield_compression, 1 + yield_stretch] after each step and scaled to det F = J again: F is what is elastic of the deformation.
- * Where there is no such limit they are kept within 1/512 and 512 (counted: stress_bounded).
+ * Where there is no such limit they are kept within 1/512 and 512 (counted: stress_bounded). (3) holds no tension beyond rho0 c0^2 / 7:
+ * a solid whose mean stress is to be more needs a higher sound_speed than the default, or it tears and J grows out of its range.
  *
  * TIME. Every quantity y of a particle is kept with its rate r; 0 <= rho_s <= rho_inf <= 1 choose the member of the GS4 family
  * (rho_inf: what high frequencies keep per step, rho_s the same of the spurious root; 0, 0 damps most and is the default):
@@ -130,7 +131,7 @@
  * MEMORY. GS4: 65 bytes a particle in float (position, velocity, J and their rates, mass, id, material, and 4 for sorting), 48 a cell
  * near material, 16 more near walls and bodies, 4 per 64 cells of the domain. Symplectic Euler: 89 and 32. A scene with a viscoelastic
  * liquid: 48 more a particle (Euler 24). With a solid: 96 more (Euler 36). Double, GS4: 121 and 96.
- * Stepping allocates nothing once the scene has stopped growing; a kernel takes 35 KB of stack, 69 in double.
+ * Stepping allocates nothing once the scene has stopped growing; a kernel takes 38 KB of stack, with solids 48; in double 75 and 90.
  *
  * THREADS. `parallel_for` or the pool. The same bits for any number of threads: blocks of one colour share no node, sums run in the
  * order of particles within a block. Two simulations on two threads are fine. Callbacks (distances, viscosity) may be called from
@@ -140,7 +141,7 @@
  * -O0, -O2 and -O3 -march=native of one compiler agree too. Not with -ffast-math, nor where doubles are kept in x87 registers.
  *
  * LIMITS. 2^30 particles, 2^36 cells, 256 materials. Time steps follow sound: viscosities above some 100 Pa s at millimetre cells
- * mean steps of microseconds. Filling is refused where material is already; emitters pause when max_particles is reached.
+ * mean steps of microseconds. There is one velocity at a node: solids that touch stick together until they are two cells apart. Filling is refused where material is already; emitters pause when max_particles is reached.
  *
  * SOURCES. The GS4 family: Zhou & Tamma 2004; extended Pom-Pom: Verbeeten, Peters & Baaijens 2001, in the form of Oishi et al. 2012; the MPM scheme after "GS4 viscoelastic MPM" (2021), with rates on particles; MLS-MPM:
  * Hu et al. 2018; solids and their yield: "Augmented MPM" (Stomakhin et al. 2014); images, contact and limits: measured for this file. */
@@ -4190,6 +4191,21 @@ static int gs4i_is_calm(const gs4i_pass *pass, int index)
     return 1;
 }
 
+/* What nodes give to particle n beside velocity; solids want its gradient too. */
+GS4I_INLINE void gs4i_gather_kick(const gs4i_particles *p, const gs4_real *at, const gs4i_stencils *s, int n, const gs4i_row *w, const gs4i_row *d, gs4i_gathered *g)
+{
+    if (p->deformation_reals) gs4i_gather_local(at, s, n, w, d, g);
+    else gs4i_gather_value(at, s, n, w, g->value);
+}
+
+static gs4i_kicks *gs4i_take_kicks(const gs4i_gathered *acc, const gs4i_gathered *jump, int n, gs4i_kicks *kicks)
+{
+    gs4i_gradient_lanes(acc->dx, acc->dy, acc->dz, n, kicks->acc);
+    if (jump) gs4i_gradient_lanes(jump->dx, jump->dy, jump->dz, n, kicks->jump);
+    else memset(kicks->jump, 0, sizeof kicks->jump);
+    return kicks;
+}
+
 /* S7: gather and correct. With `commit` 0 nothing is written: a rehearsal that only reports. */
 static void gs4i_correct(const gs4i_pass *pass, int index, int commit)
 {
@@ -4217,12 +4233,11 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit)
     memset(&laws, 0, sizeof laws);
     memset(&past, 0, sizeof past);
     memset(k.jump, 0, sizeof k.jump);
-    memset(kicks.jump, 0, sizeof kicks.jump);
     for (; i < end; i += GS4I_BATCH, row += 2) {
         const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
         gs4i_batch q;
         gs4i_stencils s;
-        gs4i_gathered acc, jump;                            /* gradients only where there are solids */
+        gs4i_gathered acc, jump;
         int b;
         gs4i_tile_prefetch(grid, next, row, grid->momentum);
         gs4i_tile_prefetch(grid, next, row, grid->force);
@@ -4231,10 +4246,8 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit)
             gs4i_row w, d;
             gs4i_x_weights(&s, b, &w, &d);
             gs4i_gather_local(u_nodes + 4 * s.base[b], &s, b, &w, &d, &u);
-            if (p.deformation_reals) gs4i_gather_local(a_nodes + 4 * s.base[b], &s, b, &w, &d, &acc);
-            else gs4i_gather_value(a_nodes + 4 * s.base[b], &s, b, &w, acc.value);
-            if (jumps && p.deformation_reals) gs4i_gather_local(j_nodes + 4 * s.base[b], &s, b, &w, &d, &jump);
-            else if (jumps) gs4i_gather_value(j_nodes + 4 * s.base[b], &s, b, &w, jump.value);
+            gs4i_gather_kick(&p, a_nodes + 4 * s.base[b], &s, b, &w, &d, &acc);
+            if (jumps) gs4i_gather_kick(&p, j_nodes + 4 * s.base[b], &s, b, &w, &d, &jump);
         }
         gs4i_to_lanes(u.value, n, k.U);
         gs4i_gradient_lanes(u.dx, u.dy, u.dz, n, k.L);
@@ -4243,11 +4256,8 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit)
         gs4i_correct_batch(rule, &k, &q);
         if (p.elastic_reals || p.deformation_reals) gs4i_take_laws(sim->laws, p.material + i, n, &laws);
         if (p.elastic_reals) gs4i_advance_elastic(&p, i, n, &rule, &laws, &past.elastic, k.L, report, commit);
-        if (p.deformation_reals) {
-            gs4i_gradient_lanes(acc.dx, acc.dy, acc.dz, n, kicks.acc);
-            if (jumps) gs4i_gradient_lanes(jump.dx, jump.dy, jump.dz, n, kicks.jump);
-            gs4i_advance_solid(&p, i, n, &rule, &laws, &past.solid, k.L, &kicks, q.v[3], report, commit);
-        }
+        if (p.deformation_reals)
+            gs4i_advance_solid(&p, i, n, &rule, &laws, &past.solid, k.L, gs4i_take_kicks(&acc, jumps ? &jump : NULL, n, &kicks), q.v[3], report, commit);
         if (!commit) { gs4i_judge(&q, k.L, p.position + 4 * i, n, grid->h, p.id + i, report); continue; }
         gs4i_pack_batch(&q, 1, &out);
         if (edge) gs4i_correct_contact(sim, i, n, &out, &u, report);
@@ -5066,8 +5076,9 @@ static void gs4i_finish(gs4_sim *sim)
     gs4i_emit(sim, dt);
 }
 
-/* How solids turn whose velocities were set by hand: by the grid, which sees less of it at their surface than there is, hence twice more
- * with what it saw. A step that is refused forgets it again. */
+/* How solids turn whose velocities were set by hand: by the grid, which sees less of it at their surface than there is, hence again with what
+ * it saw (kinetic energy that a stiff cube keeps in a quarter of a turn: 0.996 after three times, 0.9999 after ten). A step that is refused
+ * forgets it again. */
 static void gs4i_forget_turning(gs4_sim *sim)
 {
     int i;
@@ -5079,7 +5090,7 @@ static int gs4i_find_turning(gs4_sim *sim, gs4i_node_pass *nodes)
     const gs4_real ahead = sim->rule.reach.ahead;
     int pass, result = GS4_OK;
     sim->rule.reach.ahead = 0;                              /* as it is now, whatever dt is */
-    for (pass = 0; pass < 3 && result == GS4_OK; pass++) {
+    for (pass = 0; pass < 10 && result == GS4_OK; pass++) {
         result = gs4i_rasterise(sim, nodes);
         if (result == GS4_OK && gs4i_place_jumps(&sim->memory, &sim->boundary, &sim->grid) != GS4_OK) result = gs4i_fail_memory(sim);
         if (result != GS4_OK) break;
@@ -6168,7 +6179,7 @@ static void gs4i_fill_one(gs4_sim *sim, gs4_vec3 x, gs4_vec3 centre, const gs4_f
     int k;
     if (!gs4i_add_one(sim, x, v, mass, f->material)) return;
     for (k = 0; k < 3 && sim->particles.affine[k]; k++) memcpy(sim->particles.affine[k] + 4 * i, C[k], sizeof C[k]);
-    if (sim->particles.deformation_reals) gs4i_set_turning(&sim->particles, i, sim->laws[f->material].shear_modulus > 0 ? w : gs4i_vec3(0, 0, 0));
+    if (sim->particles.deformation_reals && !sim->unturned) gs4i_set_turning(&sim->particles, i, sim->laws[f->material].shear_modulus > 0 ? w : gs4i_vec3(0, 0, 0));
     gs4i_note_speed(sim, gs4i_length(v));
 }
 

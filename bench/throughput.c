@@ -1,5 +1,5 @@
 /* Nanoseconds a particle and step: one block of a million particles, 8 a cell, settled and stirred, GS4 and symplectic Euler,
- * beside a textbook MLS-MPM loop (plain_mpm.c) in the same run; then viscoelastic liquids, threads, and what an empty domain around costs.
+ * beside a textbook MLS-MPM loop (plain_mpm.c) in the same run; then viscoelastic liquids, solids, threads, and what an empty domain around costs.
  *   cc -O3 -march=native bench/throughput.c -I. -lm -lpthread -o throughput && ./throughput [--particles N] [--steps N] [--repeats N]
  * CSV on standard output. */
 #define _POSIX_C_SOURCE 200112L
@@ -11,7 +11,7 @@
 
 typedef struct row { double min_ns, median_ns, bytes_particle; int particles; uint64_t hash; double sort_share; } row;
 
-static gs4_sim *scene(int edge, const int cells[3], gs4_integrator integrator, gs4_liquid liquid, int threads, int stirred)
+static gs4_sim *scene(int edge, const int cells[3], gs4_integrator integrator, gs4_liquid liquid, gs4_solid solid, int threads, int stirred)
 {
     gs4_sim_desc d = scene_cube(edge);
     gs4_material m = scene_liquid(1000, 1, 30);
@@ -22,7 +22,8 @@ static gs4_sim *scene(int edge, const int cells[3], gs4_integrator integrator, g
     d.gravity = at(0, -9.81, 0); d.integrator = integrator; d.threads = threads; d.now = bench_now;
     d.max_particles = 8 * edge * edge * edge;
     if (gs4_create(&d, &sim) < 0) { puts(gs4_last_error(NULL)); exit(1); }
-    m.liquid = liquid;
+    m.liquid = liquid; m.solid = solid;
+    if (solid != GS4_NO_SOLID) m.shear_modulus = 1000;
     if (liquid != GS4_NEWTONIAN) { m.local_fraction = (gs4_real)0.1; m.relaxation_time = (gs4_real)0.5; }
     if (liquid == GS4_POM_POM) { m.stretch_time = (gs4_real)0.25; m.anisotropy = (gs4_real)0.1; m.arms = 4; }
     if (gs4_add_material(sim, &m) < 0) { puts(gs4_last_error(sim)); exit(1); }
@@ -96,7 +97,7 @@ static double plain(const char *name, int edge, int stirred, int steps, int repe
 int main(int count, char **values)
 {
     int particles = 1000000, steps = 5, repeats = 7, i, edge = 4;
-    double gs4[2], euler[2], text[2], elastic[2], two;
+    double gs4[2], euler[2], text[2], elastic[2], solid[3], two;
     for (i = 1; i + 1 < count; i += 2) {
         if (strcmp(values[i], "--particles") == 0) particles = atoi(values[i + 1]);
         else if (strcmp(values[i], "--steps") == 0) steps = atoi(values[i + 1]);
@@ -110,20 +111,24 @@ int main(int count, char **values)
         puts("scene,particles,min_ns,median_ns,of_which_sort_ns,bytes_a_particle,state_hash");
         for (i = 0; i < 2; i++) {
             text[i]  = plain(i ? "textbook stirred" : "textbook settled", edge, i, steps, repeats);
-            gs4[i]   = report(i ? "gs4 stirred" : "gs4 settled", scene(edge, snug, GS4_INTEGRATOR_GS4, GS4_NEWTONIAN, 1, i), steps, repeats);
-            euler[i] = report(i ? "euler stirred" : "euler settled", scene(edge, snug, GS4_INTEGRATOR_SYMPLECTIC_EULER, GS4_NEWTONIAN, 1, i), steps, repeats);
+            gs4[i]   = report(i ? "gs4 stirred" : "gs4 settled", scene(edge, snug, GS4_INTEGRATOR_GS4, GS4_NEWTONIAN, GS4_NO_SOLID, 1, i), steps, repeats);
+            euler[i] = report(i ? "euler stirred" : "euler settled", scene(edge, snug, GS4_INTEGRATOR_SYMPLECTIC_EULER, GS4_NEWTONIAN, GS4_NO_SOLID, 1, i), steps, repeats);
         }
-        elastic[0] = report("gs4 Oldroyd-B settled", scene(edge, snug, GS4_INTEGRATOR_GS4, GS4_OLDROYD_B, 1, 0), steps, repeats);
-        elastic[1] = report("gs4 Pom-Pom settled", scene(edge, snug, GS4_INTEGRATOR_GS4, GS4_POM_POM, 1, 0), steps, repeats);
-        two = report("gs4 settled two threads", scene(edge, snug, GS4_INTEGRATOR_GS4, GS4_NEWTONIAN, 2, 0), steps, repeats);
+        elastic[0] = report("gs4 Oldroyd-B settled", scene(edge, snug, GS4_INTEGRATOR_GS4, GS4_OLDROYD_B, GS4_NO_SOLID, 1, 0), steps, repeats);
+        elastic[1] = report("gs4 Pom-Pom settled", scene(edge, snug, GS4_INTEGRATOR_GS4, GS4_POM_POM, GS4_NO_SOLID, 1, 0), steps, repeats);
+        solid[0] = report("gs4 neo-Hookean settled", scene(edge, snug, GS4_INTEGRATOR_GS4, GS4_NEWTONIAN, GS4_NEO_HOOKEAN, 1, 0), steps, repeats);
+        solid[1] = report("gs4 fixed-corotated settled", scene(edge, snug, GS4_INTEGRATOR_GS4, GS4_NEWTONIAN, GS4_FIXED_COROTATED, 1, 0), steps, repeats);
+        solid[2] = report("euler neo-Hookean settled", scene(edge, snug, GS4_INTEGRATOR_SYMPLECTIC_EULER, GS4_NEWTONIAN, GS4_NEO_HOOKEAN, 1, 0), steps, repeats);
+        two = report("gs4 settled two threads", scene(edge, snug, GS4_INTEGRATOR_GS4, GS4_NEWTONIAN, GS4_NO_SOLID, 2, 0), steps, repeats);
     }
     printf("# textbook over gs4: settled %.2f, stirred %.2f; over symplectic Euler: %.2f, %.2f; two threads %.2f times one\n",
            text[0] / gs4[0], text[1] / gs4[1], text[0] / euler[0], text[1] / euler[1], gs4[0] / two);
-    printf("# over a Newtonian step: Oldroyd-B %.2f, Pom-Pom %.2f\n", elastic[0] / gs4[0], elastic[1] / gs4[0]);
+    printf("# over a Newtonian step: Oldroyd-B %.2f, Pom-Pom %.2f, neo-Hookean %.2f, fixed-corotated %.2f; symplectic Euler: neo-Hookean %.2f\n",
+           elastic[0] / gs4[0], elastic[1] / gs4[0], solid[0] / gs4[0], solid[1] / gs4[0], solid[2] / euler[0]);
     {
         const int small[3] = { 20, 20, 20 }, huge[3] = { 512, 256, 256 };
-        const double a = report("50 k snug", scene(18, small, GS4_INTEGRATOR_GS4, GS4_NEWTONIAN, 1, 0), 4 * steps, repeats);
-        const double b = report("50 k in 33 million cells", scene(18, huge, GS4_INTEGRATOR_GS4, GS4_NEWTONIAN, 1, 0), 4 * steps, repeats);
+        const double a = report("50 k snug", scene(18, small, GS4_INTEGRATOR_GS4, GS4_NEWTONIAN, GS4_NO_SOLID, 1, 0), 4 * steps, repeats);
+        const double b = report("50 k in 33 million cells", scene(18, huge, GS4_INTEGRATOR_GS4, GS4_NEWTONIAN, GS4_NO_SOLID, 1, 0), 4 * steps, repeats);
         printf("# empty space costs a factor of %.2f\n", b / a);
     }
     return 0;

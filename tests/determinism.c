@@ -2,6 +2,7 @@
  * Every build for one machine must print the same, whatever this says, but for the first three:
  *   scene=bunny    eight bunnies thrown on each other in a box, and a stamp on them, instead
  *   elastic=1      both liquids of the block viscoelastic; needs the same libm, too
+ *   solid=1        the block an elastic solid, and what the nozzle gives a plastic one; the same
  *   steps=N        length of the run (500)
  *   threads=N      of the library's own pool (GS4_PTHREADS)
  *   shuffle=1      a parallel_for that runs the tasks in another order every time
@@ -15,7 +16,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-typedef struct options { int steps, threads, shuffle, bunnies, elastic; const char *checkpoint, *frames; } options;
+typedef struct options { int steps, threads, shuffle, bunnies, elastic, solid; const char *checkpoint, *frames; } options;
 
 static gs4_vec3 at(double x, double y, double z)
 {
@@ -43,7 +44,7 @@ static void stop(const char *what, const gs4_sim *sim)
 }
 
 /* 0.6 x 0.4 x 0.8 m: open above, periodic along y; liquids, a ball and a nozzle; no particle yet */
-static gs4_sim *create_block(gs4_sim_desc *d, int elastic)
+static gs4_sim *create_block(gs4_sim_desc *d, int elastic, int solid)
 {
     gs4_material m;
     gs4_collider c;
@@ -57,8 +58,10 @@ static gs4_sim *create_block(gs4_sim_desc *d, int elastic)
     if (gs4_create(d, &sim) < 0) stop("gs4_create", NULL);
     m.density = 1000; m.viscosity = (gs4_real)0.5; m.sound_speed = 20;
     if (elastic) { m.liquid = GS4_OLDROYD_B; m.local_fraction = (gs4_real)0.2; m.relaxation_time = (gs4_real)0.05; }
+    if (solid) { m.solid = GS4_NEO_HOOKEAN; m.shear_modulus = 3000; }
     if (gs4_add_material(sim, &m) < 0) stop("gs4_add_material", sim);
     m.density = 800; m.viscosity = 5;
+    if (solid) { m.solid = GS4_FIXED_COROTATED; m.yield_compression = (gs4_real)0.02; m.yield_stretch = (gs4_real)0.01; }
     if (elastic) {                                          /* relaxes and stretches too fast for the step: the split, mostly */
         m.liquid = GS4_POM_POM; m.relaxation_time = (gs4_real)0.002; m.stretch_time = (gs4_real)0.0005; m.anisotropy = (gs4_real)0.3; m.arms = 4;
     }
@@ -130,7 +133,7 @@ static gs4_sim *create(gs4_integrator integrator, const options *o, unsigned *ca
     if (integrator == GS4_INTEGRATOR_GS4) { d.rho_inf = (gs4_real)0.8; d.rho_inf_spurious = (gs4_real)0.2; }
     d.threads = o->threads;
     if (o->shuffle) { d.parallel_for = run_shuffled; d.parallel_user = calls; }
-    return o->bunnies ? create_bunnies(&d) : create_block(&d, o->elastic);
+    return o->bunnies ? create_bunnies(&d) : create_block(&d, o->elastic, o->solid);
 }
 
 static void write_frames(gs4_sim *sim, const char *name)
@@ -190,13 +193,14 @@ static const char *value_of(const char *argument, const char *name)
 
 int main(int count, char **values)
 {
-    options o = { 500, 0, 0, 0, 0, NULL, NULL };
+    options o = { 500, 0, 0, 0, 0, 0, NULL, NULL };
     const char *v;
     int i;
     for (i = 1; i < count; i++) {
         if ((v = value_of(values[i], "scene=")) != NULL && strcmp(v, "bunny") == 0) o.bunnies = 1;
         else if ((v = value_of(values[i], "steps=")) != NULL) o.steps = atoi(v);
         else if ((v = value_of(values[i], "elastic=")) != NULL) o.elastic = atoi(v);
+        else if ((v = value_of(values[i], "solid=")) != NULL) o.solid = atoi(v);
         else if ((v = value_of(values[i], "threads=")) != NULL) o.threads = atoi(v);
         else if ((v = value_of(values[i], "shuffle=")) != NULL) o.shuffle = atoi(v);
         else if ((v = value_of(values[i], "checkpoint=")) != NULL) o.checkpoint = v;

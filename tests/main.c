@@ -10,6 +10,7 @@
 #include "test_errors.c"
 #include "test_files.c"
 #include "test_stability.c"
+#include "test_solid.c"
 #include "test_stress.c"
 #include "test_poisson.c"
 
@@ -43,6 +44,7 @@ int main(int count, char **values)
     RUN(test_heat_conserved);
     RUN(test_heat_cycles);
     RUN(test_heat_of_viscosity);
+    run_solid();
     run_errors();
     run_files();
     run_stress();

@@ -270,7 +270,7 @@ all_hashes() {
     same "GS4_NO_VECTORS" "$CC -O2 -DGS4_NO_VECTORS" ""
     threads_and_checkpoint
 }
-hashes() { all_hashes ""; bunnies; elastic; contraction; }
+hashes() { all_hashes ""; bunnies; history; contraction; }
 hashes_double() { all_hashes -DGS4_DOUBLE; }
 
 bunnies() {
@@ -281,12 +281,14 @@ bunnies() {
     scene=''
 }
 
-elastic() {
-    scene=elastic=1
-    reference "" 300
-    for level in -O0 '-O3 -march=native'; do same "$level" "$CC $level" ""; done
-    same "GS4_NO_VECTORS" "$CC -O2 -DGS4_NO_VECTORS" ""
-    threads_and_checkpoint
+# Stress that depends on what was before: the robust paths of single particles among them
+history() {
+    for scene in elastic=1 solid=1; do
+        reference "" 300
+        for level in -O0 '-O3 -march=native'; do same "$level" "$CC $level" ""; done
+        same "GS4_NO_VECTORS" "$CC -O2 -DGS4_NO_VECTORS" ""
+        threads_and_checkpoint
+    done
     scene=''
 }
 
@@ -310,6 +312,7 @@ asan() {
     if have clang; then
         build="clang -fsanitize=address,undefined -fno-sanitize-recover=all"
         check "clang determinism" sanitized_det "$build" "threads=2 elastic=1 checkpoint=$tmp/checkpoint frames=$tmp/frame"
+        check "clang determinism of solids" sanitized_det "$build" "threads=2 solid=1 checkpoint=$tmp/checkpoint frames=$tmp/frame"
         check "clang determinism in double" sanitized_det "$build -DGS4_DOUBLE -DGS4_NO_VECTORS" "checkpoint=$tmp/checkpoint"
     fi
     have gcc && check "all tests" sanitized_main "gcc -fsanitize=address,undefined -fno-sanitize-recover=all"
@@ -319,6 +322,7 @@ tsan() {
     have gcc || return
     for n in 2 3; do check "determinism on $n threads" sanitized_det "gcc -fsanitize=thread" "threads=$n checkpoint=$tmp/checkpoint"; done
     check "determinism of stress on 2 threads" sanitized_det "gcc -fsanitize=thread" "threads=2 elastic=1"
+    check "determinism of solids on 2 threads" sanitized_det "gcc -fsanitize=thread" "threads=2 solid=1"
     check "tests of files" sanitized_main "gcc -fsanitize=thread" files
 }
 

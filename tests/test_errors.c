@@ -215,7 +215,7 @@ static void test_errors_material(void)
         ERR_FIELD(gs4_material, cross_wlf.d1, "cross_wlf", ERR_LATER), ERR_FIELD(gs4_material, cross_wlf.a1, "cross_wlf", ERR_LATER),
         ERR_FIELD(gs4_material, cross_wlf.t1, "cross_wlf", ERR_LATER), ERR_FIELD(gs4_material, cross_wlf.t2, "cross_wlf", ERR_LATER),
         ERR_FIELD(gs4_material, bulk_modulus, "bulk_modulus", ERR_REAL), ERR_FIELD(gs4_material, sound_speed, "sound_speed", ERR_REAL),
-        ERR_FIELD(gs4_material, incompressible, "incompressible", ERR_LATER_INT), ERR_FIELD(gs4_material, solid, "solid", ERR_LATER_INT),
+        ERR_FIELD(gs4_material, incompressible, "incompressible", ERR_LATER_INT), ERR_FIELD(gs4_material, solid, "solid", ERR_INT),
         ERR_FIELD(gs4_material, shear_modulus, "shear_modulus", ERR_LATER), ERR_FIELD(gs4_material, yield_compression, "yield_compression", ERR_LATER),
         ERR_FIELD(gs4_material, yield_stretch, "yield_stretch", ERR_LATER), ERR_FIELD(gs4_material, heat_capacity, "heat_capacity", ERR_REAL),
         ERR_FIELD(gs4_material, flux_relaxation_time, "flux_relaxation_time", ERR_LATER), ERR_FIELD(gs4_material, fourier_fraction, "fourier_fraction", ERR_REAL),
@@ -229,6 +229,10 @@ static void test_errors_material(void)
         ERR_FIELD(gs4_material, local_fraction, "local_fraction", ERR_REAL), ERR_FIELD(gs4_material, relaxation_time, "relaxation_time", ERR_REAL),
         ERR_FIELD(gs4_material, stretch_time, "stretch_time", ERR_REAL), ERR_FIELD(gs4_material, anisotropy, "anisotropy", ERR_REAL),
         ERR_FIELD(gs4_material, arms, "arms", ERR_REAL) };
+    static const err_field solid[] = {
+        ERR_FIELD(gs4_material, solid, "solid", ERR_INT), ERR_FIELD(gs4_material, shear_modulus, "shear_modulus", ERR_REAL),
+        ERR_FIELD(gs4_material, yield_compression, "yield_compression", ERR_REAL), ERR_FIELD(gs4_material, yield_stretch, "yield_stretch", ERR_REAL),
+        ERR_FIELD(gs4_material, viscosity, "viscosity", ERR_REAL), ERR_FIELD(gs4_material, liquid, "liquid", ERR_INT) };
     static const err_field cross[] = {
         ERR_FIELD(gs4_material, cross_wlf.a, "cross_wlf", ERR_REAL), ERR_FIELD(gs4_material, cross_wlf.n, "cross_wlf", ERR_REAL),
         ERR_FIELD(gs4_material, cross_wlf.d1, "cross_wlf", ERR_REAL), ERR_FIELD(gs4_material, cross_wlf.a1, "cross_wlf", ERR_REAL),
@@ -241,6 +245,9 @@ static void test_errors_material(void)
     m.heat_capacity = 1000; m.conductivity = 1; m.flux_relaxation_time = (gs4_real)0.1; m.fourier_fraction = (gs4_real)0.5;
     m.can_melt = 1; m.melting_temperature = 1; m.latent_heat = (gs4_real)1e5; m.viscous_heating = 1;
     err_try_all(ERR_MATERIAL, &m, sizeof m, warm, ERR_COUNT(warm));
+    m = err_material();
+    m.solid = GS4_NEO_HOOKEAN; m.shear_modulus = 1000; m.yield_compression = (gs4_real)0.1;
+    err_try_all(ERR_MATERIAL, &m, sizeof m, solid, ERR_COUNT(solid));
     m = err_material();
     m.viscosity_law = GS4_VISCOSITY_CROSS_WLF;
     m.cross_wlf.a = 1; m.cross_wlf.n = (gs4_real)0.5; m.cross_wlf.d1 = 10; m.cross_wlf.a1 = 1; m.cross_wlf.t1 = 1; m.cross_wlf.t2 = -50;

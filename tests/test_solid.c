@@ -676,6 +676,56 @@ static void test_solid_is_paid_for_where_it_is(void)
     gs4_destroy(sim);
 }
 
+/* One stage of a scene in which solids come to a liquid; velocities are set by hand before a step. */
+static int solid_do(gs4_sim *sim, int stage)
+{
+    const gs4_material water = scene_liquid(1000, 1, 10), clay = solid_material(GS4_FIXED_COROTATED, 1500, 5000, 10);
+    gs4_fill f = scene_fill(at(0, -1, 0));
+    if (stage == 0) return gs4_add_material(sim, &water);
+    if (stage == 1) return gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1, 0.25, 1)), &f);
+    if (stage == 2) return gs4_add_material(sim, &clay);
+    f.material = 1; f.angular_velocity = at(0, 0, 2);
+    if (stage == 3) return gs4_add_particles(sim, gs4_box(at(0.2, 0.4, 0.2), at(0.6, 0.7, 0.6)), &f);
+    if (stage == 5) gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
+    if (stage == 6) return gs4_save(sim, "solid_memory.save");
+    if (stage == 8) return gs4_load(sim, "solid_memory.save");
+    return gs4_step(sim, (gs4_real)5e-4);
+}
+
+/* Every allocation refused once: a code, nothing lost, nothing changed, and the same end when it is done again. */
+static void test_solid_memory(void)
+{
+    uint64_t reference[2] = { 0, 0 };
+    int euler, stage, r;
+    long k, calls;
+    for (euler = 0; euler < 2; euler++)
+        for (calls = 0, k = -1; k < 0 || k < calls; k++) {
+            gs4_sim_desc d = scene_cube(8);
+            gs4_sim *sim = NULL;
+            files_memory m;
+            uint64_t before, hash;
+            memset(&m, 0, sizeof m);
+            m.fail_at = k;
+            d.integrator = physics_integrators[euler]; d.gravity = at(0, -9.81, 0);
+            d.allocator.alloc_fn = files_alloc; d.allocator.free_fn = files_free; d.allocator.user = &m;
+            if (gs4_create(&d, &sim) < 0) { CHECK(m.live == 0 && k >= 0); continue; }
+            for (stage = 0; stage < 10; stage++) {
+                before = gs4_state_hash(sim);
+                r = solid_do(sim, stage);
+                if (r >= 0) continue;
+                CHECK(k >= 0 && r == GS4_ERROR_MEMORY && (stage == 5 || gs4_state_hash(sim) == before));
+                m.fail_at = -1;
+                CHECK_RESULT(sim, solid_do(sim, stage), 0);
+            }
+            hash = gs4_state_hash(sim);
+            if (k < 0) { reference[euler] = hash; calls = m.calls; }
+            CHECK(hash == reference[euler]); CHECK(gs4_get_stats(sim).memory_bytes == m.bytes);
+            gs4_destroy(sim);
+            CHECK(m.live == 0 && m.bytes == 0 && m.wrong == 0);
+        }
+    remove("solid_memory.save");
+}
+
 /* 0.95 of the limit, where elastic waves set it, with all wiggles that a grid has. */
 static void test_solid_stability(void)
 {
@@ -722,5 +772,6 @@ static void run_solid(void)
     RUN(test_solid_huge_steps);
     RUN(test_solid_state);
     RUN(test_solid_is_paid_for_where_it_is);
+    RUN(test_solid_memory);
     RUN(test_solid_stability);
 }

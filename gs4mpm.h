@@ -908,7 +908,7 @@ typedef struct gs4i_masked {
     float *z[2], *inverse[2];           /* correction; of the diagonal, 0 where there is no unknown */
     float *w[3][2], *w_low[3][2];       /* coefficient of the face towards +x +y +z, and what float leaves of it; NULL: all equal */
     float *mass[2], *mass_low[2];       /* h^2 d; level 1: with the faces to the air; level 0 where w: -1 without unknown */
-    uint8_t *degree[2];                 /* where w is NULL: faces that conduct; 0 where there is no unknown */
+    float *degree[2];                   /* where w is NULL: faces that conduct; 0 where there is no unknown */
     double *r[2];                       /* residual */
 } gs4i_masked;
 
@@ -997,12 +997,12 @@ static void gs4i_smooth_weighted(float *GS4I_RESTRICT z, GS4I_NEIGHBOURS(float),
 }
 
 static void gs4i_residual_uniform(float *GS4I_RESTRICT out, const float *GS4I_RESTRICT z, GS4I_NEIGHBOURS(float), const double *GS4I_RESTRICT r,
-                                  const uint8_t *GS4I_RESTRICT degree, const float *GS4I_RESTRICT mass, int n)
+                                  const float *GS4I_RESTRICT degree, const float *GS4I_RESTRICT mass, int n)
 {
     int m, l;
     GS4I_STRIPS(m, l, n) {
         const float around = (left[l] + right[l]) + (south[l] + north[l]) + (below[l] + above[l]);
-        out[l] = degree[l] ? ((float)r[l] - ((float)degree[l] + mass[l]) * z[l]) + around : 0;
+        out[l] = (float)(degree[l] > 0) * (((float)r[l] - (degree[l] + mass[l]) * z[l]) + around);
     }
 }
 
@@ -1013,7 +1013,7 @@ static void gs4i_residual_weighted(float *GS4I_RESTRICT out, const float *GS4I_R
     GS4I_STRIPS(m, l, n) {
         const float c = z[l], flow = (wl[l] * (c - left[l]) + wr[l] * (c - right[l])) + (ws[l] * (c - south[l]) + wn[l] * (c - north[l]))
                                    + (wb[l] * (c - below[l]) + wa[l] * (c - above[l]));
-        out[l] = mass[l] < 0 ? 0 : (float)r[l] - (mass[l] * c + flow);
+        out[l] = (float)(mass[l] >= 0) * ((float)r[l] - (mass[l] * c + flow));
     }
 }
 
@@ -1021,7 +1021,7 @@ static void gs4i_residual_weighted(float *GS4I_RESTRICT out, const float *GS4I_R
 #define GS4I_TIMES_UNIFORM(q, v) \
     const double c = (double)(v)[l], around = ((double)left[l] + (double)right[l]) + ((double)south[l] + (double)north[l]) \
                                             + ((double)below[l] + (double)above[l]); \
-    const double q = ((double)mass[l] + (double)mass_low[l]) * c + ((double)degree[l] * c - (degree[l] ? around : 0))
+    const double q = ((double)mass[l] + (double)mass_low[l]) * c + (double)(degree[l] > 0) * ((double)degree[l] * c - around)
 #ifdef GS4_DOUBLE
 #define GS4I_LOW_FACES , const float *GS4I_RESTRICT ll, const float *GS4I_RESTRICT lr, const float *GS4I_RESTRICT ls, \
     const float *GS4I_RESTRICT ln, const float *GS4I_RESTRICT lb, const float *GS4I_RESTRICT la
@@ -1037,8 +1037,8 @@ static void gs4i_residual_weighted(float *GS4I_RESTRICT out, const float *GS4I_R
         (GS4I_FACE(wl[l], ll[l]) * (c - (double)left[l]) + GS4I_FACE(wr[l], lr[l]) * (c - (double)right[l])) \
       + (GS4I_FACE(ws[l], ls[l]) * (c - (double)south[l]) + GS4I_FACE(wn[l], ln[l]) * (c - (double)north[l])) \
       + (GS4I_FACE(wb[l], lb[l]) * (c - (double)below[l]) + GS4I_FACE(wa[l], la[l]) * (c - (double)above[l])); \
-    const double q = mass[l] < 0 ? 0 : ((double)mass[l] + (double)mass_low[l]) * c + flow
-#define GS4I_UNIFORM_MATRIX const uint8_t *GS4I_RESTRICT degree, const float *GS4I_RESTRICT mass, const float *GS4I_RESTRICT mass_low
+    const double q = (double)(mass[l] >= 0) * (((double)mass[l] + (double)mass_low[l]) * c + flow)
+#define GS4I_UNIFORM_MATRIX const float *GS4I_RESTRICT degree, const float *GS4I_RESTRICT mass, const float *GS4I_RESTRICT mass_low
 #define GS4I_WEIGHTED_MATRIX GS4I_FACES GS4I_LOW_FACES, const float *GS4I_RESTRICT mass, const float *GS4I_RESTRICT mass_low
 
 /* p.Ap */
@@ -1090,7 +1090,7 @@ static double gs4i_defect_uniform(double *GS4I_RESTRICT r, const double *GS4I_RE
 {
     double sum[GS4I_STRIP] = { 0 };
     int m, l;
-    GS4I_STRIPS(m, l, n) { GS4I_TIMES_UNIFORM(q, x); r[l] -= degree[l] || mass[l] != 0 ? q : 0; sum[l - m] += r[l] * r[l]; }
+    GS4I_STRIPS(m, l, n) { GS4I_TIMES_UNIFORM(q, x); r[l] -= q; sum[l - m] += r[l] * r[l]; }
     return gs4i_sum_lanes(sum);
 }
 
@@ -1539,7 +1539,7 @@ static size_t gs4i_lay_out(gs4i_solver *s, char *base)
         gs4i_carve_two(base, &used, g->count, g->z);
         gs4i_carve_two(base, &used, g->count, g->inverse);
         for (c = 0; c < 2; c++) g->r[c] = (double *)gs4i_carve(base, &used, g->count, sizeof(double));
-        if (l == 0 && s->uniform) for (c = 0; c < 2; c++) g->degree[c] = (uint8_t *)gs4i_carve(base, &used, g->count, 1);
+        if (l == 0 && s->uniform) gs4i_carve_two(base, &used, g->count, g->degree);
         else for (a = 0; a < 3; a++) gs4i_carve_two(base, &used, g->count, g->w[a]);
         if (l == 0 && !s->uniform && sizeof(gs4_real) == 8) for (a = 0; a < 3; a++) gs4i_carve_two(base, &used, g->count, g->w_low[a]);
         if (l == 1 || !s->uniform || s->massive) gs4i_carve_two(base, &used, g->count, g->mass);
@@ -1548,7 +1548,8 @@ static size_t gs4i_lay_out(gs4i_solver *s, char *base)
     gs4i_carve_two(base, &used, s->level[0].count, s->p);
     for (c = 0; c < 2; c++) s->x[c] = (double *)gs4i_carve(base, &used, s->level[0].count, sizeof(double));
     s->residual = (float *)gs4i_carve(base, &used, s->level[1].count, sizeof(float));
-    for (c = 0; c < 2; c++) s->parent[c] = (int32_t *)gs4i_carve(base, &used, s->level[1].count, sizeof(int32_t));
+    s->parent[0] = (int32_t *)gs4i_carve(base, &used, s->level[1].count, sizeof(int32_t));
+    s->parent[1] = (int32_t *)(void *)s->residual;          /* of black cells while setting up alone */
     return used;
 }
 
@@ -1760,7 +1761,7 @@ static void gs4i_build_row(gs4i_solver *s, const gs4_poisson_desc *d, int j, int
             if (liquid && !(q.kind[i + q.beside[f]] & GS4I_IS_LIQUID)) air += w[f];
         }
         g->inverse[c][at] = liquid && sum > 0 ? (float)(1 / sum) : 0;
-        if (g->degree[c]) g->degree[c][at] = (uint8_t)(liquid ? degree : 0);
+        if (g->degree[c]) g->degree[c][at] = (float)(liquid ? degree : 0);
         else for (f = 0; f < 3; f++) {
             g->w[f][c][at] = (float)w[2 * f + 1];
             if (g->w_low[f][c]) g->w_low[f][c][at] = (float)(w[2 * f + 1] - (double)g->w[f][c][at]);
@@ -2103,7 +2104,7 @@ static void gs4i_find_links(const gs4i_graph *g, float *link)
         if (g->parent[g->to[e]] == g->parent[i] && g->block[g->to[e]] != g->block[i]) link[3 * (size_t)i + (size_t)gs4i_axis(g->block[i], g->block[g->to[e]])] += g->w[e];
 }
 
-/* The next graph from the last. */
+/* The next graph from the last. Its tables are in x, which is larger: 24 bytes a node, at most a node for eight cells. */
 static int gs4i_coarsen_graph(gs4i_solver *s)
 {
     gs4i_graph *g = &s->graph[s->graphs - 1], *up = &s->graph[s->graphs];
@@ -2111,8 +2112,7 @@ static int gs4i_coarsen_graph(gs4i_solver *s)
     float *link;
     float strong = GS4I_STRONG;
     int reds, blacks, i, j, e, pass;
-    if (gs4i_reserve(s, &s->labels, (6 * (size_t)g->n + 2) * sizeof(int32_t), 0) != GS4_OK) return GS4_ERROR_MEMORY;
-    first = (int32_t *)s->labels.data; child = first + g->n + 2; place = child + g->n;
+    first = (int32_t *)(void *)s->x[0]; child = first + g->n + 2; place = child + g->n;
     do gs4i_join_nodes(g, strong, first, &reds, &blacks); while (5 * (int64_t)(reds + blacks) > 4 * (int64_t)g->n && (strong *= 0.25f) > 1e-3f);
     link = (float *)(place + g->n);
     gs4i_find_links(g, link);
@@ -2277,6 +2277,7 @@ static int gs4i_solver_setup(gs4i_solver *s, const gs4_poisson_desc *d, int slab
     for (l = 0; l < 2; l++) gs4i_cut(s, l, slabs < 1 ? 1 : slabs > GS4I_SLABS ? GS4I_SLABS : slabs);
     if (gs4i_build_groups(&u) != GS4_OK) return GS4_ERROR_MEMORY;
     while (s->graph[s->graphs - 1].n > GS4I_DIRECT) if (gs4i_coarsen_graph(s) != GS4_OK) return GS4_ERROR_MEMORY;
+    gs4i_clear(s, s->x[0], s->level[0].count * sizeof(double));
     if (gs4i_factor(s) != GS4_OK) return GS4_ERROR_MEMORY;
     return gs4i_find_pockets(&u);
 }

@@ -1226,7 +1226,7 @@ static void gs4i_stage_collect(gs4i_solver *s, int level, int k)
     const gs4i_masked *g = &s->level[level];
     size_t at;
     int j, n, m;
-    if (s->graphs) GS4I_EACH_ROW(g, k, j, at, n) for (m = 0; m < n; m++) {
+    GS4I_EACH_ROW(g, k, j, at, n) for (m = 0; m < n; m++) {
         const int32_t parent = s->parent[0][at + (size_t)m];
         if (parent >= 0) g->z[0][at + (size_t)m] += s->graph[0].x[parent];
     }
@@ -1433,14 +1433,15 @@ static void gs4i_graph_cycles(gs4i_solver *s)
     }
 }
 
-static void gs4i_restrict_groups(gs4i_solver *s)
+/* Of a plane of blocks: no group reaches into another. */
+static void gs4i_restrict_groups(int K, void *context)
 {
+    gs4i_solver *s = (gs4i_solver *)context;
     const gs4i_masked *g = &s->level[1];
     float *b = s->graph[0].b;
     size_t at;
     int j, k, n, m;
-    memset(b, 0, (size_t)s->graph[0].n * sizeof *b);
-    for (k = 0; k < g->n[2]; k++)
+    for (k = 2 * K; k < 2 * K + 2 && k < g->n[2]; k++)
         GS4I_EACH_ROW(g, k, j, at, n) for (m = 0; m < n; m++) {
             const int32_t parent = s->parent[0][at + (size_t)m];
             if (parent >= 0) b[parent] += s->residual[at + (size_t)m];
@@ -1456,7 +1457,9 @@ static double gs4i_cycle(gs4i_solver *s)
     static const gs4i_stage_fn up[] = { gs4i_stage_prolong, gs4i_stage_black, gs4i_stage_red, gs4i_stage_black, gs4i_stage_red, gs4i_stage_dot };
     gs4i_sweep_run(s, 0, down, 5);
     gs4i_sweep_run(s, 1, down1, 5);
-    if (s->graphs) { gs4i_restrict_groups(s); gs4i_graph_cycles(s); }
+    memset(s->graph[0].b, 0, (size_t)s->graph[0].n * sizeof(float));
+    gs4i_parallel_for(s->tasks, (s->level[1].n[2] + 1) / 2, gs4i_restrict_groups, s);
+    gs4i_graph_cycles(s);
     gs4i_sweep_run(s, 1, up1, 5);
     gs4i_sweep_run(s, 0, up, 6);
     return gs4i_total(s);
@@ -1740,7 +1743,7 @@ GS4I_INLINE double gs4i_face_of(const gs4i_rows *q, int i, int f)
     return q->face[f] ? (double)q->face[f][i] * q->unit : q->unit;
 }
 
-/* One row of level 0, and what its cells add to level 1. */
+/* One row of level 0 with coefficients, and what its cells add to level 1. */
 static void gs4i_build_row(gs4i_solver *s, const gs4_poisson_desc *d, int j, int k)
 {
     const gs4i_masked *g = &s->level[0], *h = &s->level[1];
@@ -1753,26 +1756,61 @@ static void gs4i_build_row(gs4i_solver *s, const gs4_poisson_desc *d, int j, int
         const size_t at = row + (size_t)(i / 2), to = coarse + (size_t)(i / 4);
         const double mass = liquid && q.diagonal ? (double)q.diagonal[i] * q.mass_unit : 0;
         double w[6], sum = mass, air = 0;
-        int degree = 0;
         for (f = 0; f < 6; f++) {
-            w[f] = s->uniform ? GS4I_CONDUCTS(q.kind[i], q.kind[i + q.beside[f]]) : gs4i_face_of(&q, i, f);
+            w[f] = gs4i_face_of(&q, i, f);
             sum += w[f];
-            degree += w[f] > 0;
             if (liquid && !(q.kind[i + q.beside[f]] & GS4I_IS_LIQUID)) air += w[f];
         }
         g->inverse[c][at] = liquid && sum > 0 ? (float)(1 / sum) : 0;
-        if (g->degree[c]) g->degree[c][at] = (float)(liquid ? degree : 0);
-        else for (f = 0; f < 3; f++) {
+        for (f = 0; f < 3; f++) {
             g->w[f][c][at] = (float)w[2 * f + 1];
             if (g->w_low[f][c]) g->w_low[f][c][at] = (float)(w[2 * f + 1] - (double)g->w[f][c][at]);
         }
-        if (g->mass[c]) g->mass[c][at] = (liquid && sum > 0) || s->uniform ? (float)mass : -1;
+        g->mass[c][at] = liquid && sum > 0 ? (float)mass : -1;
         if (g->mass_low[c]) g->mass_low[c][at] = liquid ? (float)(mass - (double)(float)mass) : 0;
         if (!liquid) continue;
         for (f = 0; f < 3; f++)
             if ((f == 0 ? i : f == 1 ? j : k) & 1 && q.kind[i + q.beside[2 * f + 1]] & GS4I_IS_LIQUID) h->w[f][up][to] += (float)(0.5 * w[2 * f + 1]);
         h->mass[up][to] += (float)(0.75 * air); h->z[up][to] += (float)(0.75 * air);      /* z: to the air alone, while setting up */
         h->mass[up][to] += (float)mass;
+    }
+}
+
+/* The same where one coefficient serves all faces, for cells `begin` to `end`, which hold all liquid of the row. */
+static void gs4i_build_uniform_row(gs4i_solver *s, const gs4_poisson_desc *d, int j, int k, int begin, int end)
+{
+    const gs4i_masked *g = &s->level[0], *h = &s->level[1];
+    const size_t row = gs4i_row_of(g, j, k), coarse = gs4i_row_of(h, j / 2, k / 2);
+    const ptrdiff_t ny = (ptrdiff_t)s->kind_row, nz = (ptrdiff_t)s->kind_plane;
+    static const float inverse[7] = { 0, 1, 1 / 2.0f, 1 / 3.0f, 1 / 4.0f, 1 / 5.0f, 1 / 6.0f };
+    gs4i_rows q;
+    int i, c;
+    gs4i_open_row(&q, s, d, j, k);
+    for (c = 0; c < 2; c++) {
+        memset(g->inverse[c] + row, 0, (size_t)g->width * sizeof(float)); memset(g->degree[c] + row, 0, (size_t)g->width * sizeof(float));
+        if (g->mass[c]) { memset(g->mass[c] + row, 0, (size_t)g->width * sizeof(float)); memset(g->mass_low[c] + row, 0, (size_t)g->width * sizeof(float)); }
+    }
+    for (i = begin; i < end; i++) {
+        const uint8_t *v = q.kind + i;
+        const size_t at = row + (size_t)(i / 2), to = coarse + (size_t)(i / 4);
+        const int up = (i / 2 + j / 2 + k / 2) & 1;
+        int open, wet;
+        if (!(*v & GS4I_IS_LIQUID)) continue;
+        c = (i + j + k) & 1;
+        open = (v[-1] & 1) + (v[1] & 1) + (v[-ny] & 1) + (v[ny] & 1) + (v[-nz] & 1) + (v[nz] & 1);
+        wet = (v[-1] >> 1) + (v[1] >> 1) + (v[-ny] >> 1) + (v[ny] >> 1) + (v[-nz] >> 1) + (v[nz] >> 1);
+        g->degree[c][at] = (float)open;
+        g->inverse[c][at] = inverse[open];
+        if (q.diagonal && q.diagonal[i] > 0) {
+            const double mass = (double)q.diagonal[i] * q.mass_unit;
+            g->mass[c][at] = (float)mass; g->mass_low[c][at] = (float)(mass - (double)(float)mass);
+            g->inverse[c][at] = (float)(1 / (open + mass));
+            h->mass[up][to] += (float)mass;
+        }
+        if (i & 1) h->w[0][up][to] += 0.5f * (float)(v[1] >> 1);
+        if (j & 1) h->w[1][up][to] += 0.5f * (float)(v[ny] >> 1);
+        if (k & 1) h->w[2][up][to] += 0.5f * (float)(v[nz] >> 1);
+        if (open != wet) { h->mass[up][to] += 0.75f * (float)(open - wet); h->z[up][to] += 0.75f * (float)(open - wet); }
     }
 }
 
@@ -1798,8 +1836,9 @@ static void gs4i_build_planes(int K, void *context)
     for (k = 2 * K; k < 2 * K + 2 && k < g->n[2]; k++)
         for (j = 0; j < g->n[1]; j++) {
             int32_t *span = g->span + 2 * ((size_t)k * (size_t)g->n[1] + (size_t)j), *wide = h->span + 2 * ((size_t)K * (size_t)h->n[1] + (size_t)(j / 2));
-            gs4i_build_row(s, u->d, j, k);
             gs4i_build_span(s, j, k, span);
+            if (s->uniform) gs4i_build_uniform_row(s, u->d, j, k, 2 * span[0], 2 * span[1] < g->n[0] ? 2 * span[1] : g->n[0]);
+            else gs4i_build_row(s, u->d, j, k);
             if (span[0] >= span[1]) continue;
             if (span[0] / 2 / GS4I_STRIP * GS4I_STRIP < wide[0]) wide[0] = span[0] / 2 / GS4I_STRIP * GS4I_STRIP;
             if ((span[1] / 2 + GS4I_STRIP - 1) / GS4I_STRIP * GS4I_STRIP > wide[1]) wide[1] = (span[1] / 2 + GS4I_STRIP - 1) / GS4I_STRIP * GS4I_STRIP;
@@ -2322,19 +2361,16 @@ static void gs4i_load_plane(int k, void *context)
     const gs4i_given *v = (const gs4i_given *)context;
     const gs4i_solver *s = v->s;
     const gs4i_masked *g = &s->level[0];
-    const double b = s->rhs_unit;
-    int i, j;
-    for (j = 0; j < g->n[1]; j++) {
-        const size_t row = ((size_t)k * (size_t)g->n[1] + (size_t)j) * (size_t)g->n[0];
-        const uint8_t *kind = gs4i_kinds_of(s, j, k);
-        const size_t at = gs4i_row_of(g, j, k);
-        for (i = 0; i < g->n[0]; i++) {
-            const int c = (i + j + k) & 1;
-            const uint8_t is = kind[i];
-            g->r[c][at + (size_t)(i / 2)] = is & GS4I_IS_LIQUID ? (double)v->rhs[row + (size_t)i] * b : 0;
-            if (v->guess >= 0)
-                s->x[c][at + (size_t)(i / 2)] = is == GS4I_IS_OPEN || (is && v->guess) ? (double)v->x[row + (size_t)i] * s->x_unit : 0;
-        }
+    const double b = s->rhs_unit, unit = s->x_unit;
+    int i, j, odd;
+    for (j = 0; j < g->n[1]; j++) for (odd = 0; odd < 2; odd++) {
+        const int c = (odd + j + k) & 1;
+        const size_t row = ((size_t)k * (size_t)g->n[1] + (size_t)j) * (size_t)g->n[0], at = gs4i_row_of(g, j, k);
+        const uint8_t *kind = gs4i_kinds_of(s, j, k), wanted = v->guess ? GS4I_IS_OPEN | GS4I_IS_LIQUID : GS4I_IS_OPEN;
+        double *r = g->r[c] + at, *x = s->x[c] + at;
+        for (i = odd; i < g->n[0]; i += 2) r[i / 2] = kind[i] & GS4I_IS_LIQUID ? (double)v->rhs[row + (size_t)i] * b : 0;
+        if (v->guess < 0) continue;
+        for (i = odd; i < g->n[0]; i += 2) x[i / 2] = kind[i] && (kind[i] & wanted) == kind[i] ? (double)v->x[row + (size_t)i] * unit : 0;
     }
 }
 
@@ -2344,13 +2380,12 @@ static void gs4i_store_plane(int k, void *context)
     const gs4i_solver *s = v->s;
     const gs4i_masked *g = &s->level[0];
     const double unit = 1 / s->x_unit;
-    int i, j;
-    for (j = 0; j < g->n[1]; j++) {
+    int i, j, odd;
+    for (j = 0; j < g->n[1]; j++) for (odd = 0; odd < 2; odd++) {
         const uint8_t *kind = gs4i_kinds_of(s, j, k);
+        const double *from = s->x[(odd + j + k) & 1] + gs4i_row_of(g, j, k);
         gs4_real *x = v->x + ((size_t)k * (size_t)g->n[1] + (size_t)j) * (size_t)g->n[0];
-        const size_t at = gs4i_row_of(g, j, k);
-        for (i = 0; i < g->n[0]; i++)
-            if (kind[i] & GS4I_IS_LIQUID) x[i] = (gs4_real)(s->x[(i + j + k) & 1][at + (size_t)(i / 2)] * unit);
+        for (i = odd; i < g->n[0]; i += 2) if (kind[i] & GS4I_IS_LIQUID) x[i] = (gs4_real)(from[i / 2] * unit);
     }
 }
 

@@ -108,6 +108,12 @@
  * their rates. A particle that ends inside a body or behind a wall is put back on the surface. Where the grid sees little of a
  * particle (at a wall by the weight of images; in spray filled by less than 20 %) its unseen motion fades at the rate c0/h.
  *
+ * ELLIPTIC SOLVER. gs4_poisson_* solves (diagonal - div coefficient grad) x = rhs on a box of cells that are liquid, air or solid, by
+ * itself: multigrid in float preconditions conjugate gradients in double. It needs 6 to 11 iterations for a residual of 1e-8 whatever
+ * the size, also where the coefficient jumps by 1000, and up to 20 behind walls with holes of one cell, in spray and in porous
+ * matter (tests/test_poisson.c). Parts that nothing holds are found: there the mean of x is 0, and the mean of rhs is taken off.
+ * 45 bytes a cell where one coefficient serves all faces, 58 (double: 75) else; `threads` and the same bits as below.
+ *
  * OPTIONS (macros)             meaning                                                    define it
  *     GS4MPM_IMPLEMENTATION    compile the implementation here                            in one file
  *     GS4_DOUBLE               gs4_real is double; every function gets the ending _f64    everywhere or nowhere
@@ -7752,13 +7758,14 @@ static int gs4i_init_poisson(gs4_sim *fake, gs4_poisson *p)
 GS4_API int gs4_poisson_create(const gs4_poisson_desc *desc, gs4_poisson **out)
 {
     gs4_sim fake;
+    gs4_poisson_desc d;
     gs4_poisson *p;
     gs4i_memory memory;
     int result;
     memset(&fake, 0, sizeof fake); memset(&memory, 0, sizeof memory);
     if (out) *out = NULL;
     if (!desc || !out) return gs4i_say(&fake, gs4i_bad_argument(&fake, "gs4_poisson_create needs a description and a place for the solver"));
-    gs4_poisson_desc d = *desc;
+    d = *desc;
     result = gs4i_check_poisson(&fake, &d);
     if (result != GS4_OK) return gs4i_say(&fake, result);
     memory.hook = d.allocator;
@@ -7871,6 +7878,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_STORE
 #undef GS4I_STRIP
 #undef GS4I_STRIPS
+#undef GS4I_STRONG
 #undef GS4I_SUM
 #undef GS4I_THREAD_LOCAL
 #undef GS4I_TILE

@@ -1896,7 +1896,8 @@ static void gs4i_cut(gs4i_solver *s, int level, int slabs)
 
 /* Colours and places of the eight cells of level 1 in a block; number x + 2 y + 4 z. */
 GS4I_INLINE int gs4i_child_colour(int q) { return (q ^ (q >> 1) ^ (q >> 2)) & 1; }
-GS4I_INLINE size_t gs4i_child(const gs4i_masked *g, int I, int J, int K, int q) { return gs4i_row_of(g, 2 * J + (q >> 1 & 1), 2 * K + (q >> 2)) + (size_t)I; }
+GS4I_INLINE size_t gs4i_child(const gs4i_masked *g, size_t block, int q) { return block + (size_t)(q >> 1 & 1) * g->stride + (size_t)(q >> 2) * g->plane; }
+GS4I_INLINE size_t gs4i_block_of(const gs4i_masked *g, int I, int J, int K) { return gs4i_row_of(g, 2 * J, 2 * K) + (size_t)I; }
 
 static float gs4i_strongest(const gs4i_masked *g, int c, size_t at, int t)
 {
@@ -1912,18 +1913,18 @@ static float gs4i_strongest(const gs4i_masked *g, int c, size_t at, int t)
 GS4I_INLINE int gs4i_is_strong(float w, float most, float other, float strong) { return w > 0 && w >= strong * (most > other ? most : other); }
 
 /* Groups of a block: of each cell the first cell of its group, -1 without edges. */
-static void gs4i_group_block(const gs4i_masked *g, int I, int J, int K, int group[8])
+static void gs4i_group_block(const gs4i_masked *g, size_t block, int group[8])
 {
     int q, a, i;
     float most[8];
     for (q = 0; q < 8; q++) {
-        most[q] = gs4i_strongest(g, gs4i_child_colour(q), gs4i_child(g, I, J, K, q), q & 1);
+        most[q] = gs4i_strongest(g, gs4i_child_colour(q), gs4i_child(g, block, q), q & 1);
         group[q] = most[q] > 0 ? q : -1;
     }
     for (q = 0; q < 8; q++) for (a = 0; a < 3; a++) {
         const int other = q | 1 << a;
         int from, into;
-        if (other == q || !gs4i_is_strong(g->w[a][gs4i_child_colour(q)][gs4i_child(g, I, J, K, q)], most[q], most[other], GS4I_STRONG)) continue;
+        if (other == q || !gs4i_is_strong(g->w[a][gs4i_child_colour(q)][gs4i_child(g, block, q)], most[q], most[other], GS4I_STRONG)) continue;
         from = group[q] > group[other] ? group[q] : group[other]; into = group[q] + group[other] - from;
         for (i = 0; i < 8; i++) if (group[i] == from) group[i] = into;
     }
@@ -1937,12 +1938,15 @@ static void gs4i_number_groups(int K, void *context)
     int32_t *count = u->counts + 2 * K, number[8];
     int group[8], I, J, q;
     count[0] = count[1] = 0;
+    for (J = 2 * K * g->n[1]; J < 2 * (K + 1) * g->n[1] && J < g->n[1] * g->n[2]; J++)        /* no parent behind the end of a row either */
+        memset(s->parent[0] + gs4i_row_of(g, J % g->n[1], J / g->n[1]), 0xff, g->stride * sizeof(int32_t));
     for (J = 0; J < (g->n[1] + 1) / 2; J++) for (I = 0; I < (g->n[0] + 1) / 2; I++) {
-        gs4i_group_block(g, I, J, K, group);
+        const size_t block = gs4i_block_of(g, I, J, K);
+        gs4i_group_block(g, block, group);
         for (q = 0; q < 8; q++) {
             if (group[q] == q) number[q] = count[(I + J + K) & 1]++;
             if (2 * J + (q >> 1 & 1) < g->n[1] && 2 * K + (q >> 2) < g->n[2])
-                s->parent[gs4i_child_colour(q)][gs4i_child(g, I, J, K, q)] = group[q] < 0 ? -1 : number[group[q]];
+                s->parent[gs4i_child_colour(q)][gs4i_child(g, block, q)] = group[q] < 0 ? -1 : number[group[q]];
         }
     }
 }
@@ -1971,8 +1975,9 @@ static void gs4i_fill_groups(int K, void *context)
     int I, J, q;
     for (J = 0; J < (g->n[1] + 1) / 2; J++) for (I = 0; I < (g->n[0] + 1) / 2; I++)
         for (q = 0; q < 8; q++) {
+            const size_t block = gs4i_block_of(g, I, J, K);
             const int c = gs4i_child_colour(q);
-            const size_t at = gs4i_child(g, I, J, K, q);
+            const size_t at = gs4i_child(g, block, q);
             int32_t *parent = &s->parent[c][at];
             float mass;
             if (2 * J + (q >> 1 & 1) >= g->n[1] || 2 * K + (q >> 2) >= g->n[2] || *parent < 0) continue;
@@ -1996,10 +2001,11 @@ GS4I_INLINE float gs4i_link(const gs4i_masked *g, int c, size_t at, int bits, in
 static int gs4i_block_edges(const gs4i_solver *s, int I, int J, int K, gs4i_edge *edge)
 {
     const gs4i_masked *g = &s->level[1];
+    const size_t block = gs4i_block_of(g, I, J, K);
     int q, f, e, count = 0;
     for (q = 0; q < 8; q++) {
         const int c = gs4i_child_colour(q);
-        const size_t at = gs4i_child(g, I, J, K, q);
+        const size_t at = gs4i_child(g, block, q);
         if (2 * J + (q >> 1 & 1) >= g->n[1] || 2 * K + (q >> 2) >= g->n[2] || s->parent[c][at] < 0) continue;
         for (f = 0; f < 6; f++) {
             const int a = f >> 1, high = f & 1, x = q & 1;
@@ -2218,31 +2224,41 @@ static int gs4i_factor(gs4i_solver *s)
 
 /* --- setup: closed pockets ----------------------------------------------------------------------------------------- */
 
-/* Runs of liquid cells joined by faces that conduct; `pocket` is first a place in the list, and -1 - it where air or a diagonal
- * holds the run. */
-static int gs4i_list_runs(gs4i_setup *u, gs4i_cells *run)
+/* Whether air or a diagonal holds one of the cells begin to end of a row. */
+static int gs4i_is_held(const gs4i_rows *q, int uniform, int begin, int end)
 {
+    int i, f, held = 0;
+    for (i = begin; i < end && !held; i++) {
+        for (f = 0; f < 6; f++) held |= q->kind[i + q->beside[f]] == GS4I_IS_OPEN && (uniform || gs4i_face_of(q, i, f) > 0);
+        if (q->diagonal) held |= q->diagonal[i] > 0;
+    }
+    return held;
+}
+
+/* Runs of liquid cells of a plane that faces join, from u->counts[k] on: `pocket` is the place in the list, `sum` above 0 where the
+ * run is held. Without a list they are counted. */
+static void gs4i_list_runs(int k, void *context)
+{
+    const gs4i_setup *u = (const gs4i_setup *)context;
     const gs4i_solver *s = u->s;
+    gs4i_cells *run = s->runs;
     gs4i_rows q;
-    int i, j, k, f, count = 0;
-    for (k = 0; k < s->level[0].n[2]; k++) for (j = 0; j < s->level[0].n[1]; j++) {
-        int open = 0;
+    int32_t count = run ? u->counts[k] : 0;
+    int i, j, end;
+    for (j = 0; j < s->level[0].n[1]; j++) {
         gs4i_open_row(&q, s, u->d, j, k);
-        for (i = 0; i < s->level[0].n[0]; i++) {
-            if (!(q.kind[i] & GS4I_IS_LIQUID)) { open = 0; continue; }
-            if (open && !(gs4i_face_of(&q, i, 0) > 0)) open = 0;
-            if (!open && run) { run[count].row = k * s->level[0].n[1] + j; run[count].begin = i; run[count].pocket = count; run[count].sum = 0; }
-            if (!open) count++;
-            open = 1;
-            if (!run) continue;
-            run[count - 1].end = i + 1;
-            if (run[count - 1].sum > 0) continue;
-            if (q.diagonal && q.diagonal[i] > 0) run[count - 1].sum = 1;
-            for (f = 0; f < 6; f++)
-                if (!(q.kind[i + q.beside[f]] & GS4I_IS_LIQUID) && gs4i_face_of(&q, i, f) > 0) run[count - 1].sum = 1;
+        for (i = 0; i < s->level[0].n[0]; i = end) {
+            end = i + 1;
+            if (!(q.kind[i] & GS4I_IS_LIQUID)) continue;
+            while (q.kind[end] & GS4I_IS_LIQUID && (s->uniform || gs4i_face_of(&q, end, 0) > 0)) end++;
+            if (run) {
+                run[count].row = k * s->level[0].n[1] + j; run[count].begin = i; run[count].end = end;
+                run[count].pocket = count; run[count].sum = gs4i_is_held(&q, s->uniform, i, end);
+            }
+            count++;
         }
     }
-    return count;
+    if (!run) u->counts[k] = count;
 }
 
 static int32_t gs4i_root(gs4i_cells *run, int32_t a)
@@ -2275,30 +2291,29 @@ static void gs4i_join_runs(gs4i_setup *u, gs4i_cells *run, int32_t a, int32_t *b
 static int gs4i_find_pockets(gs4i_setup *u)
 {
     gs4i_solver *s = u->s;
-    const int ny = s->level[0].n[1];
-    int count = gs4i_list_runs(u, NULL), kept = 0;
-    int32_t a, y = 0, z = 0;
+    const int ny = s->level[0].n[1], nz = s->level[0].n[2];
+    int64_t all = 0;
+    int32_t a, y = 0, z = 0, count, kept = 0;
     gs4i_cells *run;
-    if (gs4i_reserve(s, &s->cells, (size_t)count * sizeof *run, 0) != GS4_OK) return GS4_ERROR_MEMORY;
+    int k;
+    s->runs = NULL;
+    gs4i_parallel_for(s->tasks, nz, gs4i_list_runs, u);
+    for (k = 0; k < nz; k++) { const int32_t here = u->counts[k]; u->counts[k] = (int32_t)all; all += here; }
+    if (all > INT32_MAX || gs4i_reserve(s, &s->cells, (size_t)all * sizeof *run, 0) != GS4_OK) return GS4_ERROR_MEMORY;
+    count = (int32_t)all;
     s->runs = run = (gs4i_cells *)s->cells.data;
-    gs4i_list_runs(u, run);
+    gs4i_parallel_for(s->tasks, nz, gs4i_list_runs, u);
     for (a = 0; a < count; a++) {
         if (run[a].row % ny) gs4i_join_runs(u, run, a, &y, run[a].row - 1, 2);
         if (run[a].row >= ny) gs4i_join_runs(u, run, a, &z, run[a].row - ny, 4);
     }
-    s->pockets = 0;
-    for (a = 0; a < count; a++) {
-        const int32_t r = gs4i_root(run, a);
-        if (r == a) { if (!(run[a].sum > 0)) s->pockets++; }
-        run[a].pocket = r;
+    for (s->pockets = 0, a = 0; a < count; a++) {           /* a root comes before all of its runs; sum: 1 held, -1 - p in pocket p */
+        run[a].pocket = gs4i_root(run, a);
+        if (run[a].pocket != a) run[a].sum = run[run[a].pocket].sum;
+        else if (!(run[a].sum > 0)) run[a].sum = -1 - s->pockets++;
     }
-    if (gs4i_reserve(s, &s->labels, (size_t)(s->pockets ? 2 * s->pockets : 1) * sizeof(double), 1) != GS4_OK) return GS4_ERROR_MEMORY;
+    if (gs4i_reserve(s, &s->labels, 2 * (size_t)s->pockets * sizeof(double), 1) != GS4_OK) return GS4_ERROR_MEMORY;
     s->pocket = (double *)s->labels.data;
-    s->pockets = 0;
-    for (a = 0; a < count; a++) {                           /* a root comes before its runs; its `begin` of -1 - pocket would be lost */
-        if (run[a].pocket == a && !(run[a].sum > 0)) run[a].sum = -1 - s->pockets++;
-    }
-    for (a = 0; a < count; a++) if (run[run[a].pocket].sum < 0 && run[a].pocket != a) run[a].sum = run[run[a].pocket].sum; else if (run[a].pocket != a) run[a].sum = 1;
     for (a = 0; a < count; a++) if (run[a].sum < 0) {
         run[kept] = run[a]; run[kept].pocket = (int32_t)(-1 - run[a].sum);
         s->pocket[2 * run[kept].pocket + 1] += run[kept].end - run[kept].begin;

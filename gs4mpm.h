@@ -893,10 +893,11 @@ static void gs4i_shape_bounds(const gs4_shape *s, gs4_vec3 *low, gs4_vec3 *high)
  *        black      | 0 |   | 1 |   | 2 |     in the rows beside, above and below m; t = colour ^ (j + k) & 1; i = 2 m + t
  *        i        0   1   2   3   4   5       children of a coarse cell i: numbers m = i of both colours in four rows
  *
- * From level 2 on an unknown is a connected group of cells in a block, and a level is a graph. Restriction sums, prolongation
+ * From level 2 on an unknown is a group of strongly linked cells in a block, and a level is a graph. Restriction sums, prolongation
  * injects; a coarse face has half the sum of its fine ones, a face to the air 3/4, the diagonal 1: for faces the coefficient of the
- * wider stencil, measured best for the air. A cycle is red-black Gauss-Seidel, two sweeps down (R B R B) and two up (B R B R), which
- * is symmetric; it runs in float and preconditions conjugate gradients in double, whose matrix is applied in difference form. */
+ * wider stencil, measured best for the air; graphs differ where a wall or a door is near (gs4i_series, gs4i_air). A cycle is red-black
+ * Gauss-Seidel, two sweeps down (R B R B) and two up (B R B R), which is symmetric, three on graphs beyond the first; it runs in float
+ * and preconditions conjugate gradients in double, whose matrix is applied in difference form. */
 
 #define GS4I_STRIP 16                   /* a kernel works on whole strips of a row of one colour; rows are padded to them */
 #define GS4I_SLABS 64
@@ -927,7 +928,7 @@ typedef struct gs4i_graph {
     gs4i_scratch nodes, edges;
 } gs4i_graph;
 
-typedef struct gs4i_cells { int32_t row, begin, end, pocket; double sum; } gs4i_cells;     /* of a row, without a gap */
+typedef struct gs4i_cells { int32_t row, begin, end, pocket; double sum; } gs4i_cells;     /* a run of liquid cells in a row */
 
 typedef struct gs4i_solver {
     gs4i_memory *memory; const gs4i_tasks *tasks;
@@ -1065,8 +1066,8 @@ static double gs4i_curvature_weighted(const float *GS4I_RESTRICT p, GS4I_NEIGHBO
 }
 
 /* x += alpha p, r -= alpha Ap; gives r.r */
-static double gs4i_update_uniform(double *GS4I_RESTRICT x, double *GS4I_RESTRICT r, double alpha, const float *GS4I_RESTRICT p, GS4I_NEIGHBOURS(float),
-                                  GS4I_UNIFORM_MATRIX, int n)
+static double gs4i_update_uniform(double *GS4I_RESTRICT x, double *GS4I_RESTRICT r, double alpha, const float *GS4I_RESTRICT p,
+                                  GS4I_NEIGHBOURS(float), GS4I_UNIFORM_MATRIX, int n)
 {
     double sum[GS4I_STRIP] = { 0 };
     int m, l;
@@ -1078,8 +1079,8 @@ static double gs4i_update_uniform(double *GS4I_RESTRICT x, double *GS4I_RESTRICT
     return gs4i_sum_lanes(sum);
 }
 
-static double gs4i_update_weighted(double *GS4I_RESTRICT x, double *GS4I_RESTRICT r, double alpha, const float *GS4I_RESTRICT p, GS4I_NEIGHBOURS(float),
-                                   GS4I_WEIGHTED_MATRIX, int n)
+static double gs4i_update_weighted(double *GS4I_RESTRICT x, double *GS4I_RESTRICT r, double alpha, const float *GS4I_RESTRICT p,
+                                   GS4I_NEIGHBOURS(float), GS4I_WEIGHTED_MATRIX, int n)
 {
     double sum[GS4I_STRIP] = { 0 };
     int m, l;
@@ -1147,7 +1148,8 @@ static void gs4i_smooth(gs4i_solver *s, int level, int c, int k)
     GS4I_EACH_ROW(g, k, j, at, n) {
         const int t = (c + j + k) & 1;
         if (g->degree[0]) gs4i_smooth_uniform(g->z[c] + at, GS4I_AROUND(g->z[!c], at, t, g), g->r[c] + at, g->inverse[c] + at, n);
-        else gs4i_smooth_weighted(g->z[c] + at, GS4I_AROUND(g->z[!c], at, t, g), GS4I_FACES_OF(g->w, c, at, t, g), g->r[c] + at, g->inverse[c] + at, n);
+        else gs4i_smooth_weighted(g->z[c] + at, GS4I_AROUND(g->z[!c], at, t, g), GS4I_FACES_OF(g->w, c, at, t, g), g->r[c] + at,
+                                  g->inverse[c] + at, n);
     }
 }
 
@@ -1160,7 +1162,8 @@ static void gs4i_residual_row(const gs4i_solver *s, const gs4i_masked *g, float 
     const int t = (j + k) & 1;
     if (g->degree[0]) gs4i_residual_uniform(out, g->z[0] + at, GS4I_AROUND(g->z[1], at, t, g), g->r[0] + at, g->degree[0] + at,
                                             g->mass[0] ? g->mass[0] + at : s->zeros, n);
-    else gs4i_residual_weighted(out, g->z[0] + at, GS4I_AROUND(g->z[1], at, t, g), GS4I_FACES_OF(g->w, 0, at, t, g), g->r[0] + at, g->mass[0] + at, n);
+    else gs4i_residual_weighted(out, g->z[0] + at, GS4I_AROUND(g->z[1], at, t, g), GS4I_FACES_OF(g->w, 0, at, t, g), g->r[0] + at,
+                                g->mass[0] + at, n);
 }
 
 static void gs4i_stage_residual(gs4i_solver *s, int level, int k)
@@ -1205,7 +1208,8 @@ static void gs4i_stage_restrict(gs4i_solver *s, int level, int k)
     }
 }
 
-static void gs4i_add_children(float *GS4I_RESTRICT z, const float *GS4I_RESTRICT inverse, const float *GS4I_RESTRICT even, const float *GS4I_RESTRICT odd, int n)
+static void gs4i_add_children(float *GS4I_RESTRICT z, const float *GS4I_RESTRICT inverse, const float *GS4I_RESTRICT even,
+                              const float *GS4I_RESTRICT odd, int n)
 {
     int m;
     for (m = 0; m < n / 2; m++) {
@@ -1281,8 +1285,10 @@ static void gs4i_stage_update(gs4i_solver *s, int level, int k)
     int j, n, c;
     GS4I_EACH_ROW(g, k, j, at, n) for (c = 0; c < 2; c++) {
         const int t = (c + j + k) & 1;
-        if (g->degree[0]) sum += gs4i_update_uniform(s->x[c] + at, g->r[c] + at, s->alpha, s->p[c] + at, GS4I_AROUND(s->p[!c], at, t, g), g->degree[c] + at, GS4I_MASS(s, g, c, at), n);
-        else sum += gs4i_update_weighted(s->x[c] + at, g->r[c] + at, s->alpha, s->p[c] + at, GS4I_AROUND(s->p[!c], at, t, g), GS4I_WEIGHTS(s, g, c, at, t), n);
+        if (g->degree[0]) sum += gs4i_update_uniform(s->x[c] + at, g->r[c] + at, s->alpha, s->p[c] + at, GS4I_AROUND(s->p[!c], at, t, g),
+                                                     g->degree[c] + at, GS4I_MASS(s, g, c, at), n);
+        else sum += gs4i_update_weighted(s->x[c] + at, g->r[c] + at, s->alpha, s->p[c] + at, GS4I_AROUND(s->p[!c], at, t, g),
+                                         GS4I_WEIGHTS(s, g, c, at, t), n);
     }
     s->sums[k] = sum;
 }
@@ -1295,7 +1301,8 @@ static void gs4i_stage_defect(gs4i_solver *s, int level, int k)
     int j, n, c;
     GS4I_EACH_ROW(g, k, j, at, n) for (c = 0; c < 2; c++) {
         const int t = (c + j + k) & 1;
-        if (g->degree[0]) sum += gs4i_defect_uniform(g->r[c] + at, s->x[c] + at, GS4I_AROUND(s->x[!c], at, t, g), g->degree[c] + at, GS4I_MASS(s, g, c, at), n);
+        if (g->degree[0]) sum += gs4i_defect_uniform(g->r[c] + at, s->x[c] + at, GS4I_AROUND(s->x[!c], at, t, g), g->degree[c] + at,
+                                                     GS4I_MASS(s, g, c, at), n);
         else sum += gs4i_defect_weighted(g->r[c] + at, s->x[c] + at, GS4I_AROUND(s->x[!c], at, t, g), GS4I_WEIGHTS(s, g, c, at, t), n);
     }
     s->sums[k] = sum;
@@ -1669,7 +1676,8 @@ static int gs4i_choose_units(gs4i_solver *s, const gs4_poisson_desc *d, const gs
     if (!d->coefficient[0] || !d->coefficient[1] || !d->coefficient[2]) all.low = all.high = all.least = 1;
     s->unknowns = 0;
     for (k = 0; k < d->cells[2]; k++) {
-        if (seen[k].fault) return gs4i_fault(s, seen[k].fault, seen[k].value, "; it must be 0 or a finite number above that is not absurdly large");
+        if (seen[k].fault)
+            return gs4i_fault(s, seen[k].fault, seen[k].value, "; it must be 0 or a finite number above that is not absurdly large");
         if (seen[k].low < all.low) all.low = seen[k].low;
         if (seen[k].high > all.high) all.high = seen[k].high;
         if (seen[k].least < all.least) all.least = seen[k].least;
@@ -1679,7 +1687,9 @@ static int gs4i_choose_units(gs4i_solver *s, const gs4_poisson_desc *d, const gs
     all.mass *= h2;
     s->massive = all.mass > 0;
     s->uniform = all.high > 0 && all.low == all.high && all.mass < 1e9 * all.high;
-    if (all.high > 0 && all.least < 1e-30 * all.high) return gs4i_fault(s, "the smallest coefficient above 0, over the largest, is ", all.least / all.high, "; it must be at least 1e-30, use 0 for what does not conduct");
+    if (all.high > 0 && all.least < 1e-30 * all.high)
+        return gs4i_fault(s, "the smallest coefficient above 0, over the largest, is ", all.least / all.high,
+                          "; it must be at least 1e-30, use 0 for what does not conduct");
     frexp(all.high > all.mass ? all.high : all.mass, &exponent);
     s->unit = s->uniform ? 1 / all.high : ldexp(1, -exponent);
     s->mass_unit = h2 * s->unit;
@@ -1794,7 +1804,8 @@ static void gs4i_build_uniform_row(gs4i_solver *s, const gs4_poisson_desc *d, in
     gs4i_open_row(&q, s, d, j, k);
     for (c = 0; c < 2; c++) {
         memset(g->inverse[c] + row, 0, (size_t)g->width * sizeof(float)); memset(g->degree[c] + row, 0, (size_t)g->width * sizeof(float));
-        if (g->mass[c]) { memset(g->mass[c] + row, 0, (size_t)g->width * sizeof(float)); memset(g->mass_low[c] + row, 0, (size_t)g->width * sizeof(float)); }
+        if (!g->mass[c]) continue;
+        memset(g->mass[c] + row, 0, (size_t)g->width * sizeof(float)); memset(g->mass_low[c] + row, 0, (size_t)g->width * sizeof(float));
     }
     for (i = begin; i < end; i++) {
         const uint8_t *v = q.kind + i;
@@ -1837,17 +1848,20 @@ static void gs4i_build_planes(int K, void *context)
     const gs4i_setup *u = (const gs4i_setup *)context;
     gs4i_solver *s = u->s;
     const gs4i_masked *g = &s->level[0], *h = &s->level[1];
+    int32_t first, last;
     int j, k;
     for (j = 0; j < h->n[1]; j++) { h->span[2 * (K * h->n[1] + j)] = INT32_MAX; h->span[2 * (K * h->n[1] + j) + 1] = 0; }
     for (k = 2 * K; k < 2 * K + 2 && k < g->n[2]; k++)
         for (j = 0; j < g->n[1]; j++) {
-            int32_t *span = g->span + 2 * ((size_t)k * (size_t)g->n[1] + (size_t)j), *wide = h->span + 2 * ((size_t)K * (size_t)h->n[1] + (size_t)(j / 2));
+            int32_t *span = g->span + 2 * ((size_t)k * (size_t)g->n[1] + (size_t)j);
+            int32_t *wide = h->span + 2 * ((size_t)K * (size_t)h->n[1] + (size_t)(j / 2));
             gs4i_build_span(s, j, k, span);
             if (s->uniform) gs4i_build_uniform_row(s, u->d, j, k, 2 * span[0], 2 * span[1] < g->n[0] ? 2 * span[1] : g->n[0]);
             else gs4i_build_row(s, u->d, j, k);
             if (span[0] >= span[1]) continue;
-            if (span[0] / 2 / GS4I_STRIP * GS4I_STRIP < wide[0]) wide[0] = span[0] / 2 / GS4I_STRIP * GS4I_STRIP;
-            if ((span[1] / 2 + GS4I_STRIP - 1) / GS4I_STRIP * GS4I_STRIP > wide[1]) wide[1] = (span[1] / 2 + GS4I_STRIP - 1) / GS4I_STRIP * GS4I_STRIP;
+            first = span[0] / 2 / GS4I_STRIP * GS4I_STRIP; last = (span[1] / 2 + GS4I_STRIP - 1) / GS4I_STRIP * GS4I_STRIP;
+            if (first < wide[0]) wide[0] = first;
+            if (last > wide[1]) wide[1] = last;
         }
     for (j = 0; j < h->n[1]; j++) if (!h->span[2 * (K * h->n[1] + j) + 1]) h->span[2 * (K * h->n[1] + j)] = 0;
 }
@@ -1885,7 +1899,8 @@ static void gs4i_cut(gs4i_solver *s, int level, int slabs)
     if (all < 16384) slabs = 1;
     s->cut[level][0] = 0;
     for (k = 0; k < g->n[2]; k++) {
-        if (count < slabs && !(k & 1) && done >= all * count / slabs && k - s->cut[level][count - 1] >= 16 && g->n[2] - k >= 16) s->cut[level][count++] = k;
+        const int thick = k - s->cut[level][count - 1] >= 16 && g->n[2] - k >= 16;
+        if (count < slabs && thick && !(k & 1) && done >= all * count / slabs) s->cut[level][count++] = k;
         for (j = (size_t)k * rows; j < (size_t)(k + 1) * rows; j++) done += g->span[2 * j + 1] - g->span[2 * j] + 1;
     }
     s->cut[level][count] = g->n[2];
@@ -1896,12 +1911,16 @@ static void gs4i_cut(gs4i_solver *s, int level, int slabs)
 
 /* Colours and places of the eight cells of level 1 in a block; number x + 2 y + 4 z. */
 GS4I_INLINE int gs4i_child_colour(int q) { return (q ^ (q >> 1) ^ (q >> 2)) & 1; }
-GS4I_INLINE size_t gs4i_child(const gs4i_masked *g, size_t block, int q) { return block + (size_t)(q >> 1 & 1) * g->stride + (size_t)(q >> 2) * g->plane; }
+GS4I_INLINE size_t gs4i_child(const gs4i_masked *g, size_t block, int q)
+{
+    return block + (size_t)(q >> 1 & 1) * g->stride + (size_t)(q >> 2) * g->plane;
+}
 GS4I_INLINE size_t gs4i_block_of(const gs4i_masked *g, int I, int J, int K) { return gs4i_row_of(g, 2 * J, 2 * K) + (size_t)I; }
 
 static float gs4i_strongest(const gs4i_masked *g, int c, size_t at, int t)
 {
-    const float w[6] = { g->w[0][!c][at + (size_t)t - 1], g->w[0][c][at], g->w[1][!c][at - g->stride], g->w[1][c][at], g->w[2][!c][at - g->plane], g->w[2][c][at] };
+    const float w[6] = { g->w[0][!c][at + (size_t)t - 1], g->w[0][c][at], g->w[1][!c][at - g->stride], g->w[1][c][at],
+                         g->w[2][!c][at - g->plane], g->w[2][c][at] };
     float most = 0;
     int f;
     for (f = 0; f < 6; f++) if (w[f] > most) most = w[f];
@@ -1963,7 +1982,11 @@ GS4I_INLINE float gs4i_series(float w, float link, float other)
 
 /* What the air next to a cell is to the coarse cell: 3/4 at a surface, measured best; all of it where it is small beside the cell's links,
  * as a bubble of one cell is on coarse levels. */
-GS4I_INLINE float gs4i_air(float air, float link) { const float part = link / (link + 0.5f * air); return air > 0 ? (part > 0.75f ? part : 0.75f) * air : 0; }
+GS4I_INLINE float gs4i_air(float air, float link)
+{
+    const float part = air > 0 ? link / (link + 0.5f * air) : 0;
+    return (part > 0.75f ? part : 0.75f) * air;
+}
 
 /* Numbers of planes to numbers of the graph; what nodes have of their cells. */
 static void gs4i_fill_groups(int K, void *context)
@@ -2152,7 +2175,8 @@ static void gs4i_find_links(const gs4i_graph *g, float *link)
     int i, e;
     memset(link, 0, 3 * (size_t)g->n * sizeof *link);
     for (i = 0; i < g->n; i++) for (e = g->start[i]; e < g->start[i + 1]; e++)
-        if (g->parent[g->to[e]] == g->parent[i] && g->block[g->to[e]] != g->block[i]) link[3 * (size_t)i + (size_t)gs4i_axis(g->block[i], g->block[g->to[e]])] += g->w[e];
+        if (g->parent[g->to[e]] == g->parent[i] && g->block[g->to[e]] != g->block[i])
+            link[3 * (size_t)i + (size_t)gs4i_axis(g->block[i], g->block[g->to[e]])] += g->w[e];
 }
 
 /* The next graph from the last. Its tables are in x, which is larger: 24 bytes a node, at most a node for eight cells. */
@@ -2183,7 +2207,8 @@ static int gs4i_coarsen_graph(gs4i_solver *s)
             const int32_t begin = next;
             for (j = first[i]; j < first[i + 1]; j++) for (e = g->start[child[j]]; e < g->start[child[j] + 1]; e++) {
                 const int32_t to = g->parent[g->to[e]];
-                const int axis = ((g->block[child[j]] ^ g->block[g->to[e]]) & ~GS4I_LOWEST_BITS) == 0 ? -1 : gs4i_axis(g->block[child[j]], g->block[g->to[e]]);
+                const uint64_t from = g->block[child[j]], into = g->block[g->to[e]];
+                const int axis = (from ^ into) & ~GS4I_LOWEST_BITS ? gs4i_axis(from, into) : -1;        /* -1: a weak link within the block */
                 if (to == i) continue;
                 if (place[to] < begin) { place[to] = next++; if (pass) { up->to[place[to]] = to; up->w[place[to]] = 0; } }
                 if (pass) up->w[place[to]] += axis < 0 ? g->w[e] : gs4i_series(g->w[e], link[3 * child[j] + axis], link[3 * g->to[e] + axis]);
@@ -2486,8 +2511,11 @@ static int gs4i_begin(gs4i_solver *s, gs4i_given *v, double *norm, int *guess, d
     int k, i, exponent = 0;
     gs4i_parallel_for(s->tasks, s->level[0].n[2], gs4i_see_given, v);
     for (k = 0; k < s->level[0].n[2]; k++) for (i = 0; i < 3; i++) if (s->given[3 * k + i] > most[i]) most[i] = s->given[3 * k + i];
-    if (!(most[0] < (double)GS4I_HUGE)) return gs4i_fault(s, "the largest |rhs[]| in the liquid is ", most[0], "; all must be finite and not absurdly large");
-    if (!(most[1] < (double)GS4I_HUGE && most[2] < (double)GS4I_HUGE)) return gs4i_fault(s, "the largest |x[]| in liquid and air is ", most[1] > most[2] ? most[1] : most[2], "; all must be finite and not absurdly large");
+    if (!(most[0] < (double)GS4I_HUGE))
+        return gs4i_fault(s, "the largest |rhs[]| in the liquid is ", most[0], "; all must be finite and not absurdly large");
+    if (!(most[1] < (double)GS4I_HUGE && most[2] < (double)GS4I_HUGE))
+        return gs4i_fault(s, "the largest |x[]| in liquid and air is ", most[1] > most[2] ? most[1] : most[2],
+                          "; all must be finite and not absurdly large");
     b = most[0] * s->mass_unit > most[1] ? most[0] * s->mass_unit : most[1];
     frexp(b, &exponent);
     s->x_unit = ldexp(1, -exponent); s->rhs_unit = s->mass_unit * s->x_unit;

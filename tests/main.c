@@ -44,6 +44,8 @@ int main(int count, char **values)
     RUN(test_heat_conserved);
     RUN(test_heat_cycles);
     RUN(test_heat_of_viscosity);
+    RUN(test_phase_freezing);
+    RUN(test_phase_melting);
     run_solid();
     run_errors();
     run_files();

@@ -352,3 +352,76 @@ static void test_heat_of_viscosity(void)
     CHECK_CLOSE(gs4_get_stats(sim).thermal_energy / (before - gs4_get_stats(sim).kinetic_energy), 1, 0.03);
     gs4_destroy(sim);
 }
+
+/* A liquid that swirls and freezes as a whole: its phase costs no energy and gives none, F begins without strain. */
+static void test_phase_freezing(void)
+{
+    gs4_sim_desc d = scene_cube(16);
+    gs4_material m = scene_liquid(1000, 0.5, 20);
+    gs4_fill f = scene_fill(at(0.2, 0, 0));
+    gs4_sim *sim;
+    gs4_edit T;
+    gs4_view q;
+    double before, after, most = 0;
+    int i;
+    m.heat_capacity = 1000; m.can_melt = 1; m.melting_temperature = 0; m.solid = GS4_FIXED_COROTATED; m.shear_modulus = 2e4;
+    sim = physics_create(&d, &m);
+    f.temperature = 1; f.angular_velocity = at(0, 0, 3);
+    CHECK_RESULT(sim, gs4_add_particles(sim, gs4_sphere(at(0.5, 0.5, 0.5), (gs4_real)0.3), &f), GS4_OK);
+    q = gs4_particles(sim, GS4_FIELD_LIQUID_FRACTION);
+    CHECK(q.count > 0 && (double)q.data[0] == 1);
+    for (i = 0; i < 30; i++) CHECK_RESULT(sim, gs4_step(sim, (gs4_real)0.5 * gs4_stable_dt(sim)), GS4_OK);
+    before = gs4_get_stats(sim).kinetic_energy;
+    T = gs4_edit_particles(sim, GS4_FIELD_TEMPERATURE);
+    for (i = 0; i < T.count; i++) T.data[(size_t)i * (size_t)T.stride] = -1;
+    for (i = 0; i < 100; i++) {
+        CHECK_RESULT(sim, gs4_step(sim, (gs4_real)0.5 * gs4_stable_dt(sim)), GS4_OK);
+        after = gs4_get_stats(sim).kinetic_energy;
+        if (after > most) most = after;
+    }
+    q = gs4_particles(sim, GS4_FIELD_LIQUID_FRACTION);
+    CHECK((double)q.data[0] == 0);
+    if (test_filter[0]) printf("kinetic energy %.6g before, at most %.6g, %.6g after freezing\n", before, most, after);
+    CHECK(most < 1.002 * before);
+    CHECK(after > 0.8 * before);
+    gs4_destroy(sim);
+}
+
+/* A block of solid on a floor keeps its shape, melts when the floor is hot, and then flows out; frozen again it stays as it is. */
+static void test_phase_melting(void)
+{
+    int c;
+    for (c = 0; c < 2; c++) {
+        gs4_sim_desc d = scene_cube(12);
+        gs4_material m = scene_liquid(1000, 5, 8);
+        gs4_fill f = scene_fill(at(0, 0, 0));
+        gs4_sim *sim;
+        gs4_edit T;
+        gs4_view F;
+        double height[4];
+        int i, stage;
+        d.gravity = at(0, -9.81, 0); d.integrator = physics_integrators[c];
+        m.heat_capacity = 1000; m.conductivity = 1; m.can_melt = 1; m.latent_heat = 1e4; m.solid = GS4_NEO_HOOKEAN; m.shear_modulus = 2e4;
+        sim = physics_create(&d, &m);
+        f.temperature = -5;
+        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0.3, 0, 0.3), at(0.7, 0.5, 0.7)), &f), GS4_OK);
+        for (stage = 0; stage < 4; stage++) {
+            const double until[4] = { 0.3, 0.8, 0.85, 1.1 };
+            gs4_view x;
+            if (stage == 1 || stage == 2) {
+                T = gs4_edit_particles(sim, GS4_FIELD_TEMPERATURE);
+                for (i = 0; i < T.count; i++) T.data[(size_t)i * (size_t)T.stride] = (gs4_real)(stage == 1 ? 5 : -5);
+            }
+            CHECK(physics_run(sim, until[stage]) == 0);
+            x = gs4_particles(sim, GS4_FIELD_POSITION);
+            for (height[stage] = 0, i = 0; i < x.count; i++) height[stage] += (double)x.data[(size_t)i * (size_t)x.stride + 1] / x.count;
+        }
+        if (test_filter[0]) printf("mean height %.3f solid, %.3f molten, %.3f and %.3f frozen\n", height[0], height[1], height[2], height[3]);
+        CHECK_CLOSE(height[0], 0.25, 0.03);
+        CHECK(height[1] < 0.15);
+        CHECK(fabs(height[3] - height[2]) < 0.03);
+        F = gs4_particles(sim, GS4_FIELD_DEFORMATION);
+        CHECK(F.components == 9);
+        gs4_destroy(sim);
+    }
+}

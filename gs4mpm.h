@@ -29,7 +29,7 @@
  *         return 0;
  *     }
  *
- * WHAT IT DOES NOT DO, YET. Heat, melting and freezing, implicit and projection schemes are declared and refused with a sentence.
+ * WHAT IT DOES NOT DO, YET. Implicit and projection schemes are declared and refused with a sentence.
  * It has no surface tension, no two-way coupling to bodies, no sparse domain beyond 2^36 cells.
  *
  * MAP. Sections carry a tag; grep -n '\[\[' gs4mpm.h is the table of contents. A section uses only sections above it.
@@ -59,7 +59,7 @@
  *     dv/dt = div sigma / rho + g,   dJ/dt = J div v,   dx/dt = v                                                    (1)
  *     sigma = -p I + 2 F_v mu D + s + s_F                                                                             (2)
  *     p = (rho0 c0^2 / 7) (J^-7 - 1)                     Tait, weakly compressible                                   (3)
- * mu is a constant, Cross-WLF or a callback of temperature (of the air: there is no heat yet) and shear rate sqrt(2 D:D). F_v is 1
+ * mu is a constant, Cross-WLF or a callback of temperature (of the air, in a scene without heat) and shear rate sqrt(2 D:D). F_v is 1
  * for Newtonian liquids; else s, the non-local stress, is what Oldroyd-B (UCM at F_v 0) or the extended Pom-Pom model say, with
  * G0 = (1 - F_v) mu / lambda_b, r = lambda_b/lambda_0s, Lam = sqrt(1 + tr s/(3 G0)):
  *     ds/dt = L s + s L^T + 2 G0 D - [f s + G0 (f - 1) I + (alpha/G0) s.s] / lambda_b                                 (5)
@@ -3825,12 +3825,21 @@ static const struct gs4i_preset_row { const char *name; double density, viscosit
     { "olive oil", 911,   0.084, GS4_NEWTONIAN, 0, 0, 0, 0, 0 },     /* 20 C; Fellows, Food Processing Technology (2000), table 1.6 */
     { "glycerol",  1261,  1.41, GS4_NEWTONIAN, 0, 0, 0, 0, 0 },      /* 20 C; Segur & Oberstar, Ind. Eng. Chem. 43 (1951) 2117 */
     { "honey",     1420,  10, GS4_NEWTONIAN, 0, 0, 0, 0, 0 },        /* 20-25 C, 17 % water; Yanniotis, Skaltsi & Karaburnioti, J. Food Eng. 72 (2006) 372 */
-    { "lava",      2600,  1000, GS4_NEWTONIAN, 0, 0, 0, 0, 0 },      /* basalt at 1130 C, few crystals; Shaw, J. Petrology 10 (1969) 510 */
     { "cream",     1000,  3063, GS4_POM_POM, 0.02, 12.25, 11.025, 1, 16 },        /* "GS4 viscoelastic MPM" (2021), table 4, coiling 3 */
     { "ice cream", 1000,  3063, GS4_POM_POM, 0.01, 3.0625, 2.7563, 0.01, 16 },    /* the same, buckling 2 */
     { "boger fluid", 1000, 3063, GS4_OLDROYD_B, 0.02, 12.25, 0, 0, 0 },           /* the same, coiling 2: elastic, not shear thinning */
     { "polymer melt", 760, 2769, GS4_POM_POM, 0.394, 0.50349, 0.16783, 0.15, 2 }  /* low-density polyethylene at 170 C: third mode of Verbeeten, Peters &
                                          Baaijens, J. Rheology 45 (2001) 823, table II, the two faster ones as local viscosity */
+};
+
+/* What melts: viscosity (Pa s) of the liquid, shear modulus (Pa) and yield of the solid, c (J/(kg K)), k (W/(m K)), T_m (degrees Celsius), L (J/kg).
+ * Heat is as measured, within some 10 % and over the range in which each really melts. Solids are softer than real ones by a factor of 10 to 1e5,
+ * so that a step of the explicit scheme is not ruled by their sound: raise shear_modulus where stiffness matters. */
+static const struct gs4i_melt_row { const char *name; double density, viscosity; gs4_solid solid; double modulus, compression, stretch, capacity, conductivity, melting, latent; } gs4i_melts[] = {
+    { "chocolate", 1270, 3, GS4_FIXED_COROTATED, 2e4, 0.05, 0.05, 1600, 0.25, 34, 4.5e4 },       /* dark; Beckett, Science of Chocolate (2008): viscosity, c, L */
+    { "wax",       900, 0.05, GS4_FIXED_COROTATED, 2e4, 0.05, 0.05, 2500, 0.24, 56, 2e5 },       /* paraffin; Ukrainczyk, Kurajica & Sipusic (2010): c, k, L */
+    { "butter",    911, 0.05, GS4_FIXED_COROTATED, 1e4, 0.02, 0.02, 2400, 0.2, 32, 8e4 },        /* Rao, Rizvi & Datta, Engineering Properties of Foods: c, k */
+    { "lava",      2600, 1000, GS4_NEO_HOOKEAN, 1e5, 0.05, 0.05, 1150, 1.5, 1070, 4e5 }          /* basalt, molten at 1130 C; Shaw (1969): viscosity; Lange and others (1994): c, L */
 };
 
 static int gs4i_preset(const char *name, gs4_material *m)
@@ -3844,6 +3853,17 @@ static int gs4i_preset(const char *name, gs4_material *m)
         m->liquid = p->liquid; m->local_fraction = GS4I_C(p->local);
         m->relaxation_time = GS4I_C(p->relaxation); m->stretch_time = GS4I_C(p->stretch);
         m->anisotropy = GS4I_C(p->anisotropy); m->arms = GS4I_C(p->arms);
+        return GS4_OK;
+    }
+    for (i = 0; i < sizeof gs4i_melts / sizeof gs4i_melts[0]; i++) {
+        const struct gs4i_melt_row *p = &gs4i_melts[i];
+        if (strcmp(name, p->name) != 0) continue;
+        memset(m, 0, sizeof *m);
+        m->density = GS4I_C(p->density); m->viscosity = GS4I_C(p->viscosity);
+        m->solid = p->solid; m->shear_modulus = GS4I_C(p->modulus);
+        m->yield_compression = GS4I_C(p->compression); m->yield_stretch = GS4I_C(p->stretch);
+        m->heat_capacity = GS4I_C(p->capacity); m->conductivity = GS4I_C(p->conductivity);
+        m->can_melt = 1; m->melting_temperature = GS4I_C(p->melting); m->latent_heat = GS4I_C(p->latent);
         return GS4_OK;
     }
     return GS4_ERROR_ARGUMENT;

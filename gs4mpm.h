@@ -74,6 +74,14 @@
  * Where there is no such limit they are kept within 1/512 and 512 (counted: stress_bounded). (3) holds no tension beyond rho0 c0^2 / 7:
  * a solid whose mean stress is to be more needs a higher sound_speed than the default, or it tears and J grows out of its range.
  *
+ * Heat, in scenes with a material that conducts, melts or is heated by viscosity (tau the stress without the pressure, t = flux_relaxation_time):
+ *     rho c dT/dt + div q = tau : D,   q = -F_T k grad T + q_NL,   q_NL + t (dq_NL/dt - L q_NL) = -(1 - F_T) k grad T           (7)
+ * H = c T + L fraction: a material that can melt keeps T_m while its latent heat comes or goes, becomes liquid when it is all there and
+ * solid when it is all gone. Solid it has s_F alone, beside the pressure, liquid mu and s; F begins anew without strain. Temperatures are
+ * on any scale; those of presets and of the default Cross-WLF are degrees Celsius. Walls, colliders and air are insulated or isothermal.
+ * Two bodies of material less than two cells apart conduct heat to each other, as they hold each other. Below its t2 Cross-WLF has no
+ * value: a step that asks for one is refused; with T_m above t2 none does.
+ *
  * TIME. Every quantity y of a particle is kept with its rate r; 0 <= rho_s <= rho_inf <= 1 choose the member of the GS4 family
  * (rho_inf: what high frequencies keep per step, rho_s the same of the spurious root; 0, 0 damps most and is the default):
  *     alpha_m = (3 + rho_inf + rho_s - rho_inf rho_s) / (2 (1 + rho_inf) (1 + rho_s)),  alpha_f = 1 / (1 + rho_inf),
@@ -87,9 +95,11 @@
  *     S3  m_i = sum w m,   v_i = sum w m v~ / m_i;   solids: v~ + w~ x (x_i - x~), w how the particle turns (below)
  *     S4  L~ = sum v_i (x) grad w;   J~ by (4), implicit in J for known div v;   s~ by (4), (5);   F~ by (4), (6);   sigma there by (2), (3)
  *     S5  f_i = - sum V sigma grad w + sum w m g
+ *         heat: (m c)_i, (m c T**)_i, T** = T + alpha_f dt r - s r; then (m c)_i (T~_i - T**_i) / s = (7) at T~, by multigrid ([[conduction]])
  *     S6  acc_i = f_i / m_i;   u_i = v_i + s (acc_i - ag_i), s = alpha_f gamma dt / alpha_m;   ag_i += (acc_i - ag_i) / alpha_m
  *         is what the node remembers; walls and bodies
- *     S7  A = sum w acc_i, U = sum w u_i; v by (4) with dv/dt = A - (v - U) / flip_decay_time; J, s, F by (4) with grad u; x
+ *     S7  A = sum w acc_i, U = sum w u_i; v by (4) with dv/dt = A - (v - U) / flip_decay_time; J, s, F by (4) with grad u; T by (4) with
+ *         sum w (T~_i - T**_i) / s; x
  *         by (4) with dx/dt = U; w by (4) with dw/dt = curl(A - grad u grad u)/2 - (w - curl u/2) / flip_decay_time
  *     S8  bodies move, nozzles give, leavers go
  * Before S7 nothing of the state has changed. When the nodes cannot prove that S7 is safe it is rehearsed; if a particle would
@@ -101,7 +111,9 @@
  * Symplectic Euler, the fast tier: one affine scatter with stress and one gather (MLS-MPM, APIC), first order.
  *
  * ACCURACY (tests/test_order.c, tests/test_physics.c hold these)
- *     order in time 1.9 to 2.0 in x, v, J, F; elastic waves within 1.5 % at 32 cells a wave (tests/test_solid.c); order in space 2.0 for Poiseuille flow; sound speed within 1.5 % at 32 cells a wave;
+ *     order in time 1.9 to 2.0 in x, v, J, F, T, q; elastic waves within 1.5 % at 32 cells a wave (tests/test_solid.c); order in space 2.0 for
+ *     Poiseuille flow and for heat, whose modes decay 1 % too slowly at 32 cells a wave, see tests/test_heat.c; sound speed within 1.5 % at
+ *     32 cells a wave; a melting front within 0.3 cells; heat in an insulated box conserved to the tolerance of the solver;
  *     free flight exact to rounding where rho_s = 0, else to O(dt^2); momentum to rounding in free flight; a column at rest keeps
  *     its pressure within 0.3 % and its speed below 1e-4 sqrt(g h).
  *
@@ -139,8 +151,11 @@
  *
  * MEMORY. GS4: 65 bytes a particle in float (position, velocity, J and their rates, mass, id, material, and 4 for sorting), 48 a cell
  * near material, 16 more near walls and bodies, 4 per 64 cells of the domain. Symplectic Euler: 89 and 32. A scene with a viscoelastic
- * liquid: 48 more a particle (Euler 24). With a solid: 96 more (Euler 36). Double, GS4: 121 and 96.
- * Stepping allocates nothing once the scene has stopped growing; a kernel takes 38 KB of stack, with solids 48; in double 75 and 90.
+ * liquid: 48 more a particle (Euler 24). With a solid: 96 more (Euler 36). With heat: 17 more a
+ * particle, 32 more with a flux_relaxation_time, 16 (or 32) a cell near material, and about 100 a cell of the box around all material, where the
+ * solver works. Double, GS4: 121 and 96.
+ * Stepping allocates nothing once the scene has stopped growing; a kernel takes 39 KB of stack, with heat 61; in double 77 and
+ * 120.
  *
  * THREADS. `parallel_for` or the pool. The same bits for any number of threads: blocks of one colour share no node, sums run in the
  * order of particles within a block. Two simulations on two threads are fine. Callbacks (distances, viscosity) may be called from
@@ -315,7 +330,7 @@ typedef struct gs4_material {
     gs4_real melting_temperature;   /* T_m */
     gs4_real latent_heat;           /* L, J/kg; 0: sharp switch at T_m */
     int      can_melt;              /* non-zero: phase follows temperature; zero: phase is fixed by `solid` */
-    int      viscous_heating;       /* non-zero: sigma : D heats the material */
+    int      viscous_heating;       /* non-zero: the work of its stress, without the pressure, heats the material */
 } gs4_material;
 
 /* ==== [[sim]] description, scene, stepping, views, files =========================================== */
@@ -6001,8 +6016,9 @@ static void gs4i_take_power(const gs4i_heat_laws *h, const gs4i_batch_laws *l, c
     }
 }
 
-/* What a scene with heat needs on top, in both kernels that scatter stress. */
-typedef struct gs4i_warmth { gs4i_heat_laws laws; gs4i_heat h; gs4i_heat_sent sent; } gs4i_warmth;
+/* What a kernel needs on top in a scene with heat, on the stack of such scenes alone; the kernels get NULL in others. One tile has what goes to the
+ * nodes or comes from them, the other the sources, or what gives gradients for the flux: as in gs4i_conduction. */
+typedef struct gs4i_warmth { gs4i_heat_laws laws; gs4i_heat h; gs4i_heat_sent sent; gs4_real content[GS4I_TILE_REALS], source[GS4I_TILE_REALS]; } gs4i_warmth;
 
 /* Laws see the temperature of the stage (Euler: of now). */
 static void gs4i_begin_warmth(const gs4i_particles *p, size_t i, int n, gs4_real ahead, gs4i_batch_laws *l, gs4i_warmth *w)
@@ -6059,32 +6075,32 @@ GS4I_INLINE void gs4i_scatter_force(gs4_real *tile, const gs4i_stencils *s, int 
     gs4i_scatter_rows(tile + 4 * s->base[n], &p0, &p1, &p2, s, n);
 }
 
-static void gs4i_clear_warmth(gs4i_warmth *w, gs4_real *content, gs4_real *source)
+static void gs4i_clear_warmth(gs4i_warmth *w)
 {
     memset(&w->laws, 0, sizeof w->laws);
-    memset(content, 0, GS4I_TILE_REALS * sizeof *content);
-    memset(source, 0, GS4I_TILE_REALS * sizeof *source);
+    memset(w->content, 0, sizeof w->content);
+    memset(w->source, 0, sizeof w->source);
 }
 
 /* What the particles of a batch give to the tiles of heat. */
-GS4I_INLINE void gs4i_scatter_warmth(const gs4_sim *sim, const gs4i_warmth *w, const gs4i_stencils *s, int n, gs4_real *content, gs4_real *source)
+GS4I_INLINE void gs4i_scatter_warmth(const gs4_sim *sim, gs4i_warmth *w, const gs4i_stencils *s, int n)
 {
     int b;
     for (b = 0; b < n; b++)
         if (s->base[b] >= 0) {
-            gs4i_scatter_quad(content, s, b, w->sent.content + 4 * b);
-            if (sim->conduction.source) gs4i_scatter_force(source, s, b, &w->sent.source);
+            gs4i_scatter_quad(w->content, s, b, w->sent.content + 4 * b);
+            if (sim->conduction.source) gs4i_scatter_force(w->source, s, b, &w->sent.source);
         }
 }
 
-static void gs4i_add_warmth(const gs4_sim *sim, int o, const gs4_real *content, const gs4_real *source)
+static void gs4i_add_warmth(const gs4_sim *sim, int o, const gs4i_warmth *w)
 {
-    gs4i_tile_add(&sim->grid, o, sim->reports[o].rows, content, sim->conduction.content);
-    if (sim->conduction.source) gs4i_tile_add(&sim->grid, o, sim->reports[o].rows, source, sim->conduction.source);
+    gs4i_tile_add(&sim->grid, o, sim->reports[o].rows, w->content, sim->conduction.content);
+    if (sim->conduction.source) gs4i_tile_add(&sim->grid, o, sim->reports[o].rows, w->source, sim->conduction.source);
 }
 
 /* S4 and S5: L~ = sum v_i (x) grad w, J~ and stress there, and f_i = - sum V sigma grad w + sum w m g. */
-static void gs4i_scatter_stage(const gs4i_pass *pass, int index, int with_heat)
+static void gs4i_scatter_stage(const gs4i_pass *pass, int index, gs4i_warmth *warmth)
 {
     gs4_sim *sim = pass->sim;
     const gs4i_particles p = sim->particles;
@@ -6096,13 +6112,12 @@ static void gs4i_scatter_stage(const gs4i_pass *pass, int index, int with_heat)
     gs4i_batch_laws laws;
     gs4i_history_laws past;
     gs4i_seen seen;
-    gs4i_warmth warmth;
-    gs4_real nodes[GS4I_TILE_REALS], tile[GS4I_TILE_REALS], content[GS4I_TILE_REALS], source[GS4I_TILE_REALS];
+    gs4_real nodes[GS4I_TILE_REALS], tile[GS4I_TILE_REALS];
     int row = 0;
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
     gs4i_tile_load(&sim->grid, o, report->rows, sim->grid.momentum, nodes);
     memset(tile, 0, sizeof tile);
-    if (with_heat) gs4i_clear_warmth(&warmth, content, source);
+    if (warmth) gs4i_clear_warmth(warmth);
     memset(&laws, 0, sizeof laws);
     memset(&past, 0, sizeof past);
     gs4i_see_nothing(&seen);
@@ -6125,20 +6140,20 @@ static void gs4i_scatter_stage(const gs4i_pass *pass, int index, int with_heat)
         }
         gs4i_gradient_lanes(v.dx, v.dy, v.dz, n, L);
         gs4i_take_laws(sim->laws, sim->frozen, &p, i, n, &laws);
-        if (with_heat) gs4i_begin_warmth(&p, i, n, rule.reach.ahead, &laws, &warmth);
-        gs4i_stage_forces(&p, i, n, &q, &laws, &past, &rule, L, gravity, &f, J, mu, &seen, report, with_heat ? &warmth : NULL);
+        if (warmth) gs4i_begin_warmth(&p, i, n, rule.reach.ahead, &laws, warmth);
+        gs4i_stage_forces(&p, i, n, &q, &laws, &past, &rule, L, gravity, &f, J, mu, &seen, report, warmth);
         gs4i_see_liquids(&seen, &laws, J, mu);
         gs4i_check_liquids(report, J, mu, p.id + i, n);
         for (b = 0; b < n; b++) gs4i_scatter_force(tile, &s, b, &f);
-        if (with_heat) gs4i_scatter_warmth(sim, &warmth, &s, n, content, source);
+        if (warmth) gs4i_scatter_warmth(sim, warmth, &s, n);
     }
     gs4i_report_liquids(report, &seen);
     gs4i_tile_add(&sim->grid, o, report->rows, tile, sim->grid.force);
-    if (with_heat) gs4i_add_warmth(sim, o, content, source);
+    if (warmth) gs4i_add_warmth(sim, o, warmth);
 }
 
-static void gs4i_scatter_forces(int index, void *context) { gs4i_scatter_stage((const gs4i_pass *)context, index, 0); }
-static void gs4i_scatter_forces_and_heat(int index, void *context) { gs4i_scatter_stage((const gs4i_pass *)context, index, 1); }
+static void gs4i_scatter_forces(int index, void *context) { gs4i_scatter_stage((const gs4i_pass *)context, index, NULL); }
+static void gs4i_scatter_forces_and_heat(int index, void *context) { gs4i_warmth warmth; gs4i_scatter_stage((const gs4i_pass *)context, index, &warmth); }
 
 /* --- S7 ---------------------------------------------------------------------------------------------- */
 
@@ -6327,16 +6342,15 @@ static int gs4i_is_calm(const gs4i_pass *pass, int index)
     return 1;
 }
 
-static void gs4i_load_warmth(const gs4_sim *sim, int o, gs4i_warmth *w, gs4_real *nodes, gs4_real *slopes)
+static void gs4i_load_warmth(const gs4_sim *sim, int o, gs4i_warmth *w)
 {
     memset(&w->laws, 0, sizeof w->laws);
-    gs4i_tile_load(&sim->grid, o, sim->reports[o].rows, sim->conduction.content, nodes);
-    if (sim->particles.with_flux) gs4i_tile_load(&sim->grid, o, sim->reports[o].rows, sim->conduction.source, slopes);
+    gs4i_tile_load(&sim->grid, o, sim->reports[o].rows, sim->conduction.content, w->content);
+    if (sim->particles.with_flux) gs4i_tile_load(&sim->grid, o, sim->reports[o].rows, sim->conduction.source, w->source);
 }
 
-/* S7 of heat for particles i to i + n: `nodes` has rises, `slopes` what gives the gradients for the flux. */
-static void gs4i_gather_heat(const gs4_sim *sim, size_t i, int n, const gs4i_stencils *s, const gs4_real *nodes, const gs4_real *slopes, gs4i_batch_laws *l,
-                             gs4i_gradient L, gs4i_warmth *w)
+/* S7 of heat for particles i to i + n. */
+static void gs4i_gather_heat(const gs4_sim *sim, size_t i, int n, const gs4i_stencils *s, gs4i_batch_laws *l, gs4i_gradient L, gs4i_warmth *w)
 {
     const gs4i_particles *p = &sim->particles;
     gs4i_gathered g;
@@ -6349,8 +6363,8 @@ static void gs4i_gather_heat(const gs4_sim *sim, size_t i, int n, const gs4i_ste
     for (b = 0; b < n; b++) {
         gs4i_row x, d;
         gs4i_x_weights(s, b, &x, &d);
-        gs4i_gather_value(nodes + 4 * s->base[b], s, b, &x, rise);
-        if (p->with_flux) gs4i_gather_local(slopes + 4 * s->base[b], s, b, &x, &d, &g);
+        gs4i_gather_value(w->content + 4 * s->base[b], s, b, &x, rise);
+        if (p->with_flux) gs4i_gather_local(w->source + 4 * s->base[b], s, b, &x, &d, &g);
     }
     gs4i_to_lanes(rise, n, value);
     if (p->with_flux) {
@@ -6390,7 +6404,7 @@ static void gs4i_advance_history(const gs4_sim *sim, size_t i, int n, gs4i_batch
 }
 
 /* S7: gather and correct. With `commit` 0 nothing is written: a rehearsal that only reports. */
-static void gs4i_correct(const gs4i_pass *pass, int index, int commit, int with_heat)
+static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_warmth *warmth)
 {
     gs4_sim *sim = pass->sim;
     const int o = pass->blocks[index], next = pass->blocks[index + 1 < pass->count ? index + 1 : index];
@@ -6404,8 +6418,7 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, int with_
     gs4i_seen seen;
     gs4i_corrections k;
     gs4i_kicks kicks;
-    gs4i_warmth warmth;
-    gs4_real u_nodes[GS4I_TILE_REALS], a_nodes[GS4I_TILE_REALS], j_nodes[GS4I_TILE_REALS], h_nodes[GS4I_TILE_REALS], slopes[GS4I_TILE_REALS];
+    gs4_real u_nodes[GS4I_TILE_REALS], a_nodes[GS4I_TILE_REALS], j_nodes[GS4I_TILE_REALS];
     const int jumps = gs4i_load_jumps(grid, o, report->rows, j_nodes), edge = jumps || gs4i_at_edge(grid, o);
     gs4i_gathered u;
     gs4i_stored out;
@@ -6417,7 +6430,7 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, int with_
     memset(&laws, 0, sizeof laws);
     memset(&past, 0, sizeof past);
     memset(k.jump, 0, sizeof k.jump);
-    if (with_heat) gs4i_load_warmth(sim, o, &warmth, h_nodes, slopes);
+    if (warmth) gs4i_load_warmth(sim, o, warmth);
     for (; i < end; i += GS4I_BATCH, row += 2) {
         const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
         gs4i_batch q;
@@ -6440,8 +6453,8 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, int with_
         if (jumps) gs4i_to_lanes(jump.value, n, k.jump);
         gs4i_correct_batch(rule, &k, &q);
         if (p.deformation_reals) gs4i_take_kicks(&acc, jumps ? &jump : NULL, n, &kicks);
-        if (p.elastic_reals || p.deformation_reals || with_heat) gs4i_advance_history(sim, i, n, &laws, &past, &warmth, k.L, &kicks, q.v[3], report, commit);
-        if (with_heat && commit) gs4i_gather_heat(sim, i, n, &s, h_nodes, slopes, &laws, k.L, &warmth);
+        if (p.elastic_reals || p.deformation_reals || warmth) gs4i_advance_history(sim, i, n, &laws, &past, warmth, k.L, &kicks, q.v[3], report, commit);
+        if (warmth && commit) gs4i_gather_heat(sim, i, n, &s, &laws, k.L, warmth);
         if (!commit) { gs4i_judge(&q, k.L, p.position + 4 * i, n, grid->h, p.id + i, report); continue; }
         gs4i_pack_batch(&q, 1, &out);
         if (edge) gs4i_correct_contact(sim, i, n, &out, &u, report);
@@ -6453,20 +6466,26 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, int with_
 
 static void gs4i_correct_task(int index, void *context)
 {
-    gs4i_correct((const gs4i_pass *)context, index, 1, 0);
+    gs4i_correct((const gs4i_pass *)context, index, 1, NULL);
 }
 
 static void gs4i_correct_with_heat_task(int index, void *context)
 {
-    gs4i_correct((const gs4i_pass *)context, index, 1, 1);
+    gs4i_warmth warmth;
+    gs4i_correct((const gs4i_pass *)context, index, 1, &warmth);
 }
 
 static void gs4i_rehearse_task(int index, void *context)
 {
     const gs4i_pass *pass = (const gs4i_pass *)context;
-    if (gs4i_is_calm(pass, index)) return;
-    if (pass->sim->particles.with_heat) gs4i_correct(pass, index, 0, 1);
-    else gs4i_correct(pass, index, 0, 0);
+    if (!gs4i_is_calm(pass, index)) gs4i_correct(pass, index, 0, NULL);
+}
+
+static void gs4i_rehearse_with_heat_task(int index, void *context)
+{
+    const gs4i_pass *pass = (const gs4i_pass *)context;
+    gs4i_warmth warmth;
+    if (!gs4i_is_calm(pass, index)) gs4i_correct(pass, index, 0, &warmth);
 }
 
 /* --- symplectic Euler -------------------------------------------------------------------------------- */
@@ -6508,7 +6527,7 @@ GS4I_INLINE void gs4i_affine_momentum(const gs4i_particles *p, size_t at, int n,
 }
 
 /* Symplectic Euler, there: one affine scatter with stress (MLS-MPM). */
-static void gs4i_scatter_affinely(const gs4i_pass *pass, int index, int with_heat)
+static void gs4i_scatter_affinely(const gs4i_pass *pass, int index, gs4i_warmth *warmth)
 {
     gs4_sim *sim = pass->sim;
     const gs4i_particles p = sim->particles;
@@ -6521,14 +6540,13 @@ static void gs4i_scatter_affinely(const gs4i_pass *pass, int index, int with_hea
     gs4i_batch_laws laws;
     gs4i_history_laws past;
     gs4i_seen seen;
-    gs4i_warmth warmth;
-    gs4_real tile[GS4I_TILE_REALS], content[GS4I_TILE_REALS], source[GS4I_TILE_REALS];
+    gs4_real tile[GS4I_TILE_REALS];
     int row = 0;
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
     uint64_t rows = 0;
     gs4i_report_clear(report);
     memset(tile, 0, sizeof tile);
-    if (with_heat) gs4i_clear_warmth(&warmth, content, source);
+    if (warmth) gs4i_clear_warmth(warmth);
     memset(&laws, 0, sizeof laws);
     memset(&past, 0, sizeof past);
     gs4i_see_nothing(&seen);
@@ -6544,8 +6562,8 @@ static void gs4i_scatter_affinely(const gs4i_pass *pass, int index, int with_hea
         gs4i_stage_batch(&p, i, n, reach, &frame, &q, &s);
         gs4i_load_affine(&p, i, n, C);
         gs4i_take_laws(sim->laws, sim->frozen, &p, i, n, &laws);
-        if (with_heat) gs4i_begin_warmth(&p, i, n, 0, &laws, &warmth);
-        gs4i_affine_momentum(&p, i, n, &sim->rule, &q, &laws, &past, &s, C, h, fall, &f, mu, &seen, report, with_heat ? &warmth : NULL);
+        if (warmth) gs4i_begin_warmth(&p, i, n, 0, &laws, warmth);
+        gs4i_affine_momentum(&p, i, n, &sim->rule, &q, &laws, &past, &s, C, h, fall, &f, mu, &seen, report, warmth);
         gs4i_see_liquids(&seen, &laws, q.v[3], mu);
         gs4i_check_liquids(report, q.v[3], mu, p.id + i, n);
         for (b = 0; b < n; b++) {
@@ -6553,16 +6571,16 @@ static void gs4i_scatter_affinely(const gs4i_pass *pass, int index, int with_hea
             rows |= gs4i_touched_rows(s.base[b]);
             gs4i_scatter_affine(tile, &s, b, &f);
         }
-        if (with_heat) gs4i_scatter_warmth(sim, &warmth, &s, n, content, source);
+        if (warmth) gs4i_scatter_warmth(sim, warmth, &s, n);
     }
     gs4i_report_liquids(report, &seen);
     report->rows = rows;
     gs4i_tile_add(&sim->grid, o, rows, tile, sim->grid.momentum);
-    if (with_heat) gs4i_add_warmth(sim, o, content, source);
+    if (warmth) gs4i_add_warmth(sim, o, warmth);
 }
 
-static void gs4i_scatter_euler(int index, void *context) { gs4i_scatter_affinely((const gs4i_pass *)context, index, 0); }
-static void gs4i_scatter_euler_and_heat(int index, void *context) { gs4i_scatter_affinely((const gs4i_pass *)context, index, 1); }
+static void gs4i_scatter_euler(int index, void *context) { gs4i_scatter_affinely((const gs4i_pass *)context, index, NULL); }
+static void gs4i_scatter_euler_and_heat(int index, void *context) { gs4i_warmth warmth; gs4i_scatter_affinely((const gs4i_pass *)context, index, &warmth); }
 
 /* v = sum w v_i, C = sum v_i (x) grad w, J += dt J tr C, x += dt v. */
 GS4I_INLINE void gs4i_advect_batch(gs4_real dt, const gs4i_gathered *u, int n, gs4i_batch *q, gs4i_gradient C)
@@ -6576,7 +6594,7 @@ GS4I_INLINE void gs4i_advect_batch(gs4_real dt, const gs4i_gathered *u, int n, g
 }
 
 /* Symplectic Euler, and back. */
-static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, int with_heat)
+static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, gs4i_warmth *warmth)
 {
     gs4_sim *sim = pass->sim;
     const int o = pass->blocks[index], next = pass->blocks[index + 1 < pass->count ? index + 1 : index];
@@ -6588,8 +6606,7 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, int 
     gs4i_batch_laws laws;
     gs4i_history_laws past;
     gs4i_seen seen;
-    gs4i_warmth warmth;
-    gs4_real nodes[GS4I_TILE_REALS], h_nodes[GS4I_TILE_REALS], slopes[GS4I_TILE_REALS];
+    gs4_real nodes[GS4I_TILE_REALS];
     int edge = gs4i_at_edge(grid, o), c;
     gs4i_gathered u;
     gs4i_stored out;
@@ -6600,7 +6617,7 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, int 
     gs4i_see_nothing(&seen);
     memset(&laws, 0, sizeof laws);
     memset(&past, 0, sizeof past);
-    if (with_heat) gs4i_load_warmth(sim, o, &warmth, h_nodes, slopes);
+    if (warmth) gs4i_load_warmth(sim, o, warmth);
     for (; i < end; i += GS4I_BATCH, row += 2) {
         const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
         gs4i_batch q;
@@ -6615,8 +6632,8 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, int 
             gs4i_gather_local(nodes + 4 * s.base[b], &s, b, &w, &d, &u);
         }
         gs4i_advect_batch(sim->rule.dt, &u, n, &q, C);
-        if (p.elastic_reals || p.deformation_reals || with_heat) gs4i_advance_history(sim, i, n, &laws, &past, &warmth, C, NULL, q.v[3], report, commit);
-        if (with_heat && commit) gs4i_gather_heat(sim, i, n, &s, h_nodes, slopes, &laws, C, &warmth);
+        if (p.elastic_reals || p.deformation_reals || warmth) gs4i_advance_history(sim, i, n, &laws, &past, warmth, C, NULL, q.v[3], report, commit);
+        if (warmth && commit) gs4i_gather_heat(sim, i, n, &s, &laws, C, warmth);
         if (!commit) { gs4i_judge(&q, C, p.position + 4 * i, n, grid->h, p.id + i, report); continue; }
         gs4i_pack_batch(&q, 0, &out);
         if (edge) gs4i_correct_contact(sim, i, n, &out, &u, report);
@@ -6631,20 +6648,26 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, int 
 
 static void gs4i_gather_euler_task(int index, void *context)
 {
-    gs4i_gather_euler((const gs4i_pass *)context, index, 1, 0);
+    gs4i_gather_euler((const gs4i_pass *)context, index, 1, NULL);
 }
 
 static void gs4i_gather_euler_with_heat_task(int index, void *context)
 {
-    gs4i_gather_euler((const gs4i_pass *)context, index, 1, 1);
+    gs4i_warmth warmth;
+    gs4i_gather_euler((const gs4i_pass *)context, index, 1, &warmth);
 }
 
 static void gs4i_rehearse_euler_task(int index, void *context)
 {
     const gs4i_pass *pass = (const gs4i_pass *)context;
-    if (gs4i_is_calm(pass, index)) return;
-    if (pass->sim->particles.with_heat) gs4i_gather_euler(pass, index, 0, 1);
-    else gs4i_gather_euler(pass, index, 0, 0);
+    if (!gs4i_is_calm(pass, index)) gs4i_gather_euler(pass, index, 0, NULL);
+}
+
+static void gs4i_rehearse_euler_with_heat_task(int index, void *context)
+{
+    const gs4i_pass *pass = (const gs4i_pass *)context;
+    gs4i_warmth warmth;
+    if (!gs4i_is_calm(pass, index)) gs4i_gather_euler(pass, index, 0, &warmth);
 }
 
 /* Run a scattering kernel over all occupied blocks, colour after colour. */
@@ -7575,9 +7598,10 @@ static int gs4i_check_stage(gs4_sim *sim)
 /* Before anything is written to the particles: can the step be trusted? */
 static int gs4i_rehearse(gs4_sim *sim, gs4i_node_pass *nodes)
 {
+    static const gs4_task_fn tasks[2][2] = { { gs4i_rehearse_task, gs4i_rehearse_with_heat_task }, { gs4i_rehearse_euler_task, gs4i_rehearse_euler_with_heat_task } };
     gs4i_report r;
     gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_node_spreads, nodes);
-    gs4i_gather(sim, sim->desc.integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER ? gs4i_rehearse_euler_task : gs4i_rehearse_task);
+    gs4i_gather(sim, tasks[sim->desc.integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER][sim->particles.with_heat]);
     r = gs4i_all_reports(sim);
     return r.bad ? gs4i_fail_bad(sim, &r) : GS4_OK;
 }

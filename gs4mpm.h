@@ -95,7 +95,7 @@
  *     S3  m_i = sum w m,   v_i = sum w m v~ / m_i;   solids: v~ + w~ x (x_i - x~), w how the particle turns (below)
  *     S4  L~ = sum v_i (x) grad w;   J~ by (4), implicit in J for known div v;   s~ by (4), (5);   F~ by (4), (6);   sigma there by (2), (3)
  *     S5  f_i = - sum V sigma grad w + sum w m g
- *         heat: (m c)_i, (m c T**)_i, T** = T + alpha_f dt r - s r; then (m c)_i (T~_i - T**_i) / s = (7) at T~, by multigrid ([[conduction]])
+ *         heat: (m c)_i, (m c T**)_i, T** = T + (alpha_f dt - s) r; then (m c)_i (T~_i - T**_i) / s = (7) at T~, by multigrid ([[conduction]])
  *     S6  acc_i = f_i / m_i;   u_i = v_i + s (acc_i - ag_i), s = alpha_f gamma dt / alpha_m;   ag_i += (acc_i - ag_i) / alpha_m
  *         is what the node remembers; walls and bodies
  *     S7  A = sum w acc_i, U = sum w u_i; v by (4) with dv/dt = A - (v - U) / flip_decay_time; J, s, F by (4) with grad u; T by (4) with
@@ -112,7 +112,7 @@
  *
  * ACCURACY (tests/test_order.c, tests/test_physics.c hold these)
  *     order in time 1.9 to 2.0 in x, v, J, F, T, q; elastic waves within 1.5 % at 32 cells a wave (tests/test_solid.c); order in space 2.0 for
- *     Poiseuille flow and for heat, whose modes decay 1 % too slowly at 32 cells a wave, see tests/test_heat.c; sound speed within 1.5 % at
+ *     Poiseuille flow and for heat, whose modes decay within 0.4 % at 32 cells a wave, see tests/test_heat.c; sound speed within 1.5 % at
  *     32 cells a wave; a melting front within 0.3 cells; heat in an insulated box conserved to the tolerance of the solver;
  *     free flight exact to rounding where rho_s = 0, else to O(dt^2); momentum to rounding in free flight; a column at rest keeps
  *     its pressure within 0.3 % and its speed below 1e-4 sqrt(g h).
@@ -3422,7 +3422,7 @@ typedef struct gs4i_particles {
     gs4_real *affine[3];                /* 4 each: column j of the velocity gradient, dv_i/dx_j; NULL for GS4 */
     gs4_real *elastic; int elastic_reals;   /* 12: non-local stress xx yy zz xy xz yz (Pa) and its rate; 6 for Euler; 0: the scene has none */
     gs4_real *deformation; int deformation_reals;   /* 24, see [[solid]]: F, row-major, M (1/s), turning w (rad/s) and its rate; 9 for Euler; 0: none */
-    gs4_real *heat; int with_heat;      /* 4: temperature, liquid fraction, rate of enthalpy over heat capacity, the same sharpened, see [[heat]]; 0: the scene has none */
+    gs4_real *heat; int with_heat;      /* 4: temperature, liquid fraction, rate of enthalpy over heat capacity, 0; 0: the scene has none */
     uint8_t *liquid;                    /* 1 while liquid; with heat */
     gs4_real *flux, *flux_rate; int with_flux;  /* 4 each: non-local heat flux (W/m^2), 0, and its rate; 0: the scene has none */
     gs4i_half *lag;                     /* 4: v - shift a - dx/dt, 0, see S2; NULL for symplectic Euler */
@@ -3578,6 +3578,7 @@ GS4I_INLINE void gs4i_prefetch_particles(const gs4i_particles *p, size_t i)
     }
     for (b = 0; b < p->elastic_reals * GS4I_BATCH; b += 16) GS4I_PREFETCH(p->elastic + (size_t)p->elastic_reals * i + b);
     for (b = 0; b < p->deformation_reals * GS4I_BATCH; b += 16) GS4I_PREFETCH(p->deformation + (size_t)p->deformation_reals * i + b);
+    for (b = 0; b < 4 * GS4I_BATCH && p->heat; b += 16) GS4I_PREFETCH(p->heat + 4 * i + b);
 }
 
 /* Particles i to i + n. */
@@ -4774,9 +4775,9 @@ static void gs4i_set_turning(const gs4i_particles *p, size_t i, gs4_vec3 w)
  *
  *     (m c)_i (T~_i - T**_i) / s = sum_p [w_ip V tau:D + grad w_ip . V q** t / (t + s)] + (div k_eff grad T~)_i     ([[conduction]])
  *
- * and a particle takes the rate r = sum_i w_ip R_i, R = (T~ - T**) / s, so that what nodes gain particles gain: heat is conserved.
- * There and back again a rate is smoothed, (1 + h^2/4 div grad) R of R, which would leave an error of first order in dt in
- * T~_i = sum_p w (T + alpha_f dt r)_p + s (R_i - r): so r is there what gives R back, the sharpened rate sum_i w_ip (1 - h^2/4 div grad) R_i. */
+ * and a particle takes the rate r = sum_i w_ip (R - h^2/4 div grad R)_i, R = (T~ - T**) / s. To nodes and back again a field is smoothed,
+ * f + h^2/4 div grad f, and R is made sharper by as much: else modes would decay too slowly, and the stage, T~ = sum w (T + alpha_f dt r) + s (R - r),
+ * would have an error of first order in dt. The sharpening moves heat between nodes: what nodes gain particles gain, heat is conserved. */
 
 /* What the grid cannot see of the temperature of particles fades at the rate GS4I_MIXING k / (rho c h^2), as conduction over less than a cell has it
  * (with a relaxation time t, the non-local part at most at 1/t), and not in less than flip_decay_time. It is taken from T** itself, T**_p less the
@@ -4789,8 +4790,8 @@ typedef struct gs4i_heat_laws {
     int melts;                          /* some of those seen so far do */
 } gs4i_heat_laws;
 
-/* Of one batch: temperature (K), fraction, rate of H/c and the same sharpened (K/s); non-local flux (W/m^2) and its rate. */
-typedef struct gs4i_heat { gs4i_lanes T, fraction, rate, sharp, q[4], q_rate[4]; } gs4i_heat;
+/* Of one batch: temperature (K), fraction, rate of H/c (K/s); non-local flux (W/m^2) and its rate. */
+typedef struct gs4i_heat { gs4i_lanes T, fraction, rate, q[4], q_rate[4]; } gs4i_heat;
 
 static void gs4i_take_heat_laws(const gs4i_batch_laws *laws, gs4i_heat_laws *l)
 {
@@ -4810,7 +4811,7 @@ GS4I_INLINE void gs4i_load_heat(const gs4i_particles *p, size_t i, int n, gs4i_h
     gs4i_lanes own[4];
     gs4i_to_lanes(p->heat + 4 * i, n, own);
     memcpy(h->T, own[0], sizeof h->T); memcpy(h->fraction, own[1], sizeof h->fraction);
-    memcpy(h->rate, own[2], sizeof h->rate); memcpy(h->sharp, own[3], sizeof h->sharp);
+    memcpy(h->rate, own[2], sizeof h->rate);
     if (!p->with_flux) return;
     gs4i_to_lanes(p->flux + 4 * i, n, h->q);
     gs4i_to_lanes(p->flux_rate + 4 * i, n, h->q_rate);
@@ -4819,7 +4820,9 @@ GS4I_INLINE void gs4i_load_heat(const gs4i_particles *p, size_t i, int n, gs4i_h
 GS4I_INLINE void gs4i_store_heat(const gs4i_particles *p, size_t i, int n, const gs4i_heat *h)
 {
     gs4_real own[4 * GS4I_BATCH];
-    gs4i_from_lanes(h->T, h->fraction, h->rate, h->sharp, own);
+    gs4i_lanes none;
+    memset(none, 0, sizeof none);
+    gs4i_from_lanes(h->T, h->fraction, h->rate, none, own);
     memcpy(p->heat + 4 * i, own, 4 * (size_t)n * sizeof *own);
     if (!p->with_flux) return;
     gs4i_from_lanes(h->q[0], h->q[1], h->q[2], h->q[3], own);
@@ -4857,12 +4860,12 @@ GS4I_INLINE void gs4i_warm(const gs4i_heat_laws *l, gs4i_lanes rise, gs4i_lanes 
     }
 }
 
-/* The temperature of H + ahead dH/dt, less s times the sharpened rate. */
-static void gs4i_temperature_ahead(const gs4i_heat_laws *l, const gs4i_heat *h, gs4_real ahead, gs4_real s, gs4i_lanes T)
+/* The temperature of H + ahead dH/dt. */
+static void gs4i_temperature_ahead(const gs4i_heat_laws *l, const gs4i_heat *h, gs4_real ahead, gs4i_lanes T)
 {
     gs4i_lanes rise, fraction;
     int b;
-    GS4I_BATCH_LOOP(b) rise[b] = ahead * h->rate[b] - s * h->sharp[b];
+    GS4I_BATCH_LOOP(b) rise[b] = ahead * h->rate[b];
     memcpy(T, h->T, sizeof h->T);
     memcpy(fraction, h->fraction, sizeof fraction);
     gs4i_warm(l, rise, T, fraction);
@@ -4890,7 +4893,7 @@ static void gs4i_send_heat(const gs4i_heat_laws *l, const gs4i_heat *h, const gs
     gs4i_lanes T, capacity, content, resists, mixes, q[3], none;
     const gs4i_wide least = (mass[0] - mass[0]) + GS4I_C(1e-15);
     int b, c;
-    gs4i_temperature_ahead(l, h, rule->before + rule->s, rule->s, T);
+    gs4i_temperature_ahead(l, h, rule->before, T);
     GS4I_BATCH_LOOP(b) {
         capacity[b] = mass[b] * l->capacity[b];
         content[b] = capacity[b] * T[b];
@@ -4913,18 +4916,16 @@ static void gs4i_send_heat(const gs4i_heat_laws *l, const gs4i_heat *h, const gs
     gs4i_from_lanes(power, mixes, none, none, to->source.weight);
 }
 
-/* S7: `from` is sum w (T~ - T**), the same sharpened, the rate of mixing, and times the temperature to mix to; `slope` the gradient of T~, read with a
- * flux only. */
+/* S7: `from` is the sharpened T~ - T**, the rate of mixing, and times the temperature to mix to; `slope` the gradient of T~, read with a flux only. */
 static void gs4i_receive_heat(const gs4i_heat_laws *l, const gs4i_rule *rule, gs4i_lanes from[4], gs4i_lanes slope[3], gs4i_gradient L, int with_flux, gs4i_heat *h)
 {
     gs4i_lanes gain, T, q[3];
     int b, c;
-    gs4i_temperature_ahead(l, h, rule->before + rule->s, rule->s, T);
+    gs4i_temperature_ahead(l, h, rule->before, T);
     GS4I_BATCH_LOOP(b) {
-        const gs4i_wide change = ((from[0][b] * (1 / rule->s) - (from[2][b] * T[b] - from[3][b])) - h->rate[b]) * rule->inv_alpha_m;
+        const gs4i_wide change = ((from[0][b] * (1 / rule->s) - (from[1][b] * T[b] - from[2][b])) - h->rate[b]) * rule->inv_alpha_m;
         gain[b] = rule->dt * h->rate[b] + rule->gamma * rule->dt * change;
         h->rate[b] += change;
-        h->sharp[b] += (from[1][b] * (1 / rule->s) - h->sharp[b]) * rule->inv_alpha_m;
     }
     gs4i_warm(l, gain, h->T, h->fraction);
     if (!with_flux) return;
@@ -5529,12 +5530,12 @@ typedef struct gs4i_emitter {
 } gs4i_emitter;
 
 /* Heat on nodes: only while a step is made, see [[conduction]]. */
-enum { GS4I_HEAT_T, GS4I_HEAT_K, GS4I_HEAT_FILL, GS4I_HEAT_MIX, GS4I_HEAT_DIAGONAL, GS4I_HEAT_RHS, GS4I_HEAT_X, GS4I_HEAT_FACES, GS4I_HEAT_FIELDS = GS4I_HEAT_FACES + 3 };
+enum { GS4I_HEAT_T, GS4I_HEAT_K, GS4I_HEAT_FILL, GS4I_HEAT_HOLDS, GS4I_HEAT_MIX, GS4I_HEAT_DIAGONAL, GS4I_HEAT_RHS, GS4I_HEAT_X, GS4I_HEAT_FACES, GS4I_HEAT_FIELDS = GS4I_HEAT_FACES + 3 };
 typedef struct gs4i_conduction {
     gs4_real *content, *source; int slots;  /* 4 a node: m c, m c T**, V / k_eff, V -> what gs4i_heat_back says; source (W), mixing (W/K), 0, 0 -> the same; NULL where there is none */
     int heats;                          /* some material is heated by viscosity */
     int low[3], size[3];                /* the box: its first node, and how many there are along each axis */
-    uint8_t *kind; gs4_real *field[GS4I_HEAT_FIELDS]; size_t room;  /* T**; K; m^3 of material per m^3; W/(m^3 K) of mixing; J/(m^3 K); J/m^3; T~ - T**; faces of each axis */
+    uint8_t *kind; gs4_real *field[GS4I_HEAT_FIELDS]; size_t room;  /* T**; K; m^3 of material per m^3; J/(m^3 K); W/(m^3 K) of mixing; diagonal, J/(m^3 K); J/m^3; T~ - T**; faces of each axis */
     int exposed, linked;                /* air or a body is isothermal; or a wall */
     double *outer, *wrapped;            /* with periodic walls: x, r, p, A p; and the links around, see gs4i_solve_periodic */
     gs4i_solver solver;
@@ -6026,7 +6027,7 @@ static void gs4i_begin_warmth(const gs4i_particles *p, size_t i, int n, gs4_real
 {
     gs4i_load_heat(p, i, n, &w->h);
     gs4i_take_heat_laws(l, &w->laws);
-    gs4i_temperature_ahead(&w->laws, &w->h, ahead, 0, l->temperature);
+    gs4i_temperature_ahead(&w->laws, &w->h, ahead, l->temperature);
 }
 
 static void gs4i_send_warmth(const gs4i_batch_laws *l, const gs4i_rule *rule, const gs4i_wide *mass, const gs4i_wide *J, gs4i_gradient L, gs4i_symmetric sigma, int with_flux, gs4i_warmth *w)
@@ -6750,9 +6751,9 @@ static void gs4i_fill_heat(const gs4_sim *sim)
         const gs4_real sign = GS4I_C(sim->desc.wall_is_isothermal[wall] ? -1 : 1), twice = sim->desc.wall_is_isothermal[wall] ? 2 * sim->desc.wall_temperature[wall] : 0;
         for (i = 0; i < b->image_count[wall]; i++) {
             const size_t from = 4 * (size_t)b->images[wall][i].mirror, to = 4 * (size_t)b->images[wall][i].image;
-            for (a = 0; a < 2; a++) k->content[to + (size_t)a] = sign * k->content[from + (size_t)a];
-            k->content[to + 2] = k->content[from + 2];
-            k->content[to + 3] = twice * k->content[from + 2] + sign * k->content[from + 3];
+            k->content[to] = sign * k->content[from];
+            k->content[to + 1] = k->content[from + 1];
+            k->content[to + 2] = twice * k->content[from + 1] + sign * k->content[from + 2];
             for (a = 0; a < 3 && sim->particles.with_flux; a++) k->source[to + (size_t)a] = twice + sign * k->source[from + (size_t)a];
         }
     }
@@ -6840,7 +6841,7 @@ static void gs4i_heat_nodes(int index, void *context)
             k->field[GS4I_HEAT_K][cell] = q[3] / q[2];      /* one behind the other, as heat goes where two materials meet */
             k->field[GS4I_HEAT_FILL][cell] = q[3] * inv_cell;
             k->field[GS4I_HEAT_MIX][cell] = gs4i_min((k->source ? k->source[node + 1] : GS4I_MIXING * q[3] * q[3] / q[2] * g->inv_h * g->inv_h) / q[0], sim->rule.mixing) * q[0] * inv_cell;
-            k->field[GS4I_HEAT_DIAGONAL][cell] = q[0] * inv_cell;
+            k->field[GS4I_HEAT_HOLDS][cell] = k->field[GS4I_HEAT_DIAGONAL][cell] = q[0] * inv_cell;
             k->field[GS4I_HEAT_RHS][cell] = k->source ? k->source[node] * inv_cell * sim->rule.s : GS4I_C(0);
         }
     }
@@ -6982,7 +6983,7 @@ static gs4_real gs4i_second_differences(const gs4_sim *sim, const gs4_real *fiel
     return difference[0] + difference[1] + difference[2];
 }
 
-/* What particles gather, on the nodes of a group of blocks: the rise x, and sharpened; the rate of mixing, and times T** sharpened. For the flux
+/* What particles gather, on the nodes of a group of blocks: the rise x, sharpened; the rate of mixing, and times T** sharpened. For the flux
  * T~ - h^2/4 div grad T~ + h^2/12 d2T~/da2 for each axis a, whose gradient there and back again gives what the faces of the box give. */
 static void gs4i_heat_back(int index, void *context)
 {
@@ -6990,7 +6991,7 @@ static void gs4i_heat_back(int index, void *context)
     const gs4_sim *sim = pass->sim;
     const gs4i_grid *g = &sim->grid;
     const gs4i_conduction *k = &sim->conduction;
-    const gs4_real *X = k->field[GS4I_HEAT_X], *T = k->field[GS4I_HEAT_T], *fill = k->field[GS4I_HEAT_FILL], *mix = k->field[GS4I_HEAT_MIX], *wall = sim->desc.wall_temperature;
+    const gs4_real *X = k->field[GS4I_HEAT_X], *T = k->field[GS4I_HEAT_T], *holds = k->field[GS4I_HEAT_HOLDS], *mix = k->field[GS4I_HEAT_MIX], *wall = sim->desc.wall_temperature;
     int s, i, a;
     for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
         int first[3];
@@ -7007,15 +7008,14 @@ static void gs4i_heat_back(int index, void *context)
             if (at[0] < 0 || at[1] < 0 || at[2] < 0 || at[0] >= k->size[0] || at[1] >= k->size[1] || at[2] >= k->size[2]) continue;
             cell = gs4i_heat_cell(k, at[0], at[1], at[2]);
             if (k->kind[cell] != GS4_CELL_LIQUID) continue;
-            q[0] = X[cell];
-            sum = gs4i_second_differences(sim, X, fill, NULL, at, x);
-            q[1] = X[cell] - GS4I_C(0.25) * sum;
+            sum = gs4i_second_differences(sim, X, holds, NULL, at, x);
+            q[0] = X[cell] - GS4I_C(0.25) * sum;
             if (mix[cell] > 0) {
-                q[2] = mix[cell] / capacity;
-                q[3] = q[2] * (T[cell] - GS4I_C(0.25) * gs4i_second_differences(sim, T, mix, wall, at, t));
+                q[1] = mix[cell] / capacity;
+                q[2] = q[1] * (T[cell] - GS4I_C(0.25) * gs4i_second_differences(sim, T, mix, wall, at, t));
             }
             if (!flux) continue;
-            sum += gs4i_second_differences(sim, T, fill, wall, at, t);
+            sum += gs4i_second_differences(sim, T, holds, wall, at, t);
             for (a = 0; a < 3; a++) flux[a] = T[cell] + X[cell] - GS4I_C(0.25) * sum + GS4I_C(1.0 / 12) * (t[a] + x[a]);
         }
     }

@@ -32,6 +32,7 @@ int main(int count, char **values)
     RUN(test_drop_impact);
     RUN(test_elastic_wave);
     RUN(test_channel_overshoot);
+    RUN(test_elastic_couette);
     RUN(test_stress_is_paid_for_where_it_is);
     RUN(test_drop_draws_back);
     RUN(test_heat_modes);

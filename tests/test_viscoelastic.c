@@ -180,3 +180,47 @@ static void test_drop_draws_back(void)
     }
     gs4_destroy(sim);
 }
+
+/* Start-up of plane Couette flow of Oldroyd-B between a wall and a body that moves, 1 apart, density 1: velocities at mid-height at some
+ * times eta0 t / (rho h^2), by the shared reference (couette_startup: Waters & King), whose overshoot is at the first or second of them. */
+typedef struct couette_case { double elasticity, local, times[4], expected[4]; } couette_case;
+
+static void test_elastic_couette(void)
+{
+    static const couette_case cases[] = {
+        { 0.1, 0.1, { 0.2, 0.5, 1, 2 }, { 0.43272, 0.54087, 0.49976, 0.50001 } }, { 1, 0.5, { 0.2, 0.5, 1, 2 }, { 0.29019, 0.50858, 0.53619, 0.50355 } },
+        { 0.1, 0.5, { 0.2, 0.5, 1, 2 }, { 0.40841, 0.51587, 0.49961, 0.50000 } }, { 10, 0.1, { 1, 2, 3, 5 }, { 0.38764, 0.63093, 0.63864, 0.50297 } },
+        { 10, 0.5, { 0.5, 1, 2, 5 }, { 0.45443, 0.50617, 0.50923, 0.50502 } } };
+    const int n = 32;
+    int c, k, i;
+    for (c = 0; c < (test_slow ? (int)(sizeof cases / sizeof cases[0]) : 2); c++) {
+        const double h = 1 / (n - 0.25), mu = 0.5;         /* a plane of nodes a quarter of a cell before the body */
+        gs4_sim_desc d = scene_cube(n);
+        gs4_material m = viscoelastic_liquid(mu, cases[c].local, cases[c].elasticity / mu, 8);
+        gs4_fill f = scene_fill(at(0, 0, 0));
+        gs4_collider body;
+        gs4_sim *sim;
+        memset(&body, 0, sizeof body);
+        body.shape = gs4_plane(at(0, 1, 0), at(0, -1, 0)); body.velocity = at(1, 0, 0); body.contact = GS4_WALL_STICK;
+        d.cells[0] = d.cells[2] = 4; d.cells[1] = n + 3; d.cell_size = (gs4_real)h;
+        d.walls[0] = d.walls[1] = d.walls[4] = d.walls[5] = GS4_WALL_PERIODIC; d.walls[2] = GS4_WALL_STICK;
+        sim = physics_create(&d, &m);
+        CHECK(gs4_add_collider(sim, &body) == 0);
+        CHECK(gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(4 * h, 1, 4 * h)), &f) > 0);
+        for (k = 0; k < 4; k++) {
+            double u = 0, slope = 0, weight = 0;
+            gs4_view x, v;
+            CHECK(physics_run(sim, cases[c].times[k] / mu) == 0);
+            x = gs4_particles(sim, GS4_FIELD_POSITION); v = gs4_particles(sim, GS4_FIELD_VELOCITY);
+            for (i = 0; i < x.count; i++) {                 /* a straight line through the particles within a cell and a half */
+                const double y = (double)x.data[(size_t)i * (size_t)x.stride + 1] - 0.5;
+                if (fabs(y) > 1.5 * h) continue;
+                u += (double)v.data[(size_t)i * (size_t)v.stride]; weight += 1; slope += y;
+            }
+            u /= weight;
+            if (test_filter[0]) printf("El %g, local %g, t* %g: %.4f, exact %.4f\n", cases[c].elasticity, cases[c].local, cases[c].times[k], u, cases[c].expected[k]);
+            CHECK_CLOSE(u, cases[c].expected[k], 0.02 * fmax(0.5, cases[c].expected[k]));
+        }
+        gs4_destroy(sim);
+    }
+}

@@ -65,8 +65,8 @@
  *     ds/dt = L s + s L^T + 2 G0 D - [f s + G0 (f - 1) I + (alpha/G0) s.s] / lambda_b                                 (5)
  *     f = 2 r exp((2/Q) (Lam - 1)) (1 - 1/Lam) + (1 - alpha tr(s.s)/(3 G0^2)) / Lam^2;  Oldroyd-B: f = 1, alpha = 0
  * s goes by rule (4) where the step resolves it; else by a split that keeps the conformation s/G0 + I positive definite, in as many
- * substeps as it takes (counted: stress_substeps). With alpha > 1 (5) itself blows up: there, and only there, the eigenvalues of the
- * conformation are kept within 1e-3 and 1e6 (counted: stress_bounded).
+ * substeps as it takes (counted: stress_substeps). With alpha > 1 (5) itself blows up: there, and only there, eigenvalues of the
+ * conformation below 1 - 1/alpha relax without the term of alpha, none relaxes to less, and none is above 1e6 (counted: stress_bounded).
  * Solids have s_F, of the elastic deformation gradient F with det F = J, B = J^(-2/3) F F^T and V^2 = B:
  *     dF/dt = L F,   neo-Hookean: s_F = (G/J) dev(B),   fixed-corotated: s_F = (2 G/J) dev(B - V)                     (6)
  * the pressure is (3) with the same J, viscosity damps (Kelvin-Voigt). Where it yields, the singular values of F are clamped to
@@ -3897,8 +3897,9 @@ static int gs4i_preset(const char *name, gs4_material *m)
  * rule 1 of the manual, in lanes, with the relaxation f s implicit, where the step resolves the material; and, particle by
  * particle where it does not, the split c <- E c E^T, E = exp(L h), between two half relaxations in the eigenbasis of c, in
  * which each eigenvalue obeys dc_k/dt = -[f c_k - 1 + alpha (c_k - 1)^2] / lambda_b: positive by construction, in substeps h
- * chosen by comparing one with two halves. For alpha > 1 the model itself leaves the cone in finite time: then, and only
- * then, eigenvalues are kept within [1e-3, 1e6], and how often is counted. */
+ * chosen by comparing one with two halves. For alpha > 1 an eigenvalue below 1 - 1/alpha falls without end: the model leaves the cone in
+ * finite time. Then, and only then, it relaxes there without the term of alpha, none relaxes to less, none is above 1e6, and how
+ * often is counted. */
 
 /* What the particles of a batch need of their materials. */
 typedef struct gs4i_elastic_laws {
@@ -4024,10 +4025,13 @@ static void gs4i_relax(gs4i_split *p, double m[6], double h)
         f = gs4i_relaxation(p, half, &stiff);
         if (stage) p->swing = fmax(p->swing, (fabs(stiff - before) + 2 * stiff) * h * p->inv_lambda);
         for (k = 0; k < 3; k++) {
-            const double g = f + p->alpha * (half[k] - 2), t = (stage ? h : 0.5 * h) * p->inv_lambda, x = g * t;
+            const double lost = p->alpha > 1 ? 1 - 1 / p->alpha : 0, alpha = half[k] < lost ? 0 : p->alpha;
+            const double g = f + alpha * (half[k] - 2), t = (stage ? h : 0.5 * h) * p->inv_lambda, x = g * t;
             const double phi = fabs(x) < 1e-9 ? 1 - 0.5 * x : -expm1(-x) / x;
-            next[k] = c[k] * exp(-x) + (1 - p->alpha) * t * phi;
-            if (p->alpha > 1 && !(next[k] >= 1e-3 && next[k] <= 1e6)) { next[k] = next[k] > 1 ? 1e6 : 1e-3; p->bounded = 1; }
+            next[k] = c[k] * exp(-x) + (1 - alpha) * t * phi;
+            if (alpha > 1 && !(next[k] >= 0.999 * lost)) { next[k] = 0.999 * lost; p->bounded = 1; }
+            if (alpha < p->alpha || next[k] > 1e6) p->bounded = 1;
+            if (p->alpha > 1 && next[k] > 1e6) next[k] = 1e6;
         }
         for (k = 0; k < 3; k++) half[k] = next[k];
     }
@@ -4150,18 +4154,23 @@ static void gs4i_split_one(const gs4i_elastic_laws *l, gs4i_lanes G, gs4i_gradie
 
 /* --- both together ------------------------------------------------------------------------------------- */
 
-/* Does rule 1 resolve each particle: |L| dt and what relaxes explicitly small, and c = s/G + I inside the cone? */
-static int gs4i_resolved(gs4i_lanes G, gs4i_gradient L, gs4i_symmetric s, gs4i_lanes relax, gs4i_lanes stiff, const gs4i_rule *rule, int ok[GS4I_BATCH])
+/* Does rule 1 resolve each particle: |L| dt and what relaxes explicitly small, and c = s/G + I inside the cone, or above 1 - 1/alpha? */
+static int gs4i_resolved(gs4i_lanes G, const gs4i_wide *alpha, gs4i_gradient L, gs4i_symmetric s, gs4i_lanes relax, gs4i_lanes stiff, const gs4i_rule *rule, int ok[GS4I_BATCH])
 {
     const gs4_real dt = rule->dt, fastest = rule->afresh ? 1 / dt : GS4I_HUGE;      /* the midpoint rule of a first step damps nothing */
     gs4i_lanes squared, verdict;
     int b, j, all = 1;
     gs4i_gradient_squared(L, squared);
     GS4I_BATCH_LOOP(b) {
-        const gs4i_wide zero = G[b] - G[b], one = zero + GS4I_C(1), xx = s[0][b] + G[b], yy = s[1][b] + G[b], zz = s[2][b] + G[b];
-        const gs4i_wide minor = xx * yy - s[3][b] * s[3][b];
-        const gs4i_wide det = zz * minor - s[4][b] * (s[4][b] * yy - s[3][b] * s[5][b]) - s[5][b] * (xx * s[5][b] - s[3][b] * s[4][b]);
-        const gs4i_wide_mask good = ((squared[b] * (dt * dt) < GS4I_C(0.0625)) & (stiff[b] * dt < GS4I_C(0.4)) & (relax[b] * dt > GS4I_C(-0.1)) & (relax[b] < fastest)
+        const gs4i_wide zero = G[b] - G[b], one = zero + GS4I_C(1);
+        gs4i_wide room, xx, yy, zz, minor, det;
+        gs4i_wide_mask good;
+        GS4I_WIDE_MAX(room, alpha[b], one);
+        room = G[b] / room;
+        xx = s[0][b] + room; yy = s[1][b] + room; zz = s[2][b] + room;
+        minor = xx * yy - s[3][b] * s[3][b];
+        det = zz * minor - s[4][b] * (s[4][b] * yy - s[3][b] * s[5][b]) - s[5][b] * (xx * s[5][b] - s[3][b] * s[4][b]);
+        good = ((squared[b] * (dt * dt) < GS4I_C(0.0625)) & (stiff[b] * dt < GS4I_C(0.4)) & (relax[b] * dt > GS4I_C(-0.1)) & (relax[b] < fastest)
             & (xx > GS4I_C(1e-3) * G[b]) & (minor > GS4I_C(1e-5) * xx * yy) & (det > GS4I_C(1e-5) * xx * yy * zz)) | (G[b] <= GS4I_TINY);
         all &= gs4i_all(&good);
         GS4I_CHOOSE(verdict[b], good, one, zero);
@@ -4193,7 +4202,7 @@ static void gs4i_stage_elastic(const gs4i_elastic_laws *l, gs4i_lanes G, const g
     gs4i_elastic_rate(l, G, s, L, R, relax, stiff);
     for (c = 0; c < 6; c++)
         GS4I_BATCH_LOOP(b) s[c][b] = (e->s[c][b] + (ahead - w) * e->rate[c][b] + w * (R[c][b] + relax[b] * s[c][b])) / (GS4I_C(1) + w * relax[b]);
-    if (gs4i_resolved(G, L, s, relax, stiff, rule, ok)) return;
+    if (gs4i_resolved(G, l->alpha, L, s, relax, stiff, rule, ok)) return;
     for (b = 0; b < n; b++) if (!ok[b]) gs4i_split_one(l, G, L, e, b, (double)ahead, 1, s, NULL, count);
 }
 
@@ -4227,7 +4236,7 @@ static void gs4i_correct_elastic(const gs4i_elastic_laws *l, gs4i_elastic *e, co
             e->s[c][b] = (e->s[c][b] + dt * e->rate[c][b]) + rule->gamma * dt * change[c][b];
             e->rate[c][b] += change[c][b];
         }
-    if (gs4i_resolved(G, L, e->s, relax, stiff, rule, ok)) return;
+    if (gs4i_resolved(G, l->alpha, L, e->s, relax, stiff, rule, ok)) return;
     for (b = 0; b < n; b++) if (!ok[b]) gs4i_split_one(l, G, L, &old, b, (double)dt, (double)rule->gamma, e->s, e->rate, count);
 }
 

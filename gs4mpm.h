@@ -3759,6 +3759,7 @@ static gs4_real gs4i_cross_wlf(const gs4_material *m, gs4_real temperature, gs4_
     const double T = (double)temperature, n = (double)m->cross_wlf.n;
     const double mu0 = (double)m->cross_wlf.d1 * exp(-(double)m->cross_wlf.a1 * (T - (double)m->cross_wlf.t1) / (T - (double)m->cross_wlf.t2));
     if (!(mu0 < (double)GS4I_HUGE) || (m->cross_wlf.a1 > 0 && temperature <= m->cross_wlf.t2)) return GS4I_HUGE;
+    if (!(m->cross_wlf.a > 0)) return GS4I_C(mu0);              /* 0 times infinity, at rest and with n below 0 */
     return GS4I_C(mu0 / (1 + (double)m->cross_wlf.a * pow(mu0 * (double)shear_rate, n)));
 }
 
@@ -4793,6 +4794,8 @@ static void gs4i_set_turning(const gs4i_particles *p, size_t i, gs4_vec3 w)
  * gathered T** sharpened, in a form that conserves heat; not sharpened it would cool what the grid does see. */
 #define GS4I_MIXING GS4I_C(4.0)
 
+#define GS4I_INSULATES GS4I_C(1e-15)    /* W/(m K), of what has no conductivity, so that resistances can be added */
+
 typedef struct gs4i_heat_laws {
     gs4i_lanes capacity, conductivity, flux_time, fourier, melting, heating /* 1: by viscosity */;
     const gs4i_law *of[GS4I_BATCH];
@@ -4900,7 +4903,7 @@ static void gs4i_send_heat(const gs4i_heat_laws *l, const gs4i_heat *h, const gs
                            gs4i_lanes volume, gs4i_lanes power, int with_flux, gs4i_heat_sent *to)
 {
     gs4i_lanes T, capacity, content, resists, mixes, q[3], none;
-    const gs4i_wide least = (mass[0] - mass[0]) + GS4I_C(1e-15);
+    const gs4i_wide least = (mass[0] - mass[0]) + GS4I_INSULATES;
     int b, c;
     gs4i_temperature_ahead(l, h, rule->before, T);
     GS4I_BATCH_LOOP(b) {
@@ -6894,13 +6897,34 @@ static void gs4i_heat_faces(int z, void *context)
     }
 }
 
-/* How full the node `far` steps from cell `at` along a side is; nothing beyond the box. */
-GS4I_INLINE gs4_real gs4i_fill_beyond(const gs4i_conduction *k, const int at[3], int side, int far)
+/* Closes faces that let through next to nothing of what the best of them does: the solver takes less contrast than what near-empty nodes and
+ * insulators, whose conductivity is GS4I_INSULATES, make of it. Nothing that can be seen goes through them. */
+static void gs4i_close_faint_faces(const gs4i_conduction *k)
 {
+    gs4_real most = 0;
+    int axis, pass;
+    for (pass = 0; pass < 2; pass++)
+        for (axis = 0; axis < 3; axis++) {
+            gs4_real *face = k->field[GS4I_HEAT_FACES + axis];
+            size_t i, n = 1;
+            int a;
+            for (a = 0; a < 3; a++) n *= (size_t)k->size[a] + (a == axis);
+            if (!pass) for (i = 0; i < n; i++) most = gs4i_max(most, face[i]);
+            else for (i = 0; i < n; i++) if (face[i] < GS4I_C(1e-25) * most) face[i] = 0;
+        }
+}
+
+/* How full the node `far` steps from cell `at` along a side is: around a periodic axis, by images behind a wall; nothing beyond the box else. */
+GS4I_INLINE gs4_real gs4i_fill_beyond(const gs4_sim *sim, const int at[3], int side, int far)
+{
+    const gs4i_conduction *k = &sim->conduction;
+    const int a = side / 2, n = sim->grid.cells[a], there = at[a] + k->low[a] + (side & 1 ? far : -far);
     int p[3];
     p[0] = at[0]; p[1] = at[1]; p[2] = at[2];
-    p[side / 2] += side & 1 ? far : -far;
-    if (p[side / 2] < 0 || p[side / 2] >= k->size[side / 2]) return 0;
+    p[a] = there - k->low[a];
+    if (sim->grid.periodic[a]) p[a] = (p[a] + n) % n;
+    else if ((there < 0 || there >= n) && sim->desc.walls[side] != GS4_WALL_OPEN) p[a] = (there < 0 ? -1 - there : 2 * n - 1 - there) - k->low[a];
+    if (p[a] < 0 || p[a] >= k->size[a]) return 0;
     return k->field[GS4I_HEAT_FILL][gs4i_heat_cell(k, p[0], p[1], p[2])];
 }
 
@@ -6910,7 +6934,7 @@ static gs4_real gs4i_isothermal_links(const gs4_sim *sim, const int at[3], gs4_r
 {
     const gs4i_conduction *k = &sim->conduction;
     const gs4_real fill = k->field[GS4I_HEAT_FILL][gs4i_heat_cell(k, at[0], at[1], at[2])];
-    gs4_real shows[6], all = 0, T = 0;
+    gs4_real shows[6], most = 0, all = 0, T = 0;
     int side, a;
     *warmth = 0;
     for (side = 0; side < 6; side++) {
@@ -6918,21 +6942,23 @@ static gs4_real gs4i_isothermal_links(const gs4_sim *sim, const int at[3], gs4_r
         shows[side] = 0;
         if ((next < 0 || next >= sim->grid.cells[side / 2]) && sim->desc.walls[side] != GS4_WALL_OPEN) {
             if (sim->desc.wall_is_isothermal[side]) { all += 2 * fill; *warmth += 2 * fill * sim->desc.wall_temperature[side]; }
-        } else if (k->exposed && gs4i_fill_beyond(k, at, side, 3) < GS4I_C(0.5))     /* not the noise of the inside */
-            shows[side] = gs4i_max(fill - gs4i_fill_beyond(k, at, side, 1), GS4I_C(0));
+        } else if (k->exposed && gs4i_fill_beyond(sim, at, side, 3) < GS4I_C(0.5))     /* not the noise of the inside */
+            shows[side] = gs4i_max(fill - gs4i_fill_beyond(sim, at, side, 1), GS4I_C(0));
+        most = gs4i_max(most, shows[side]);
     }
     for (side = 0; side < 6; side++) {
-        gs4_real square = shows[side] * shows[side], cube = square * shows[side], p[3], norm, link;
+        const gs4_real own = most > 0 ? shows[side] / most : GS4I_C(0);     /* of `most`: what a node with next to no mass shows has no square in float */
+        gs4_real square = own * own, cube = square * own, p[3], norm, link;
         if (!(shows[side] > 0)) continue;
         for (a = 0; a < 3; a++) {
-            const gs4_real other = gs4i_max(shows[2 * a], shows[2 * a + 1]);
+            const gs4_real other = gs4i_max(shows[2 * a], shows[2 * a + 1]) / most;
             if (a != side / 2) { square += other * other; cube += other * other * other; }
             p[a] = GS4I_C(at[a] + k->low[a]) + GS4I_C(0.5);
         }
         p[side / 2] += side & 1 ? GS4I_C(1) : GS4I_C(-1);
         if (!gs4i_is_isothermal_at(sim, gs4i_add(sim->grid.origin, gs4i_scale(gs4i_vec3(p[0], p[1], p[2]), sim->grid.h)), &T)) continue;
         norm = GS4I_SQRT(square);
-        link = shows[side] * (shows[side] / norm) / (GS4I_SURFACE_DEPTH - GS4I_C(0.5) * (1 - cube / (square * norm)));
+        link = shows[side] * (own / norm) / (GS4I_SURFACE_DEPTH - GS4I_C(0.5) * (1 - cube / (square * norm)));
         all += link; *warmth += link * T;
     }
     return all;
@@ -7201,6 +7227,7 @@ static int gs4i_conduct(gs4_sim *sim, gs4i_node_pass *nodes)
     for (a = 0; a < 6; a++) k->linked |= sim->desc.wall_is_isothermal[a];
     gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_heat_nodes, nodes);
     gs4i_parallel_for(&sim->tasks, k->size[2] + 1, gs4i_heat_faces, nodes);
+    gs4i_close_faint_faces(k);
     gs4i_parallel_for(&sim->tasks, k->size[2], gs4i_heat_flows, nodes);
     result = gs4i_solve_heat(sim);
     if (result != GS4_OK) return result;
@@ -8050,7 +8077,8 @@ typedef struct gs4i_head {
     char magic[8];
     uint32_t version, real_size, byte_order, head_size, material_size, body_size, emitter_size;
     int32_t cells[3], integrator, walls[6];
-    double cell_size, origin[3], gravity[3], rho[2], decay;
+    double cell_size, origin[3], gravity[3], rho[2], decay, warmth[7];
+    int32_t isothermal[7], unused;      /* walls, air */
     double time, last_dt; uint64_t steps;
     uint32_t next_id; int32_t afresh, unsorted, unseen, unturned;
     double min_mass, fastest, shift;
@@ -8074,6 +8102,8 @@ static void gs4i_head_of(const gs4_sim *sim, gs4i_head *h)
     h->origin[0] = (double)d->origin.x; h->origin[1] = (double)d->origin.y; h->origin[2] = (double)d->origin.z;
     h->gravity[0] = (double)d->gravity.x; h->gravity[1] = (double)d->gravity.y; h->gravity[2] = (double)d->gravity.z;
     h->rho[0] = (double)d->rho_inf; h->rho[1] = (double)d->rho_inf_spurious; h->decay = (double)d->flip_decay_time;
+    for (i = 0; i < 6; i++) { h->warmth[i] = (double)d->wall_temperature[i]; h->isothermal[i] = d->wall_is_isothermal[i] != 0; }
+    h->warmth[6] = (double)d->ambient_temperature; h->isothermal[6] = d->air_is_isothermal != 0;
     h->time = sim->time; h->last_dt = sim->last_dt; h->steps = sim->steps;
     h->next_id = sim->next_id; h->afresh = sim->afresh; h->unsorted = sim->unsorted; h->unseen = sim->unseen; h->unturned = sim->unturned;
     h->min_mass = (double)sim->min_mass; h->fastest = (double)sim->fastest; h->shift = (double)sim->shift;
@@ -8124,7 +8154,8 @@ static int gs4i_check_head(gs4_sim *sim, const gs4i_head *h)
     if (memcmp(h->cells, own.cells, sizeof h->cells) || memcmp(h->walls, own.walls, sizeof h->walls) || h->integrator != own.integrator
         || memcmp(&h->cell_size, &own.cell_size, sizeof h->cell_size) || memcmp(h->origin, own.origin, sizeof h->origin)
         || memcmp(h->gravity, own.gravity, sizeof h->gravity) || memcmp(h->rho, own.rho, sizeof h->rho)
-        || memcmp(&h->decay, &own.decay, sizeof h->decay))
+        || memcmp(&h->decay, &own.decay, sizeof h->decay) || memcmp(h->warmth, own.warmth, sizeof h->warmth)
+        || memcmp(h->isothermal, own.isothermal, sizeof h->isothermal))
         return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint belongs to a simulation with another description");
     if (h->materials != own.materials || h->bodies != own.bodies || h->emitters != own.emitters || h->elastic_reals != own.elastic_reals
         || h->deformation_reals != own.deformation_reals || h->with_heat != own.with_heat || h->with_flux != own.with_flux)
@@ -8179,7 +8210,8 @@ static int gs4i_same_scene(const gs4_sim *sim, const gs4i_pieces *p)
         memcpy(&there, p->at[GS4I_PIECE_BODIES] + (size_t)i * sizeof there, sizeof there);
         gs4i_forget_pointers(&there.is.shape); gs4i_forget_pointers(&here.is.shape);
         if (memcmp(&there.is.shape, &here.is.shape, sizeof here.is.shape) || there.is.contact != here.is.contact || there.is_mouth != here.is_mouth
-            || memcmp(&there.is.friction, &here.is.friction, sizeof here.is.friction)) return 0;
+            || memcmp(&there.is.friction, &here.is.friction, sizeof here.is.friction) || memcmp(&there.is.temperature, &here.is.temperature, sizeof here.is.temperature)
+            || there.is.is_isothermal != here.is.is_isothermal) return 0;
     }
     for (i = 0; i < sim->emitter_count; i++) {
         gs4i_emitter there, here = sim->emitters[i];
@@ -8198,6 +8230,8 @@ static void gs4i_restore_scene(gs4_sim *sim, const gs4i_pieces *p)
         memcpy(l, p->at[GS4I_PIECE_LAWS] + (size_t)i * sizeof *l, sizeof *l);
         l->viscosity_fn = here.viscosity_fn; l->viscosity_user = here.viscosity_user;
         l->is.viscosity_fn = here.is.viscosity_fn; l->is.viscosity_user = here.is.viscosity_user;
+        sim->frozen[i] = *l;
+        gs4i_freeze_law(&sim->frozen[i]);
     }
     for (i = 0; i < sim->boundary.body_count; i++) {
         gs4i_body here = sim->boundary.bodies[i], *b = &sim->boundary.bodies[i];
@@ -8618,6 +8652,7 @@ static int gs4i_has_heat(const gs4_material *m) { return m->conductivity > 0 || 
 
 static int gs4i_check_heat(gs4_sim *sim, const gs4_material *m)
 {
+    int i;
     GS4I_TRY(gs4i_check(sim, "heat_capacity", m->heat_capacity, GS4I_NOT_NEGATIVE));
     GS4I_TRY(gs4i_check(sim, "conductivity", m->conductivity, GS4I_NOT_NEGATIVE));
     GS4I_TRY(gs4i_check(sim, "flux_relaxation_time", m->flux_relaxation_time, GS4I_NOT_NEGATIVE));
@@ -8632,6 +8667,9 @@ static int gs4i_check_heat(gs4_sim *sim, const gs4_material *m)
         return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "flux_relaxation_time is ", (double)m->flux_relaxation_time, "; it must be 0 (Fourier) or from 1e-15 to 1e15 s");
     if (m->heat_capacity == 0 && (gs4i_has_heat(m) || sim->particles.with_heat))
         return gs4i_bad_argument(sim, "heat_capacity is 0; every material of a scene with heat needs one above 0, J/(kg K)");
+    for (i = 0; i < sim->material_count && gs4i_has_heat(m); i++)
+        if (sim->laws[i].is.heat_capacity == 0)
+            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "heat_capacity of material ", i, " is 0; with this material the scene has heat, and every material needs one above 0");
     if (m->flux_relaxation_time > 0 && m->conductivity == 0)
         return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "flux_relaxation_time is ", (double)m->flux_relaxation_time, "; without conductivity there is no flux, leave it 0");
     if (!m->can_melt) {
@@ -8912,21 +8950,17 @@ static int gs4i_make_heat(gs4_sim *sim, const gs4_material *material)
     gs4_real *made[3] = { NULL, NULL, NULL };
     uint8_t *liquid = NULL;
     int i;
-    for (i = 0; i < sim->material_count; i++)
-        if (sim->laws[i].is.heat_capacity == 0)
-            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "heat_capacity of material ", i, " is 0; with this material the scene has heat, and every material needs one above 0");
     if (p->capacity) {
         if (heat) { made[0] = (gs4_real *)gs4i_alloc(&sim->memory, room, each); liquid = (uint8_t *)gs4i_alloc(&sim->memory, room, 1); }
         if (flux) { made[1] = (gs4_real *)gs4i_alloc(&sim->memory, room, each); made[2] = (gs4_real *)gs4i_alloc(&sim->memory, room, each); }
         if ((heat && (!made[0] || !liquid)) || (flux && (!made[1] || !made[2]))) {
             for (i = 0; i < 3; i++) gs4i_free(&sim->memory, made[i], room, each);
             gs4i_free(&sim->memory, liquid, room, 1);
-            return gs4i_fail_memory(sim);
+            return GS4_ERROR_MEMORY;
         }
     }
     if (heat) { p->heat = made[0]; p->liquid = liquid; p->with_heat = 1; }
     for (i = 0; i < p->count && heat; i++) gs4i_begin_heat(p, (size_t)i, &sim->laws[p->material[i]], sim->desc.ambient_temperature);
-    for (i = 0; i < 4 * p->count && flux; i++) made[1][i] = made[2][i] = 0;
     if (flux) { p->flux = made[1]; p->flux_rate = made[2]; p->with_flux = 1; }
     sim->conduction.heats |= material->viscous_heating != 0;
     sim->unsorted = 1;                                      /* nodes need room for it, too */
@@ -8946,6 +8980,21 @@ static int gs4i_make_deformation(gs4_sim *sim)
     return GS4_OK;
 }
 
+/* All that particles carry from this material on, or nothing of it. */
+static int gs4i_make_history(gs4_sim *sim, const gs4_material *material)
+{
+    gs4i_particles *p = &sim->particles;
+    const gs4i_particles before = *p;
+    int result = material->liquid != GS4_NEWTONIAN ? gs4i_make_elastic(sim) : GS4_OK;
+    if (result == GS4_OK && material->solid != GS4_NO_SOLID) result = gs4i_make_deformation(sim);
+    if (result == GS4_OK && gs4i_has_heat(material)) result = gs4i_make_heat(sim, material);
+    if (result == GS4_OK) return GS4_OK;
+    if (p->elastic != before.elastic) gs4i_free(&sim->memory, p->elastic, (size_t)p->capacity + 1, (size_t)p->elastic_reals * sizeof(gs4_real));
+    if (p->deformation != before.deformation) gs4i_free(&sim->memory, p->deformation, (size_t)p->capacity + 1, (size_t)p->deformation_reals * sizeof(gs4_real));
+    *p = before;
+    return result;
+}
+
 GS4_API int gs4_add_material(gs4_sim *sim, const gs4_material *material)
 {
     if (!sim) return GS4_ERROR_ARGUMENT;
@@ -8954,9 +9003,7 @@ GS4_API int gs4_add_material(gs4_sim *sim, const gs4_material *material)
     if (sim->material_count == 256) return gs4i_bad_argument(sim, "there are 256 materials already, which is all there can be");
     GS4I_TRY(gs4i_grow(sim, (void **)&sim->laws, sim->material_count, &sim->material_capacity, sizeof *sim->laws));
     GS4I_TRY(gs4i_grow(sim, (void **)&sim->frozen, sim->material_count, &sim->frozen_capacity, sizeof *sim->frozen));
-    if (material->liquid != GS4_NEWTONIAN && gs4i_make_elastic(sim) != GS4_OK) return gs4i_fail_memory(sim);
-    if (material->solid != GS4_NO_SOLID && gs4i_make_deformation(sim) != GS4_OK) return gs4i_fail_memory(sim);
-    if (gs4i_has_heat(material)) GS4I_TRY(gs4i_make_heat(sim, material));
+    if (gs4i_make_history(sim, material) != GS4_OK) return gs4i_fail_memory(sim);
     sim->laws[sim->material_count++].is = *material;
     gs4i_set_laws(sim);
     return sim->material_count - 1;
@@ -9533,6 +9580,11 @@ static int gs4i_make_point_batch(gs4_sim *fake, const gs4_material *material, co
         for (i = 0; i < 9; i++) GS4I_NTH(q->L[i / 3][i % 3], n) = L[i];
         for (i = 0; i < 6; i++) { GS4I_NTH(q->e.s[i], n) = point->stress[i]; GS4I_NTH(q->e.rate[i], n) = point->stress_rate[i]; }
     }
+    if (q->law.varies) {
+        const gs4_real mu = gs4i_viscosity_of(&q->law, point->temperature, q->L, 0);
+        if (!(mu >= 0 && mu < GS4I_HUGE))
+            return gs4i_fail_value(fake, GS4_ERROR_ARGUMENT, "the viscosity at this temperature and shear rate is ", (double)mu, "; it must be 0 or a finite number above that is not absurdly large");
+    }
     gs4i_take_elastic_laws(&q->laws, &q->past.elastic);
     return gs4i_take_solid_laws(&q->laws, &q->past.solid) ? gs4i_take_point_deformation(fake, point->deformation, q) : GS4_OK;
 }
@@ -9749,6 +9801,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_GREATER
 #undef GS4I_HUGE
 #undef GS4I_INLINE
+#undef GS4I_INSULATES
 #undef GS4I_IS_LIQUID
 #undef GS4I_IS_OPEN
 #undef GS4I_J_HIGH

@@ -47,6 +47,8 @@ int main(int count, char **values)
     RUN(test_heat_of_viscosity);
     RUN(test_phase_freezing);
     RUN(test_phase_melting);
+    RUN(test_heat_rims);
+    RUN(test_heat_full_box);
     run_solid();
     run_errors();
     run_files();

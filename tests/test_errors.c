@@ -752,6 +752,64 @@ static void test_errors_edit_then_add(void)
     }
 }
 
+/* A material that asks for more than the scene can have leaves nothing of itself behind: here everything a particle can carry. */
+static void test_errors_material_all_or_nothing(void)
+{
+    gs4_sim *sim = err_scene();
+    gs4_material m = err_material();
+    const uint64_t before = gs4_get_stats(sim).memory_bytes;
+    m.liquid = GS4_OLDROYD_B; m.relaxation_time = 1; m.solid = GS4_NEO_HOOKEAN; m.shear_modulus = 100;
+    m.can_melt = 1; m.heat_capacity = 1000; m.conductivity = 1; m.flux_relaxation_time = 1;
+    ERR_REFUSED(sim, gs4_add_material(sim, &m), GS4_ERROR_ARGUMENT, "heat_capacity of material 0");
+    CHECK(gs4_particles(sim, GS4_FIELD_STRESS).data == NULL && gs4_particles(sim, GS4_FIELD_DEFORMATION).data == NULL && gs4_particles(sim, GS4_FIELD_TEMPERATURE).data == NULL);
+    CHECK(gs4_get_stats(sim).memory_bytes == before);
+    CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)0.01), 0);
+    gs4_destroy(sim);
+}
+
+/* --- one point ------------------------------------------------------------------------------------------ */
+
+static gs4_real err_viscosity_of_heat(gs4_real temperature, gs4_real rate, void *user)
+{
+    (void)rate; (void)user;
+    return (gs4_real)((double)temperature > 100 ? ERR_NAN : (double)temperature > 50 ? -1 : 0.5);
+}
+
+/* Stress of a point at a temperature for which its material has no viscosity: said, never given. And a material that can melt goes by temperature. */
+static void test_errors_point(void)
+{
+    static const struct { double T; int r; } at_T[6] = { { 20, 0 }, { 60, -1 }, { 101, -1 }, { 48.4, -1 }, { 48.3, -1 }, { 100, 0 } };
+    const gs4_real shear[9] = { 0, 1, 0, 0, 0, 0, 0, 0, 0 };
+    gs4_real sigma[6];
+    gs4_point p;
+    gs4_material m;
+    int i, elastic;
+    for (i = 0; i < 6; i++) for (elastic = 0; elastic < 2; elastic++) {
+        m = err_material();
+        m.heat_capacity = 1; m.conductivity = 1;
+        if (i < 3) { m.viscosity_law = GS4_VISCOSITY_CALLBACK; m.viscosity_fn = err_viscosity_of_heat; }
+        else m.viscosity_law = GS4_VISCOSITY_CROSS_WLF;
+        if (elastic) { m.liquid = GS4_OLDROYD_B; m.relaxation_time = 1; }
+        memset(&p, 0, sizeof p); memset(sigma, 0, sizeof sigma);
+        p.temperature = (gs4_real)at_T[i].T;
+        CHECK_RESULT(NULL, gs4_point_stress(&m, &p, shear, sigma), at_T[i].r);
+        if (at_T[i].r) CHECK(strstr(gs4_last_error(NULL), "viscosity") != NULL && (double)sigma[3] == 0);
+        CHECK_RESULT(NULL, gs4_point_step(&m, &p, shear, (gs4_real)0.01, 0, 0), at_T[i].r);
+        if (at_T[i].r) CHECK(strstr(gs4_last_error(NULL), "viscosity") != NULL && (double)p.stress[3] == 0);
+    }
+    for (i = 0; i < 3; i++) {                               /* below, at and above T_m: solid, solid, liquid */
+        const double turned = i < 2 ? 100 * 0.01 : 0.1;
+        m = err_material();
+        m.heat_capacity = 1; m.can_melt = 1; m.melting_temperature = 7; m.latent_heat = 3; m.solid = GS4_NEO_HOOKEAN; m.shear_modulus = 100;
+        memset(&p, 0, sizeof p);
+        p.temperature = (gs4_real)(6 + i);
+        CHECK_RESULT(NULL, gs4_point_step(&m, &p, shear, (gs4_real)0.01, 0, 0), 0);
+        CHECK_RESULT(NULL, gs4_point_stress(&m, &p, shear, sigma), 0);
+        CHECK_CLOSE(sigma[3], turned, 1e-3 * turned);
+        CHECK_CLOSE(p.deformation[1], i < 2 ? 0.01 : 0, 1e-6);
+    }
+}
+
 /* --- steps ---------------------------------------------------------------------------------------------- */
 
 typedef struct err_law { int calls; gs4_real value; } err_law;
@@ -983,6 +1041,8 @@ static void run_errors(void)
     RUN(test_errors_edit);
     RUN(test_errors_edit_repaired);
     RUN(test_errors_edit_then_add);
+    RUN(test_errors_material_all_or_nothing);
+    RUN(test_errors_point);
     RUN(test_errors_refused_step);
     RUN(test_errors_viscosity_callback);
     RUN(test_errors_no_end);

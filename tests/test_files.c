@@ -634,6 +634,32 @@ static void test_files_continue(void)
     }
 }
 
+/* The sound speed that a scene has chosen for itself holds for what is frozen, too. */
+static void test_files_continue_frozen(void)
+{
+    gs4_sim_desc d = scene_cube(8);
+    gs4_material m = scene_liquid(1000, 1, 0);
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    gs4_sim *sim, *other;
+    gs4_edit v;
+    int i;
+    d.gravity = at(0, -10, 0);
+    m.heat_capacity = 1000; m.conductivity = 1; m.can_melt = 1; m.solid = GS4_NEO_HOOKEAN; m.shear_modulus = 1000; f.temperature = -5;
+    CHECK(gs4_create(&d, &sim) == GS4_OK && gs4_create(&d, &other) == GS4_OK);
+    CHECK_RESULT(sim, gs4_add_material(sim, &m), 0); CHECK_RESULT(other, gs4_add_material(other, &m), 0);
+    CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0.2, 0, 0.2), at(0.7, 0.5, 0.7)), &f), 0);
+    CHECK_RESULT(sim, files_steps(sim, 5), 0);
+    v = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
+    for (i = 0; i < v.count; i++) v.data[i * v.stride + 1] -= 20;
+    CHECK_RESULT(sim, gs4_step(sim, (gs4_real)1e-4), 0);
+    CHECK_RESULT(sim, gs4_save(sim, files_path("f.sav")), 0);
+    CHECK_RESULT(other, gs4_load(other, files_path("f.sav")), 0);
+    CHECK_RESULT(sim, files_steps(sim, 20), 0); CHECK_RESULT(other, files_steps(other, 20), 0);
+    CHECK(gs4_state_hash(sim) == gs4_state_hash(other));
+    remove(files_path("f.sav"));
+    gs4_destroy(sim); gs4_destroy(other);
+}
+
 /* After something was changed by hand, and while particles leave. */
 static void test_files_continue_edited(void)
 {
@@ -795,7 +821,7 @@ static void test_files_other_desc(void)
     unsigned char *data;
     CHECK_RESULT(from, files_steps(from, 5), 0);
     CHECK_RESULT(from, gs4_save(from, files_path("d.sav")), 0);
-    for (which = 0; which < 11; which++) {
+    for (which = 0; which < 15; which++) {
         gs4_sim_desc o = files_desc(0);
         gs4_sim *sim;
         switch (which) {
@@ -809,6 +835,10 @@ static void test_files_other_desc(void)
         case 7: o.rho_inf = (gs4_real)0.7; break;
         case 8: o.rho_inf_spurious = (gs4_real)0.3; break;
         case 9: o.flip_decay_time = (gs4_real)0.2; break;
+        case 10: o.wall_temperature[4] = 1; break;
+        case 11: o.wall_is_isothermal[4] = 1; break;
+        case 12: o.ambient_temperature = 1; break;
+        case 13: o.air_is_isothermal = 1; break;
         default: o = files_desc(1); break;                  /* the other integrator */
         }
         sim = files_scene(&o);
@@ -908,6 +938,7 @@ static void run_files(void)
     RUN(test_files_places);
     RUN(test_files_previous);
     RUN(test_files_continue);
+    RUN(test_files_continue_frozen);
     RUN(test_files_continue_edited);
     RUN(test_files_bad_edit);
     RUN(test_files_damaged);

@@ -424,3 +424,78 @@ static void test_phase_melting(void)
         gs4_destroy(sim);
     }
 }
+
+/* --- what nobody would put in ------------------------------------------------------------------------- */
+
+static int heat_view_is_finite(const gs4_sim *sim, gs4_field field)
+{
+    const gs4_view v = gs4_particles(sim, field);
+    int i, c;
+    for (i = 0; i < v.count; i++)
+        for (c = 0; c < v.components; c++) if (!(fabs((double)v.data[(size_t)i * (size_t)v.stride + (size_t)c]) < (sizeof(gs4_real) == 8 ? 1e200 : 1e37))) return 0;
+    return 1;
+}
+
+static int heat_is_finite(const gs4_sim *sim)
+{
+    int field;
+    for (field = 0; field <= GS4_FIELD_MASS; field++) if (!heat_view_is_finite(sim, (gs4_field)field)) return 0;
+    return 1;
+}
+
+/* Nodes with next to no mass, at the rim of what a particle reaches, must not stop a scene: beside an insulator (whose faces there let
+ * 1e-31 of the others through, in double), nor in isothermal air (where what they show has no square, in float). */
+static void test_heat_rims(void)
+{
+    gs4_sim_desc d = scene_cube(8);
+    gs4_material m = scene_liquid(1000, 0, 10), insulator;
+    gs4_fill f = scene_fill(at(0.3, 0, 0.1));
+    gs4_sim *sim;
+    int i, seed, result;
+    m.heat_capacity = 1000; m.conductivity = 50;
+    insulator = m; insulator.conductivity = 0;
+    d.gravity = at(0, -10, 0);
+    for (seed = 5; seed < (test_slow ? 60 : 8); seed++) {
+        sim = physics_create(&d, &m);
+        CHECK_RESULT(sim, gs4_add_material(sim, &insulator), GS4_OK);
+        f.jitter = 1; f.random_seed = (uint32_t)seed;
+        f.material = 0; f.temperature = 100;
+        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0.2, 0.2, 0.2), at(0.5, 0.7, 0.7)), &f), GS4_OK);
+        f.material = 1; f.temperature = 0;
+        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0.5, 0.2, 0.2), at(0.8, 0.7, 0.7)), &f), GS4_OK);
+        for (result = GS4_OK, i = 0; i < 40 && result == GS4_OK; i++) CHECK_RESULT(sim, result = gs4_step(sim, (gs4_real)0.5 * gs4_stable_dt(sim)), GS4_OK);
+        gs4_destroy(sim);
+    }
+    d.air_is_isothermal = 1;
+    for (i = 0; i < 2; i++) {
+        const gs4_real x[6] = { (gs4_real)0.51, (gs4_real)0.52, (gs4_real)0.53, (gs4_real)0.25, (gs4_real)0.25, (gs4_real)0.25 };
+        sim = physics_create(&d, &m);
+        f.material = 0; f.temperature = 100;
+        CHECK_RESULT(sim, gs4_add_points(sim, x, 2, (gs4_real)(i ? 1e-16 : 1e-6), &f), GS4_OK);
+        for (seed = 0; seed < 20; seed++) CHECK_RESULT(sim, gs4_step(sim, (gs4_real)0.1 * gs4_stable_dt(sim)), GS4_OK);
+        CHECK(heat_is_finite(sim) && gs4_get_stats(sim).max_temperature <= 100.01 && gs4_get_stats(sim).min_temperature >= -0.01);
+        gs4_destroy(sim);
+    }
+}
+
+/* Where there is no surface isothermal air takes nothing: a box that is full to its walls, or to itself around. */
+static void test_heat_full_box(void)
+{
+    int around, i;
+    for (around = 0; around < 2; around++) {
+        gs4_sim_desc d = scene_cube(9);
+        gs4_material m = scene_liquid(1000, 0, 10);
+        gs4_fill f = scene_fill(at(0, 0, 0));
+        gs4_sim *sim;
+        double before;
+        d.air_is_isothermal = 1;
+        for (i = 0; i < 6 && around; i++) d.walls[i] = GS4_WALL_PERIODIC;
+        m.heat_capacity = 1000; m.conductivity = 1e5; f.temperature = 100; f.jitter = 1;
+        sim = physics_create(&d, &m);
+        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1, 1, 1)), &f), GS4_OK);
+        before = gs4_get_stats(sim).thermal_energy;
+        for (i = 0; i < 20; i++) CHECK_RESULT(sim, gs4_step(sim, (gs4_real)1e-3), GS4_OK);
+        CHECK_CLOSE(gs4_get_stats(sim).thermal_energy / before, 1, 1e-5);
+        gs4_destroy(sim);
+    }
+}

@@ -29,14 +29,20 @@
 #include <time.h>
 #include <unistd.h>
 
-typedef enum example_colour { EXAMPLE_PLAIN = 0, EXAMPLE_MATERIAL, EXAMPLE_SPEED } example_colour;
+typedef enum example_colour { EXAMPLE_PLAIN = 0, EXAMPLE_MATERIAL, EXAMPLE_SPEED, EXAMPLE_TEMPERATURE } example_colour;
+
+/* For EXAMPLE_TEMPERATURE, where look.palette is not set: what is solid is grey, what is liquid has a colour. */
+static const float example_melt[6][3] = {{0.33f, 0.42f, 0.56f}, {0.45f, 0.49f, 0.57f}, {0.57f, 0.54f, 0.55f},
+                                         {0.86f, 0.24f, 0.16f}, {0.97f, 0.55f, 0.13f}, {1.00f, 0.90f, 0.42f}};
 
 typedef struct example {
     const char *name, *out;             /* files are OUT/NAME_0001.png; no `out`: the directory "out" */
     int frames, cells, threads;         /* threads 0: two */
     int row, rows;                      /* of a table of materials: --row 1 to rows, in the names of files too; rows 0: no such option */
     double frame_time;                  /* s from frame to frame; 0: 1/30 */
-    example_colour colour;              /* what the pictures show: one colour, the number of the material, or the speed */
+    example_colour colour;              /* what the pictures show: one colour, the number of the material, the speed or the temperature */
+    double melting;                     /* EXAMPLE_TEMPERATURE: 40 % of the palette go from look.low to this, solid, 20 % from solid to
+                                           liquid, 40 % from this to look.high: very nearly enthalpy, which stays in order where it is blurred */
     preview_settings look;
     int frame;                          /* how many are done */
     double pace;                        /* s of waiting a frame, of late */
@@ -119,11 +125,28 @@ static gs4_sim *example_create(const example *e, gs4_sim_desc *desc)
     return sim;
 }
 
+static double example_share(double x, double low, double high) { return fmax(0, fmin(1, (x - low) / (high - low))); }
+
+/* What the colour stands for, a number a particle; NULL: out of memory. */
+static gs4_real *example_numbers(const example *e, gs4_sim *sim)
+{
+    const gs4_view T = gs4_particles(sim, GS4_FIELD_TEMPERATURE), liquid = gs4_particles(sim, GS4_FIELD_LIQUID_FRACTION);
+    const uint8_t *material = gs4_particle_materials(sim);
+    const int count = gs4_get_stats(sim).particles;
+    gs4_real *number = (gs4_real *)malloc((size_t)count * sizeof *number);
+    for (int i = 0; number && i < count; ++i) {
+        if (e->colour == EXAMPLE_MATERIAL) { number[i] = (gs4_real)material[i]; continue; }
+        number[i] = real(0.4 * example_share((double)T.data[i * T.stride], (double)e->look.low, e->melting)
+                       + 0.2 * (double)liquid.data[i * liquid.stride]
+                       + 0.4 * example_share((double)T.data[i * T.stride], e->melting, (double)e->look.high));
+    }
+    return number;
+}
+
 static void example_write(const example *e, gs4_sim *sim)
 {
     gs4_view x = gs4_particles(sim, GS4_FIELD_POSITION), v = gs4_particles(sim, GS4_FIELD_VELOCITY);
-    const uint8_t *material = gs4_particle_materials(sim);
-    gs4_real *number = NULL;
+    preview_settings look = e->look;
     char path[1024], row[16] = "";
     int failed = 0;
     if (!x.count) return;
@@ -131,15 +154,18 @@ static void example_write(const example *e, gs4_sim *sim)
     sprintf(path, "%.900s/%.64s%s_%04d.ply", e->out, e->name, row, e->frame);
     example_need(sim, gs4_write_ply(sim, path));
     strcpy(strrchr(path, '.'), ".png");
-    if (e->colour == EXAMPLE_MATERIAL) {
-        number = (gs4_real *)malloc((size_t)x.count * sizeof *number);
-        for (int i = 0; number && i < x.count; ++i) number[i] = (gs4_real)material[i];
-        failed = !number ? 2 : preview_write_png(path, &e->look, x.count, x.data, x.stride, number, 1, 1);
+    if (e->colour == EXAMPLE_TEMPERATURE) {
+        look.low = 0; look.high = 1;
+        if (!look.palette) { look.palette = example_melt; look.palette_count = 6; }
+    }
+    if (e->colour == EXAMPLE_MATERIAL || e->colour == EXAMPLE_TEMPERATURE) {
+        gs4_real *number = example_numbers(e, sim);
+        failed = !number ? 2 : preview_write_png(path, &look, x.count, x.data, x.stride, number, 1, 1);
         free(number);
     } else if (e->colour == EXAMPLE_SPEED)
-        failed = preview_write_png(path, &e->look, x.count, x.data, x.stride, v.data, v.components, v.stride);
+        failed = preview_write_png(path, &look, x.count, x.data, x.stride, v.data, v.components, v.stride);
     else
-        failed = preview_write_png(path, &e->look, x.count, x.data, x.stride, NULL, 0, 0);
+        failed = preview_write_png(path, &look, x.count, x.data, x.stride, NULL, 0, 0);
     if (failed) { fprintf(stderr, "\n%s: %s\n", path, failed == 1 ? "cannot be written" : "out of memory"); exit(1); }
 }
 

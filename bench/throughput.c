@@ -1,5 +1,5 @@
 /* Nanoseconds a particle and step: one block of a million particles, 8 a cell, settled and stirred, GS4 and symplectic Euler,
- * beside a textbook MLS-MPM loop (plain_mpm.c) in the same run; then viscoelastic liquids, solids, threads, and what an empty domain around costs.
+ * beside a textbook MLS-MPM loop (plain_mpm.c) in the same run; then viscoelastic liquids, solids, melting, solids, threads, and what an empty domain around costs.
  *   cc -O3 -march=native bench/throughput.c -I. -lm -lpthread -o throughput && ./throughput [--particles N] [--steps N] [--repeats N]
  * CSV on standard output. */
 #define _POSIX_C_SOURCE 200112L
@@ -39,6 +39,27 @@ static gs4_sim *scene(int edge, const int cells[3], gs4_integrator integrator, g
             v.data[(size_t)a * (size_t)v.stride + 2] = (gs4_real)(-6 * ((double)p[0] - 0.5));
         }
     }
+    return sim;
+}
+
+/* The block in a corner of 128^3 cells or more, its upper quarter molten: with `solid` GS4_NO_SOLID what is frozen flows, too. */
+static gs4_sim *melting_scene(int edge, gs4_solid solid)
+{
+    const int n = edge < 128 ? 128 : edge, top = edge * 3 / 4;
+    gs4_sim_desc d = scene_cube(edge);
+    gs4_material m = scene_liquid(1000, 1, 30);
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    gs4_sim *sim;
+    d.cells[0] = d.cells[1] = d.cells[2] = n;
+    d.gravity = at(0, -9.81, 0); d.now = bench_now; d.max_particles = 8 * edge * edge * edge;
+    if (gs4_create(&d, &sim) < 0) { puts(gs4_last_error(NULL)); exit(1); }
+    m.heat_capacity = 2000; m.conductivity = (gs4_real)0.5; m.can_melt = 1; m.melting_temperature = 30; m.latent_heat = (gs4_real)1e5;
+    m.solid = solid; m.shear_modulus = solid == GS4_NO_SOLID ? 0 : (gs4_real)1e4;
+    if (gs4_add_material(sim, &m) < 0) { puts(gs4_last_error(sim)); exit(1); }
+    f.jitter = (gs4_real)0.2; f.random_seed = 1; f.temperature = 20;
+    if (gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1, (double)top / edge, 1)), &f) < 0) { puts(gs4_last_error(sim)); exit(1); }
+    f.temperature = 60;
+    if (gs4_add_particles(sim, gs4_box(at(0, (double)top / edge, 0), at(1, 1, 1)), &f) < 0) { puts(gs4_last_error(sim)); exit(1); }
     return sim;
 }
 
@@ -97,7 +118,7 @@ static double plain(const char *name, int edge, int stirred, int steps, int repe
 int main(int count, char **values)
 {
     int particles = 1000000, steps = 5, repeats = 7, i, edge = 4;
-    double gs4[2], euler[2], text[2], elastic[2], solid[3], two;
+    double gs4[2], euler[2], text[2], elastic[2], solid[3], melting[2], two;
     for (i = 1; i + 1 < count; i += 2) {
         if (strcmp(values[i], "--particles") == 0) particles = atoi(values[i + 1]);
         else if (strcmp(values[i], "--steps") == 0) steps = atoi(values[i + 1]);
@@ -119,12 +140,15 @@ int main(int count, char **values)
         solid[0] = report("gs4 neo-Hookean settled", scene(edge, snug, GS4_INTEGRATOR_GS4, GS4_NEWTONIAN, GS4_NEO_HOOKEAN, 1, 0), steps, repeats);
         solid[1] = report("gs4 fixed-corotated settled", scene(edge, snug, GS4_INTEGRATOR_GS4, GS4_NEWTONIAN, GS4_FIXED_COROTATED, 1, 0), steps, repeats);
         solid[2] = report("euler neo-Hookean settled", scene(edge, snug, GS4_INTEGRATOR_SYMPLECTIC_EULER, GS4_NEWTONIAN, GS4_NEO_HOOKEAN, 1, 0), steps, repeats);
+        melting[0] = report("gs4 melting, all flows", melting_scene(edge, GS4_NO_SOLID), steps, repeats);
+        melting[1] = report("gs4 melting, neo-Hookean below", melting_scene(edge, GS4_NEO_HOOKEAN), steps, repeats);
         two = report("gs4 settled two threads", scene(edge, snug, GS4_INTEGRATOR_GS4, GS4_NEWTONIAN, GS4_NO_SOLID, 2, 0), steps, repeats);
     }
     printf("# textbook over gs4: settled %.2f, stirred %.2f; over symplectic Euler: %.2f, %.2f; two threads %.2f times one\n",
            text[0] / gs4[0], text[1] / gs4[1], text[0] / euler[0], text[1] / euler[1], gs4[0] / two);
     printf("# over a Newtonian step: Oldroyd-B %.2f, Pom-Pom %.2f, neo-Hookean %.2f, fixed-corotated %.2f; symplectic Euler: neo-Hookean %.2f\n",
            elastic[0] / gs4[0], elastic[1] / gs4[0], solid[0] / gs4[0], solid[1] / gs4[0], solid[2] / euler[0]);
+    printf("# a quarter of it molten: %.2f with heat alone, %.2f with solids below the melting point\n", melting[0] / gs4[0], melting[1] / gs4[0]);
     {
         const int small[3] = { 20, 20, 20 }, huge[3] = { 512, 256, 256 };
         const double a = report("50 k snug", scene(18, small, GS4_INTEGRATOR_GS4, GS4_NEWTONIAN, GS4_NO_SOLID, 1, 0), 4 * steps, repeats);

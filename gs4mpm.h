@@ -102,6 +102,7 @@
  *         sum w (T~_i - T**_i) / s; x
  *         by (4) with dx/dt = U; w by (4) with dw/dt = curl(A - grad u grad u)/2 - (w - curl u/2) / flip_decay_time
  *     S8  bodies move, nozzles give, leavers go
+ * What (v - U) / flip_decay_time takes from motion that the grid does see is small: as much as a kinematic viscosity of h^2 / (4 flip_decay_time).
  * Before S7 nothing of the state has changed. When the nodes cannot prove that S7 is safe it is rehearsed; if a particle would
  * leave 1/16 < J < 16, move more than two cells or become non-finite, the step is refused and the last good state stays.
  *

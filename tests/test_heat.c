@@ -76,7 +76,7 @@ static void test_heat_modes(void)
             if (test_filter[0]) printf("F %g tau %g, %s: error %.2e, %.2e with twice the cells, flux %.2e\n", bar.F, bar.tau, i ? "Euler" : "GS4", coarse - exact, fine - exact, flux - exact_flux);
             CHECK(fabs(fine - exact) < 0.002);
             CHECK(log2(fabs(coarse - exact) / fabs(fine - exact)) > 1.8);
-            CHECK_CLOSE(flux, exact_flux, 0.005 * exact_flux);          /* half a per cent at 32 cells a wave */
+            CHECK_CLOSE(flux, exact_flux, (i ? 0.007 : 0.005) * exact_flux);     /* half a per cent at 32 cells a wave; Euler: and of first order in dt */
         }
 }
 

@@ -15,7 +15,7 @@ full='warnings tsan hashes asan arm hashes_double wasm windows tiny musl i386 la
 # A transfer kernel may be longer than 60 lines; nothing else.
 long_functions=''
 # Tests of tests/main.c that run on foreign machines too: parts of their names. All of them run where it costs no more than here.
-few_tests='free_flight files error'
+few_tests='free_flight files_continue errors_desc errors_fill solid_stress poisson_shapes heat_walls phase_freezing'
 # What the library may ask of libc; all of libm is allowed, and with GS4_PTHREADS what is named here.
 libc='malloc|free|mem(cpy|move|set|cmp)|str(len|cmp|chr)|f(open|close|read|write|flush|error)|rename|remove|stat|__assert_fail'
 pthreads='pthread_((mutex|cond)_[a-z]+|create|join)'

@@ -2,8 +2,8 @@
  *     cc -O3 -march=native examples/chocolate_stream.c -Iexamples -I. -lm -lpthread -o chocolate_stream
  *     ./chocolate_stream                  pictures and particles in out/
  *
- * After figure 10 of "Augmented MPM" (2014). The stream has 70 degrees, the bunny 5, both melt at 34: the stream eats into the head and
- * freezes on the flanks and on the cold plate. Greys are solid, from cold to warm, colours liquid. Chocolate conducts 600 times too
+ * After figure 10 of "Augmented MPM" (2014). The stream has 70 degrees, the bunny 5, both melt at 34: the stream eats into the bunny and
+ * freezes on the plate, which has 0. Greys are solid, from cold to warm, colours liquid. Chocolate conducts 600 times too
  * well here. */
 #include "example.h"
 #include "bunny.h"

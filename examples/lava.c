@@ -21,7 +21,7 @@ int main(int argc, char **argv)
     gs4_emitter spring = {0};
     preview_solid things[SLABS] = {{0}};
     gs4_sim *sim;
-    e.name = "lava"; e.frames = 56; e.cells = 48; e.frame_time = 0.6;
+    e.name = "lava"; e.frames = 50; e.cells = 40; e.frame_time = 0.6;
     example_options(&e, argc, argv);
 
     desc.cell_size = real(length / e.cells);

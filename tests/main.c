@@ -49,6 +49,8 @@ int main(int count, char **values)
     RUN(test_phase_melting);
     RUN(test_heat_rims);
     RUN(test_heat_full_box);
+    RUN(test_heat_uneven_steps);
+    RUN(test_heat_draws);
     run_solid();
     run_errors();
     run_files();

@@ -3,6 +3,7 @@
  *   scene=bunny    eight bunnies thrown on each other in a box, and a stamp on them, instead
  *   elastic=1      both liquids of the block viscoelastic; needs the same libm, too
  *   solid=1        the block an elastic solid, and what the nozzle gives a plastic one; the same
+ *   heat=1         the block frozen, its flux lagging behind, between warm walls and a hot ball; what the nozzle gives is molten and viscoelastic
  *   steps=N        length of the run (500)
  *   threads=N      of the library's own pool (GS4_PTHREADS)
  *   shuffle=1      a parallel_for that runs the tasks in another order every time
@@ -16,7 +17,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-typedef struct options { int steps, threads, shuffle, bunnies, elastic, solid; const char *checkpoint, *frames; } options;
+typedef struct options { int steps, threads, shuffle, bunnies, elastic, solid, heat; const char *checkpoint, *frames; } options;
 
 static gs4_vec3 at(double x, double y, double z)
 {
@@ -44,7 +45,7 @@ static void stop(const char *what, const gs4_sim *sim)
 }
 
 /* 0.6 x 0.4 x 0.8 m: open above, periodic along y; liquids, a ball and a nozzle; no particle yet */
-static gs4_sim *create_block(gs4_sim_desc *d, int elastic, int solid)
+static gs4_sim *create_block(gs4_sim_desc *d, const options *o)
 {
     gs4_material m;
     gs4_collider c;
@@ -55,21 +56,29 @@ static gs4_sim *create_block(gs4_sim_desc *d, int elastic, int solid)
     d->cell_size = (gs4_real)(1.0 / 30);
     d->walls[0] = GS4_WALL_STICK; d->walls[1] = GS4_WALL_SEPARATE; d->walls[2] = d->walls[3] = GS4_WALL_PERIODIC;
     d->walls[4] = GS4_WALL_SLIP; d->walls[5] = GS4_WALL_OPEN;
+    if (o->heat) { d->wall_is_isothermal[0] = 1; d->wall_temperature[0] = 30; d->air_is_isothermal = 1; d->ambient_temperature = 5; }
     if (gs4_create(d, &sim) < 0) stop("gs4_create", NULL);
     m.density = 1000; m.viscosity = (gs4_real)0.5; m.sound_speed = 20;
-    if (elastic) { m.liquid = GS4_OLDROYD_B; m.local_fraction = (gs4_real)0.2; m.relaxation_time = (gs4_real)0.05; }
-    if (solid) { m.solid = GS4_NEO_HOOKEAN; m.shear_modulus = 3000; }
+    if (o->elastic) { m.liquid = GS4_OLDROYD_B; m.local_fraction = (gs4_real)0.2; m.relaxation_time = (gs4_real)0.05; }
+    if (o->solid || o->heat) { m.solid = GS4_NEO_HOOKEAN; m.shear_modulus = 3000; }
+    if (o->heat) {
+        m.heat_capacity = 1000; m.conductivity = 400; m.flux_relaxation_time = (gs4_real)0.01; m.fourier_fraction = (gs4_real)0.3;
+        m.can_melt = 1; m.melting_temperature = 10; m.latent_heat = 2000; m.viscous_heating = 1;
+    }
     if (gs4_add_material(sim, &m) < 0) stop("gs4_add_material", sim);
     m.density = 800; m.viscosity = 5;
-    if (solid) { m.solid = GS4_FIXED_COROTATED; m.yield_compression = (gs4_real)0.02; m.yield_stretch = (gs4_real)0.01; }
-    if (elastic) {                                          /* relaxes and stretches too fast for the step: the split, mostly */
+    if (o->heat) { m.liquid = GS4_OLDROYD_B; m.local_fraction = (gs4_real)0.5; m.relaxation_time = (gs4_real)0.05; m.flux_relaxation_time = m.fourier_fraction = 0; }
+    if (o->solid) { m.solid = GS4_FIXED_COROTATED; m.yield_compression = (gs4_real)0.02; m.yield_stretch = (gs4_real)0.01; }
+    if (o->elastic) {                                       /* relaxes and stretches too fast for the step: the split, mostly */
         m.liquid = GS4_POM_POM; m.relaxation_time = (gs4_real)0.002; m.stretch_time = (gs4_real)0.0005; m.anisotropy = (gs4_real)0.3; m.arms = 4;
     }
     if (gs4_add_material(sim, &m) < 0) stop("gs4_add_material", sim);
     c.shape = gs4_sphere(at(0.33, 0.21, 0.16), (gs4_real)0.09); c.pivot = at(0.33, 0.21, 0.16);
     c.contact = GS4_WALL_SEPARATE; c.friction = (gs4_real)0.3; c.angular_velocity = at(0, 4, 1);
+    if (o->heat) { c.is_isothermal = 1; c.temperature = 60; }
     if (gs4_add_collider(sim, &c) < 0) stop("gs4_add_collider", sim);
     e.shape = gs4_cylinder(at(0.1, 0.2, 0.5), at(0.1, 0.2, 0.55), (gs4_real)0.05);
+    if (o->heat) e.fill.temperature = 25;
     e.fill.material = 1; e.fill.velocity = at(0, 0, -1);
     if (gs4_add_emitter(sim, &e) < 0) stop("gs4_add_emitter", sim);
     return sim;
@@ -133,7 +142,7 @@ static gs4_sim *create(gs4_integrator integrator, const options *o, unsigned *ca
     if (integrator == GS4_INTEGRATOR_GS4) { d.rho_inf = (gs4_real)0.8; d.rho_inf_spurious = (gs4_real)0.2; }
     d.threads = o->threads;
     if (o->shuffle) { d.parallel_for = run_shuffled; d.parallel_user = calls; }
-    return o->bunnies ? create_bunnies(&d) : create_block(&d, o->elastic, o->solid);
+    return o->bunnies ? create_bunnies(&d) : create_block(&d, o);
 }
 
 static void write_frames(gs4_sim *sim, const char *name)
@@ -193,7 +202,7 @@ static const char *value_of(const char *argument, const char *name)
 
 int main(int count, char **values)
 {
-    options o = { 500, 0, 0, 0, 0, 0, NULL, NULL };
+    options o = { 500, 0, 0, 0, 0, 0, 0, NULL, NULL };
     const char *v;
     int i;
     for (i = 1; i < count; i++) {
@@ -201,6 +210,7 @@ int main(int count, char **values)
         else if ((v = value_of(values[i], "steps=")) != NULL) o.steps = atoi(v);
         else if ((v = value_of(values[i], "elastic=")) != NULL) o.elastic = atoi(v);
         else if ((v = value_of(values[i], "solid=")) != NULL) o.solid = atoi(v);
+        else if ((v = value_of(values[i], "heat=")) != NULL) o.heat = atoi(v);
         else if ((v = value_of(values[i], "threads=")) != NULL) o.threads = atoi(v);
         else if ((v = value_of(values[i], "shuffle=")) != NULL) o.shuffle = atoi(v);
         else if ((v = value_of(values[i], "checkpoint=")) != NULL) o.checkpoint = v;

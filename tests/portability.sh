@@ -283,7 +283,7 @@ bunnies() {
 
 # Stress that depends on what was before: the robust paths of single particles among them
 history() {
-    for scene in elastic=1 solid=1; do
+    for scene in elastic=1 solid=1 heat=1; do
         reference "" 300
         for level in -O0 '-O3 -march=native'; do same "$level" "$CC $level" ""; done
         same "GS4_NO_VECTORS" "$CC -O2 -DGS4_NO_VECTORS" ""
@@ -313,6 +313,7 @@ asan() {
         build="clang -fsanitize=address,undefined -fno-sanitize-recover=all"
         check "clang determinism" sanitized_det "$build" "threads=2 elastic=1 checkpoint=$tmp/checkpoint frames=$tmp/frame"
         check "clang determinism of solids" sanitized_det "$build" "threads=2 solid=1 checkpoint=$tmp/checkpoint frames=$tmp/frame"
+        check "clang determinism of heat" sanitized_det "$build" "threads=2 heat=1 checkpoint=$tmp/checkpoint frames=$tmp/frame"
         check "clang determinism in double" sanitized_det "$build -DGS4_DOUBLE -DGS4_NO_VECTORS" "checkpoint=$tmp/checkpoint"
     fi
     have gcc && check "all tests" sanitized_main "gcc -fsanitize=address,undefined -fno-sanitize-recover=all"
@@ -323,6 +324,7 @@ tsan() {
     for n in 2 3; do check "determinism on $n threads" sanitized_det "gcc -fsanitize=thread" "threads=$n checkpoint=$tmp/checkpoint"; done
     check "determinism of stress on 2 threads" sanitized_det "gcc -fsanitize=thread" "threads=2 elastic=1"
     check "determinism of solids on 2 threads" sanitized_det "gcc -fsanitize=thread" "threads=2 solid=1"
+    check "determinism of heat on 2 threads" sanitized_det "gcc -fsanitize=thread" "threads=2 heat=1"
     check "tests of files" sanitized_main "gcc -fsanitize=thread" files
 }
 

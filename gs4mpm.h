@@ -7217,7 +7217,7 @@ static int gs4i_reserve_heat(gs4_sim *sim)
     if (!sim->particles.with_heat || (k->slots >= sim->grid.active && (k->source || !wants_source))) return GS4_OK;
     content = (gs4_real *)gs4i_alloc(m, slots, node);
     source = wants_source ? (gs4_real *)gs4i_alloc(m, slots, node) : NULL;
-    if (!content || (wants_source && !source)) { gs4i_free(m, content, slots, node); return GS4_ERROR_MEMORY; }
+    if (!content || (wants_source && !source)) { gs4i_free(m, content, slots, node); gs4i_free(m, source, slots, node); return GS4_ERROR_MEMORY; }
     gs4i_free(m, k->content, (size_t)k->slots, node); gs4i_free(m, k->source, (size_t)k->slots, node);
     k->content = content; k->source = source; k->slots = sim->grid.capacity;
     return GS4_OK;
@@ -7997,7 +7997,7 @@ static int gs4i_file_close(gs4_sim *sim, gs4i_file *f)
 }
 
 /* Columns of a frame, in order. Frames are little-endian; on a big-endian machine numbers are turned round. */
-enum { GS4I_COLUMNS = 10 };
+enum { GS4I_COLUMNS = 11 };
 typedef struct gs4i_column { const char *name; const char *ply; const char *npy; const void *data; size_t size; int numbers; size_t stride; } gs4i_column;
 
 static int gs4i_columns(gs4_sim *sim, gs4i_column c[GS4I_COLUMNS])
@@ -8065,7 +8065,7 @@ static int gs4i_write_ply(gs4_sim *sim, const char *path)
             if (c[k].numbers == 1) gs4i_put(&t, c[k].name);
             else if (c[k].numbers == 6) { gs4i_put(&t, "stress_"); gs4i_put(&t, tensor[e]); }
             else if (c[k].numbers == 9) { gs4i_put(&t, "F_"); gs4i_put(&t, axis[e / 3]); gs4i_put(&t, axis[e % 3]); }
-            else { gs4i_put(&t, k == 1 ? "v" : ""); gs4i_put(&t, axis[e]); }
+            else { gs4i_put(&t, k == 0 ? "" : k == 1 ? "v" : "flux_"); gs4i_put(&t, axis[e]); }
         }
     gs4i_put(&t, "\nend_header\n");
     gs4i_file_put(&f, head, strlen(head));

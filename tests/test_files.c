@@ -137,6 +137,18 @@ static void files_make_cube(gs4_real v[24], gs4_vec3 low, double side)
     }
 }
 
+/* Whether the scene has heat, and with it all that a particle can carry: a solid that melts, its liquid viscoelastic; a flux that lags; a hot body, mouth and wall. */
+static int files_warm;
+
+static void files_warm_material(gs4_material *m, int which)
+{
+    if (!files_warm) return;
+    m->heat_capacity = 1000; m->conductivity = (gs4_real)(which == 2 ? 0 : 100); m->viscous_heating = which == 4;
+    if (which == 0 || which == 3) { m->can_melt = 1; m->melting_temperature = 5; m->latent_heat = 500; m->solid = GS4_FIXED_COROTATED; m->shear_modulus = 1000; }
+    if (which == 1 || which == 3) { m->liquid = GS4_OLDROYD_B; m->local_fraction = (gs4_real)0.5; m->relaxation_time = (gs4_real)0.1; }
+    if (which == 1 || which == 5) { m->flux_relaxation_time = (gs4_real)0.01; m->fourier_fraction = (gs4_real)0.3; }
+}
+
 static gs4_sim_desc files_desc(int euler)
 {
     gs4_sim_desc d = scene_cube(8);
@@ -144,6 +156,7 @@ static gs4_sim_desc files_desc(int euler)
     d.walls[1] = GS4_WALL_SEPARATE; d.walls[2] = d.walls[3] = GS4_WALL_PERIODIC; d.walls[5] = GS4_WALL_OPEN;
     if (euler) d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER;
     else { d.rho_inf = (gs4_real)0.6; d.rho_inf_spurious = (gs4_real)0.2; }
+    if (files_warm) { d.wall_is_isothermal[0] = d.air_is_isothermal = 1; d.wall_temperature[0] = 50; d.ambient_temperature = -3; }
     return d;
 }
 
@@ -159,14 +172,15 @@ static int files_build(gs4_sim *sim, int stage)
     memset(&c, 0, sizeof c); memset(&e, 0, sizeof e);
     files_make_cube(files_cube[0], at(0.5, 0.5, 0.5), 0.25);
     files_make_cube(files_cube[1], at(0.7, 0.1, -0.05), 0.2);
-    c.pivot = at(0.8, 0.2, 0.05);
+    c.pivot = at(0.8, 0.2, 0.05); c.temperature = 40; c.is_isothermal = files_warm;
+    f.temperature = (gs4_real)(files_warm ? -2 : 0);
     switch (stage) {
-    case 0: case 1: case 2: case 3: case 4: case 5: m.density = (gs4_real)(1000 + 100 * stage); return gs4_add_material(sim, &m);
+    case 0: case 1: case 2: case 3: case 4: case 5: m.density = (gs4_real)(1000 + 100 * stage); files_warm_material(&m, stage); return gs4_add_material(sim, &m);
     case 6: return gs4_add_particles(sim, gs4_box(at(0.125, 0.125, 0.125), at(0.375, 0.375, 0.375)), &f);
-    case 7: f.material = 1; f.velocity = at(-1, 0.5, 0); return gs4_add_particles(sim, gs4_mesh(files_cube[0], 8, files_triangles, 12), &f);
+    case 7: f.material = files_warm ? 3 : 1; f.velocity = at(-1, 0.5, 0); return gs4_add_particles(sim, gs4_mesh(files_cube[0], 8, files_triangles, 12), &f);
     case 8: c.shape = gs4_mesh(files_cube[1], 8, files_triangles, 12); c.angular_velocity = at(0, 0, 1); return gs4_add_collider(sim, &c);
     case 9: c.shape = gs4_sphere(at(0.2, 0.8, 0.1), (gs4_real)0.15); c.contact = GS4_WALL_SEPARATE; c.friction = (gs4_real)0.2; c.velocity = at(0.1, 0, 0); return gs4_add_collider(sim, &c);
-    case 10: e.shape = gs4_box(at(0.25, 0.25, 0.8), at(0.5, 0.5, 0.9)); e.fill = f; e.fill.velocity = at(0, 0, -1); e.travel = at(0.2, 0, 0); return gs4_add_emitter(sim, &e);
+    case 10: e.shape = gs4_box(at(0.25, 0.25, 0.8), at(0.5, 0.5, 0.9)); e.fill = f; e.fill.temperature *= -8; e.fill.velocity = at(0, 0, -1); e.travel = at(0.2, 0, 0); return gs4_add_emitter(sim, &e);
     case 11: e.shape = gs4_sphere(at(0.7, 0.6, 0.9), (gs4_real)0.08); e.fill = f; e.fill.velocity = at(0, 0.3, -1.5); e.start = (gs4_real)0.01; return gs4_add_emitter(sim, &e);
     case 12: c.shape = gs4_box(at(0, 0, 0), at(0.1, 0.1, 0.1)); return gs4_add_collider(sim, &c);
     case 13: c.shape = gs4_plane(at(0, 0, 0.02), at(0.1, 0, 1)); c.contact = GS4_WALL_SLIP; return gs4_add_collider(sim, &c);
@@ -268,8 +282,9 @@ static uint64_t files_scenario(int euler, files_memory *m, long fail_at, int fro
 
 static void test_files_memory(void)
 {
-    int euler;
-    for (euler = 0; euler < 2; euler++) {
+    int which;
+    for (which = 0; which < 4; which++) {
+        const int euler = which % 2, warm = files_warm = which / 2;
         gs4_sim_desc d = files_long_desc(euler);
         gs4_sim *late = files_scene(&d);
         gs4_edit x;
@@ -286,14 +301,15 @@ static void test_files_memory(void)
         reference = files_scenario(euler, &m, -1, 0, &refused);
         CHECK(refused == 0);
         calls = m.calls;
-        for (k = 0; k < calls; k++) {
+        for (k = 0; k < calls; k += test_slow || !warm ? 1 : 5) {
             CHECK(files_scenario(euler, &m, k, 0, &refused) == reference);
             CHECK(refused == 1);
-            if (k % 3 && !test_slow) continue;
+            if (k % (warm ? 4 : 3) && !test_slow) continue;
             CHECK(files_scenario(euler, &m, k, 1, &refused) == reference);
             CHECK(refused == 1);
         }
         remove(files_path("memory.sav")); remove(files_path("memory.ply")); remove(files_path("memory.npy")); remove(files_path("memory_late.sav"));
+        files_warm = 0;
     }
 }
 
@@ -372,6 +388,21 @@ static double files_expected(const gs4_sim *sim, const char *name, int c, int i)
     if (!strcmp(name, "position")) return (double)x.data[(size_t)i * (size_t)x.stride + (size_t)c];
     if (!strcmp(name, "velocity")) return (double)v.data[(size_t)i * (size_t)v.stride + (size_t)c];
     if (!strcmp(name, "volume_ratio")) { const gs4_view j = gs4_particles(sim, GS4_FIELD_VOLUME_RATIO); return (double)j.data[(size_t)i * (size_t)j.stride]; }
+    if (!strncmp(name, "stress_", 7) || !strncmp(name, "flux_", 5) || !strcmp(name, "stress") || !strcmp(name, "flux")) {
+        static const char *const axes[9] = { "xx", "yy", "zz", "xy", "xz", "yz", "x", "y", "z" };
+        const gs4_view s = gs4_particles(sim, name[0] == 's' ? GS4_FIELD_STRESS : GS4_FIELD_FLUX);
+        for (k = name[0] == 's' ? 0 : 6; strchr(name, '_') && k < 9; k++) if (!strcmp(strchr(name, '_') + 1, axes[k])) c = k % 6;
+        return s.data ? (double)s.data[(size_t)i * (size_t)s.stride + (size_t)c] : (double)NAN;
+    }
+    if (!strncmp(name, "F_", 2) || !strcmp(name, "deformation")) {
+        const gs4_view F = gs4_particles(sim, GS4_FIELD_DEFORMATION);
+        if (name[0] == 'F') c = 3 * (name[2] - 'x') + (name[3] - 'x');
+        return F.data ? (double)F.data[(size_t)i * (size_t)F.stride + (size_t)c] : (double)NAN;
+    }
+    if (!strcmp(name, "temperature") || !strcmp(name, "liquid_fraction")) {
+        const gs4_view T = gs4_particles(sim, name[0] == 't' ? GS4_FIELD_TEMPERATURE : GS4_FIELD_LIQUID_FRACTION);
+        return T.data ? (double)T.data[(size_t)i * (size_t)T.stride] : (double)NAN;
+    }
     if (!strcmp(name, "mass")) { const gs4_view m = gs4_particles(sim, GS4_FIELD_MASS); return (double)m.data[(size_t)i * (size_t)m.stride]; }
     if (!strcmp(name, "id")) return (double)gs4_particle_ids(sim)[i];
     if (!strcmp(name, "material")) return (double)gs4_particle_materials(sim)[i];
@@ -402,7 +433,7 @@ static void files_check_ply(const gs4_sim *sim, const char *path)
     size_t size;
     unsigned char *data = files_read(path, &size);
     files_column c[32];
-    int columns = 0, vertices = -1, found = 0;
+    int columns = 0, vertices = -1, found = 0, i, k;
     char *line, *end;
     CHECK(data != NULL && size > 10 && memcmp(data, "ply\n", 4) == 0);
     if (!data) return;
@@ -416,7 +447,8 @@ static void files_check_ply(const gs4_sim *sim, const char *path)
         line = end + 1;
     }
     CHECK(found && vertices == gs4_get_stats((gs4_sim *)(uintptr_t)sim).particles);
-    CHECK(columns == 10 && !strcmp(c[0].name, "x") && !strcmp(c[3].name, "vx") && !strcmp(c[5].name, "vz"));
+    for (i = 0; i < columns; i++) for (k = 0; k < i; k++) CHECK(strcmp(c[i].name, c[k].name) != 0);
+    CHECK(columns == (files_warm ? 30 : 10) && !strcmp(c[0].name, "x") && !strcmp(c[3].name, "vx") && !strcmp(c[5].name, "vz"));
     if (found) files_compare(sim, (unsigned char *)end + 1, size - (size_t)((unsigned char *)end + 1 - data), c, columns);
     free(data);
 }
@@ -427,7 +459,7 @@ static void files_check_npy(const gs4_sim *sim, const char *path)
     unsigned char *data = files_read(path, &size);
     files_column c[32];
     int columns = 0, shape = -1;
-    char *p;
+    char *p, *shape_of;
     CHECK(data != NULL && size > 10 && memcmp(data, "\x93NUMPY\x01\x00", 8) == 0);
     if (!data) return;
     head = (size_t)data[8] + 256 * (size_t)data[9] + 10;
@@ -438,21 +470,23 @@ static void files_check_npy(const gs4_sim *sim, const char *path)
     CHECK(strchr((char *)data + 10, '{') == (char *)data + 10);
     while (p && columns < 32 && (p = strstr(p, "('")) != NULL) {
         CHECK(sscanf(p, "('%39[a-z_]', '%15[a-z0-9<|]'", c[columns].name, c[columns].type) == 2);
-        c[columns].numbers = strncmp(strchr(strchr(p, ',') + 1, '\'') + strlen(c[columns].type) + 2, ", (3,))", 7) == 0 ? 3 : 1;
+        shape_of = strchr(strchr(p, ',') + 1, '\'') + strlen(c[columns].type) + 2;
+        c[columns].numbers = strncmp(shape_of, ", (3,))", 7) == 0 ? 3 : strncmp(shape_of, ", (6,))", 7) == 0 ? 6 : strncmp(shape_of, ", (3, 3))", 9) == 0 ? 9 : 1;
         columns++; p += 2;
     }
     p = strstr((char *)data + 10, "'shape': (");
     CHECK(p && sscanf(p, "'shape': (%d,)", &shape) == 1 && shape == gs4_get_stats((gs4_sim *)(uintptr_t)sim).particles);
-    CHECK(columns == 6 && c[0].numbers == 3 && c[1].numbers == 3 && c[2].numbers == 1);
+    CHECK(columns == (files_warm ? 11 : 6) && c[0].numbers == 3 && c[1].numbers == 3 && c[2].numbers == 1);
     files_compare(sim, data + head, size - head, c, columns);
     free(data);
 }
 
 static void test_files_frames(void)
 {
-    int euler;
-    for (euler = 0; euler < 2; euler++) {
-        gs4_sim_desc d = files_desc(euler);
+    int which;
+    for (which = 0; which < 4; which++) {
+        const int warm = files_warm = which / 2;
+        gs4_sim_desc d = files_desc(which % 2);
         gs4_sim *sim = files_scene(&d), *empty = NULL;
         const uint64_t h = gs4_state_hash(sim);
         CHECK_RESULT(sim, gs4_write_ply(sim, files_path("a.ply")), 0);
@@ -464,11 +498,13 @@ static void test_files_frames(void)
         CHECK(!files_leftover(files_path("a.ply")) && !files_leftover(files_path("a.npy")));
         files_check_ply(sim, files_path("a.ply"));
         files_check_npy(sim, files_path("a.npy"));
+        files_warm = 0;
         CHECK(gs4_create(&d, &empty) == GS4_OK);
         CHECK_RESULT(empty, gs4_write_ply(empty, files_path("a.ply")), 0);
         CHECK_RESULT(empty, gs4_write_raw(empty, files_path("a.npy")), 0);
         files_check_ply(empty, files_path("a.ply"));
         files_check_npy(empty, files_path("a.npy"));
+        if (warm) CHECK(gs4_get_stats(sim).max_temperature > gs4_get_stats(sim).min_temperature);
         remove(files_path("a.ply")); remove(files_path("a.npy"));
         gs4_destroy(sim); gs4_destroy(empty);
     }
@@ -624,13 +660,17 @@ static void files_continue(const gs4_sim_desc *d, int n)
 static void test_files_continue(void)
 {
     static const int steps[] = { 0, 1, 2, 7, 40 };
-    int euler, i;
-    for (euler = 0; euler < 2; euler++) for (i = 0; i < 5; i++) {
-        gs4_sim_desc d = files_desc(euler);
+    int which, i;
+    for (which = 0; which < 4; which++) for (i = 0; i < 5; i++) {
+        const int euler = which % 2;
+        gs4_sim_desc d;
+        files_warm = which / 2;
+        d = files_desc(euler);
         files_continue(&d, steps[i]);
         d.flip_decay_time = (gs4_real)(euler ? 0 : INFINITY);
         d.max_particles = 3000;
         if (steps[i] == 7) files_continue(&d, steps[i]);
+        files_warm = 0;
     }
 }
 
@@ -747,12 +787,16 @@ static void files_reject(gs4_sim *sim, uint64_t hash, const void *data, size_t s
 
 static void test_files_damaged(void)
 {
-    int euler;
-    for (euler = 0; euler < 2; euler++) {
-        gs4_sim *sim = files_small(euler, 12), *to = files_small(euler, 5);
-        const uint64_t hash = gs4_state_hash(to);
+    int which;
+    for (which = 0; which < 4; which++) {
+        const int euler = which % 2;
+        gs4_sim *sim, *to;
+        uint64_t hash;
         size_t size = 0, n, i;
         unsigned char *data, *more;
+        files_warm = which / 2;
+        sim = files_small(euler, 12); to = files_small(euler, 5);
+        hash = gs4_state_hash(to);
         CHECK_RESULT(sim, gs4_save(sim, files_path("good.sav")), 0);
         data = files_read(files_path("good.sav"), &size);
         CHECK(data && size > 2000);
@@ -788,6 +832,7 @@ static void test_files_damaged(void)
         free(data);
         remove(files_path("good.sav")); remove(files_path("x.ply"));
         gs4_destroy(sim); gs4_destroy(to);
+        files_warm = 0;
     }
 }
 
@@ -911,6 +956,27 @@ static void test_files_other_scene(void)
         test_report(which == 0 ? r == GS4_OK : r == GS4_ERROR_FORMAT && gs4_last_error(sim)[0] && gs4_state_hash(sim) == h, __FILE__, __LINE__, line);
         CHECK_RESULT(sim, files_steps(sim, 3), 0);
         gs4_destroy(sim);
+    }
+    for (which = 0; which < 2; which++) {                   /* one has heat, the other has none; the descriptions agree */
+        gs4_sim *other;
+        int stage;
+        for (stage = 0; stage < 2; stage++) {
+            const gs4_sim_desc d = files_desc(0);
+            gs4_material m = scene_liquid(1000, 0.1, 6);
+            const gs4_fill f = scene_fill(at(0, 0, 0));
+            m.heat_capacity = 1000; m.conductivity = (gs4_real)(stage == which);
+            CHECK(gs4_create(&d, &other) == GS4_OK);
+            CHECK_RESULT(other, gs4_add_material(other, &m), 0);
+            CHECK_RESULT(other, gs4_add_particles(other, gs4_box(at(0.25, 0.25, 0.25), at(0.5, 0.5, 0.5)), &f), 0);
+            CHECK_RESULT(other, files_steps(other, 5), 0);
+            if (stage == 0) CHECK_RESULT(other, gs4_save(other, files_path("s.sav")), 0);
+            else {
+                const uint64_t h = gs4_state_hash(other);
+                CHECK_RESULT(other, gs4_load(other, files_path("s.sav")), GS4_ERROR_FORMAT);
+                CHECK(strstr(gs4_last_error(other), "other materials") != NULL && gs4_state_hash(other) == h);
+            }
+            gs4_destroy(other);
+        }
     }
     {                                                       /* too many particles for here */
         gs4_sim_desc d = files_desc(0);

@@ -3423,7 +3423,7 @@ typedef struct gs4i_particles {
     gs4_real *affine[3];                /* 4 each: column j of the velocity gradient, dv_i/dx_j; NULL for GS4 */
     gs4_real *elastic; int elastic_reals;   /* 12: non-local stress xx yy zz xy xz yz (Pa) and its rate; 6 for Euler; 0: the scene has none */
     gs4_real *deformation; int deformation_reals;   /* 24, see [[solid]]: F, row-major, M (1/s), turning w (rad/s) and its rate; 9 for Euler; 0: none */
-    gs4_real *heat; int with_heat;      /* 4: temperature, liquid fraction, rate of enthalpy over heat capacity, 0; 0: the scene has none */
+    gs4_real *heat; int with_heat;      /* 4: temperature, liquid fraction, rate of enthalpy over heat capacity, what rounding still owes the temperature; 0: the scene has none */
     uint8_t *liquid;                    /* 1 while liquid; with heat */
     gs4_real *flux, *flux_rate; int with_flux;  /* 4 each: non-local heat flux (W/m^2), 0, and its rate; 0: the scene has none */
     gs4i_half *lag;                     /* 4: v - shift a - dx/dt, 0, see S2; NULL for symplectic Euler */
@@ -4803,8 +4803,9 @@ typedef struct gs4i_heat_laws {
     int melts;                          /* some of those seen so far do */
 } gs4i_heat_laws;
 
-/* Of one batch: temperature (K), fraction, rate of H/c (K/s); non-local flux (W/m^2) and its rate. */
-typedef struct gs4i_heat { gs4i_lanes T, fraction, rate, q[4], q_rate[4]; } gs4i_heat;
+/* Of one batch: temperature (K), fraction, rate of H/c (K/s), what is owed (K): what warms by less than its last digit in a step warms still; non-local
+ * flux (W/m^2) and its rate. */
+typedef struct gs4i_heat { gs4i_lanes T, fraction, rate, owed, q[4], q_rate[4]; } gs4i_heat;
 
 static void gs4i_take_heat_laws(const gs4i_batch_laws *laws, gs4i_heat_laws *l)
 {
@@ -4824,7 +4825,7 @@ GS4I_INLINE void gs4i_load_heat(const gs4i_particles *p, size_t i, int n, gs4i_h
     gs4i_lanes own[4];
     gs4i_to_lanes(p->heat + 4 * i, n, own);
     memcpy(h->T, own[0], sizeof h->T); memcpy(h->fraction, own[1], sizeof h->fraction);
-    memcpy(h->rate, own[2], sizeof h->rate);
+    memcpy(h->rate, own[2], sizeof h->rate); memcpy(h->owed, own[3], sizeof h->owed);
     if (!p->with_flux) return;
     gs4i_to_lanes(p->flux + 4 * i, n, h->q);
     gs4i_to_lanes(p->flux_rate + 4 * i, n, h->q_rate);
@@ -4833,9 +4834,7 @@ GS4I_INLINE void gs4i_load_heat(const gs4i_particles *p, size_t i, int n, gs4i_h
 GS4I_INLINE void gs4i_store_heat(const gs4i_particles *p, size_t i, int n, const gs4i_heat *h)
 {
     gs4_real own[4 * GS4I_BATCH];
-    gs4i_lanes none;
-    memset(none, 0, sizeof none);
-    gs4i_from_lanes(h->T, h->fraction, h->rate, none, own);
+    gs4i_from_lanes(h->T, h->fraction, h->rate, h->owed, own);
     memcpy(p->heat + 4 * i, own, 4 * (size_t)n * sizeof *own);
     if (!p->with_flux) return;
     gs4i_from_lanes(h->q[0], h->q[1], h->q[2], h->q[3], own);
@@ -4934,15 +4933,21 @@ static void gs4i_send_heat(const gs4i_heat_laws *l, const gs4i_heat *h, const gs
  * of it than nodes conduct would drive a front that nothing holds. */
 static void gs4i_receive_heat(const gs4i_heat_laws *l, const gs4i_rule *rule, gs4i_lanes from[4], gs4i_lanes slope[4], gs4i_gradient L, int with_flux, gs4i_heat *h)
 {
-    gs4i_lanes gain, T, q[3], drives;
+    gs4i_lanes gain, T, fraction, q[3], drives;
     int b, c;
     gs4i_temperature_ahead(l, h, rule->before, T);
     GS4I_BATCH_LOOP(b) {
         const gs4i_wide change = ((from[0][b] * (1 / rule->s) - (from[1][b] * T[b] - from[2][b])) - h->rate[b]) * rule->inv_alpha_m;
-        gain[b] = rule->dt * h->rate[b] + rule->gamma * rule->dt * change;
+        gain[b] = (rule->dt * h->rate[b] + rule->gamma * rule->dt * change) + h->owed[b];
         h->rate[b] += change;
     }
+    memcpy(T, h->T, sizeof T); memcpy(fraction, h->fraction, sizeof fraction);
     gs4i_warm(l, gain, h->T, h->fraction);
+    GS4I_BATCH_LOOP(b) {
+        const gs4i_wide zero = gain[b] - gain[b], owed = gain[b] - (h->T[b] - T[b]);
+        const gs4i_wide_mask same = (h->fraction[b] <= fraction[b]) & (h->fraction[b] >= fraction[b]);
+        GS4I_CHOOSE(h->owed[b], same, owed, zero);
+    }
     if (!with_flux) return;
     gs4i_flux_before(h, rule, L, q);
     GS4I_BATCH_LOOP(b) {

@@ -45,6 +45,7 @@ int main(int count, char **values)
     RUN(test_heat_conserved);
     RUN(test_heat_cycles);
     RUN(test_heat_of_viscosity);
+    RUN(test_heat_slowly);
     RUN(test_phase_freezing);
     RUN(test_phase_melting);
     RUN(test_heat_rims);

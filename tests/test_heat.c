@@ -712,3 +712,33 @@ static void test_heat_draws(void)
     if (test_filter[0]) printf("%d steps; refused as unstable %d, not converged %d, else %d; heat lost in a step at most %.2e\n", steps, refused[0], refused[1], refused[2], lost);
     CHECK(refused[1] + refused[2] == 0);
 }
+
+/* What warms by less than the last digit of its temperature in a step warms still: T = 1500 + cos x in an insulated bar, by 2e-5 K a step and less. */
+static void test_heat_slowly(void)
+{
+    const double length = acos(-1.0);
+    const int n = 8, steps = 2500;
+    gs4_sim_desc d = scene_cube(n);
+    gs4_material m = scene_liquid(1, 0, 1e-3);
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    double a = 0, norm = 0;
+    gs4_sim *sim;
+    gs4_view x;
+    gs4_edit T;
+    int i;
+    d.cells[1] = d.cells[2] = 4; d.cell_size = (gs4_real)(length / n);
+    m.heat_capacity = 1; m.conductivity = 1;
+    sim = physics_create(&d, &m);
+    CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(length, 1e6, 1e6)), &f), GS4_OK);
+    x = gs4_particles(sim, GS4_FIELD_POSITION); T = gs4_edit_particles(sim, GS4_FIELD_TEMPERATURE);
+    for (i = 0; i < T.count; i++) T.data[(size_t)i * (size_t)T.stride] = (gs4_real)(1500 + cos((double)x.data[(size_t)i * (size_t)x.stride]));
+    for (i = 0; i < steps; i++) CHECK_RESULT(sim, gs4_step(sim, (gs4_real)2e-5), GS4_OK);
+    x = gs4_particles(sim, GS4_FIELD_POSITION); T = gs4_edit_particles(sim, GS4_FIELD_TEMPERATURE);
+    for (i = 0; i < T.count; i++) {
+        const double c = cos((double)x.data[(size_t)i * (size_t)x.stride]);
+        a += ((double)T.data[(size_t)i * (size_t)T.stride] - 1500) * c; norm += c * c;
+    }
+    if (test_filter[0]) printf("%.5f, exact %.5f\n", a / norm, exp(-2e-5 * steps));
+    CHECK_CLOSE((1 - a / norm) / (1 - exp(-2e-5 * steps)), 1, 0.03);
+    gs4_destroy(sim);
+}

@@ -50,6 +50,10 @@ int main(int count, char **values)
     RUN(test_phase_melting);
     RUN(test_heat_rims);
     RUN(test_heat_full_box);
+    RUN(test_heat_extremes);
+    RUN(test_heat_glass);
+    RUN(test_heat_not_converged);
+    RUN(test_heat_poured);
     RUN(test_heat_uneven_steps);
     RUN(test_heat_draws);
     run_solid();

@@ -536,6 +536,189 @@ static void test_heat_uneven_steps(void)
     }
 }
 
+/* Steps of an extreme scene: every one is taken, or refused with a sentence and nothing changed, and all stays finite. How many were taken; the last code. */
+static int heat_steps(gs4_sim *sim, int count, double longest, int *code)
+{
+    int i, taken = 0;
+    *code = GS4_OK;
+    for (i = 0; i < count; i++) {
+        const uint64_t before = gs4_state_hash(sim);
+        const double limit = (double)gs4_stable_dt(sim);
+        const int r = gs4_step(sim, (gs4_real)(0.5 * fmin(limit, longest)));
+        CHECK(heat_is_finite(sim));
+        if (r != GS4_OK) { CHECK(r < 0 && gs4_last_error(sim)[0] && (i == 0 || gs4_state_hash(sim) == before)); *code = r; }
+        taken += r == GS4_OK;
+    }
+    return taken;
+}
+
+/* One at a time, what a scene can have to an extreme. All must be taken, and no temperature be beyond those given by more than a tenth of their range. */
+static void test_heat_extremes(void)
+{
+    enum { CASES = 24 };
+    int c, i, code;
+    for (c = 0; c < 2 * CASES; c++) {
+        const int which = c / 2;
+        gs4_sim_desc d = scene_cube(8);
+        gs4_material m = scene_liquid(1000, 0.1, 10), other;
+        gs4_fill f = scene_fill(at(0.2, -0.5, 0.1));
+        gs4_collider hot;
+        gs4_sim *sim;
+        gs4_edit T;
+        double low = 0, high = 100;
+        int isles = 1, added = 0;
+        if (c & 1) d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER;
+        memset(&hot, 0, sizeof hot);
+        m.heat_capacity = 1000; m.conductivity = 100;
+        switch (which) {
+        case 0: m.heat_capacity = (gs4_real)1e-3; break;
+        case 1: m.heat_capacity = (gs4_real)1e6; break;
+        case 2: m.can_melt = 1; m.latent_heat = (gs4_real)1e9; m.melting_temperature = 50; break;
+        case 3: m.conductivity = 0; m.can_melt = 1; m.melting_temperature = 50; break;
+        case 4: d.wall_is_isothermal[0] = d.wall_is_isothermal[1] = 1; d.wall_temperature[0] = -2000; d.wall_temperature[1] = 3000; low = -2000; high = 3000; break;
+        case 5: d.air_is_isothermal = 1; d.ambient_temperature = 5000; high = 5000; break;
+        case 6: for (i = 0; i < 6; i++) { d.wall_is_isothermal[i] = 1; d.wall_temperature[i] = (gs4_real)(1000 * i); } high = 5000; d.air_is_isothermal = 1; break;
+        case 7: d.walls[0] = d.walls[1] = GS4_WALL_PERIODIC; break;
+        case 8: d.walls[0] = d.walls[1] = d.walls[2] = d.walls[3] = GS4_WALL_PERIODIC; break;
+        case 9: for (i = 0; i < 6; i++) d.walls[i] = GS4_WALL_PERIODIC; d.cells[0] = 5; d.cells[1] = 6; d.cells[2] = 7; break;
+        case 10: for (i = 0; i < 6; i++) d.walls[i] = GS4_WALL_OPEN; d.air_is_isothermal = 1; break;
+        case 11: d.cells[0] = d.cells[2] = 4; break;
+        case 12: d.cells[0] = d.cells[1] = d.cells[2] = 4; for (i = 0; i < 6; i++) d.walls[i] = GS4_WALL_PERIODIC; break;
+        case 13: m.flux_relaxation_time = (gs4_real)1e-15; break;
+        case 14: m.flux_relaxation_time = (gs4_real)1e15; break;
+        case 15: m.flux_relaxation_time = (gs4_real)1e-2; m.fourier_fraction = 1; break;
+        case 16: m.flux_relaxation_time = (gs4_real)1e-2; break;
+        case 17: low = -273; high = -20; break;
+        case 18: high = 1e6; break;
+        case 19: low = -1e12; high = 1e12; break;
+        case 20: isles = 3; d.air_is_isothermal = 1; break;
+        case 21: isles = 3; break;
+        case 22: hot.shape = gs4_box(at(-1, -1, -1), at(2, 2, 2)); hot.temperature = 30; hot.is_isothermal = 1; break;    /* everything is inside of it */
+        default: isles = 0; d.air_is_isothermal = 1; break;         /* one particle alone */
+        }
+        other = m;
+        if (which > 13 && which != 14 && which != 19) { other.conductivity = (gs4_real)(1e-6 * (double)m.conductivity); other.density = 10; }
+        sim = physics_create(&d, &m);
+        CHECK_RESULT(sim, gs4_add_material(sim, &other), GS4_OK);
+        for (i = 0; i < isles; i++) {
+            const double x = isles == 3 ? 0.34 * i : 0.1;
+            f.material = 0; f.temperature = (gs4_real)(i == 1 ? high : low);
+            added += gs4_add_particles(sim, gs4_box(at(x, 0.1, 0.1), at(x + (isles == 3 ? 0.15 : 0.3), 0.5, 0.5)), &f);
+            f.material = 1; f.temperature = (gs4_real)high;
+            if (isles == 1) CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0.4, 0.1, 0.1), at(0.7, 0.5, 0.5)), &f), GS4_OK);
+        }
+        if (isles == 0) {
+            const gs4_real alone[3] = { (gs4_real)0.53, (gs4_real)0.52, (gs4_real)0.51 };
+            f.temperature = 100;
+            added = gs4_add_points(sim, alone, 1, (gs4_real)2e-4, &f);
+        }
+        CHECK(added > 0);
+        if (which == 22) CHECK_RESULT(sim, gs4_add_collider(sim, &hot), GS4_OK);
+        if (which == 18) {                                  /* a single hot particle */
+            T = gs4_edit_particles(sim, GS4_FIELD_TEMPERATURE);
+            for (i = 0; i < T.count; i++) T.data[(size_t)i * (size_t)T.stride] = (gs4_real)(i == T.count / 2 ? 1e6 : 0);
+        }
+        i = heat_steps(sim, 30, 1e-2, &code);
+        if (test_filter[0]) printf("case %d, %s: %d steps, %g to %g K of %g to %g\n", which, c & 1 ? "Euler" : "GS4", i, gs4_get_stats(sim).min_temperature, gs4_get_stats(sim).max_temperature, low, high);
+        CHECK(i == 30);
+        if (i < 30) printf("    case %d: %s\n", c, gs4_last_error(sim));
+        if (gs4_get_stats(sim).particles) CHECK(gs4_get_stats(sim).min_temperature >= low - 0.1 * (high - low) && gs4_get_stats(sim).max_temperature <= high + 0.1 * (high - low));
+        gs4_destroy(sim);
+    }
+}
+
+/* A viscosity that ends at some temperature: the step that would need it is refused and says so; what is frozen solid there has none and needs none. */
+static void test_heat_glass(void)
+{
+    static const double T[4] = { -100, 48.4, 48.4001, 20 };
+    int c, i, solid;
+    for (c = 0; c < 8; c++) for (solid = 0; solid < 2; solid++) {
+        gs4_sim_desc d = scene_cube(8);
+        gs4_material m = scene_liquid(1000, 0.1, 10);
+        gs4_fill f = scene_fill(at(0, 0, 0));
+        gs4_sim *sim;
+        int code, taken;
+        if (c & 1) d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER;
+        m.heat_capacity = 1000; m.conductivity = 1; m.viscosity_law = GS4_VISCOSITY_CROSS_WLF;
+        if (solid) { m.can_melt = 1; m.melting_temperature = 300; m.latent_heat = 1e5; m.solid = GS4_NEO_HOOKEAN; m.shear_modulus = 1e4; }
+        sim = physics_create(&d, &m);
+        f.temperature = (gs4_real)T[c / 2];
+        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0.1, 0.1, 0.1), at(0.4, 0.4, 0.4)), &f), GS4_OK);
+        if (!solid) CHECK_RESULT(sim, gs4_step(sim, (gs4_real)1e-6), GS4_ERROR_UNSTABLE);
+        taken = heat_steps(sim, 5, 1e-3, &code);
+        CHECK(taken == (solid ? 5 : 0));
+        i = gs4_advance(sim, (gs4_real)0.01);
+        CHECK(solid ? i == GS4_OK : i == GS4_ERROR_UNSTABLE);
+        if (!solid) CHECK(strstr(gs4_last_error(sim), "viscosity") != NULL);
+        gs4_destroy(sim);
+    }
+}
+
+/* The solver may stop where it is told to, and then nothing has happened. */
+static void test_heat_not_converged(void)
+{
+    int c;
+    for (c = 0; c < 8; c++) {
+        gs4_sim_desc d = scene_cube(8);
+        gs4_material m = scene_liquid(1000, 0.1, 10), other;
+        gs4_fill f = scene_fill(at(0, 0, 0));
+        gs4_sim *sim;
+        uint64_t before;
+        int i;
+        if (c & 1) d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER;
+        for (i = 0; i < 6 && c & 2; i++) d.walls[i] = GS4_WALL_PERIODIC;
+        if (c & 4) d.solver_tolerance = (gs4_real)1e-14;    /* in float, too: that is what the solver works to */
+        else { d.solver_max_iterations = 1; d.solver_tolerance = (gs4_real)1e-6; }
+        m.heat_capacity = 1000; m.conductivity = (gs4_real)1e8;
+        other = m; other.conductivity = 1;
+        sim = physics_create(&d, &m);
+        CHECK_RESULT(sim, gs4_add_material(sim, &other), GS4_OK);
+        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_sphere(at(0.4, 0.5, 0.5), (gs4_real)0.3), &f), GS4_OK);
+        f.temperature = 50; f.material = 1;
+        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0.72, 0.2, 0.2), at(1, 0.6, 0.6)), &f), GS4_OK);
+        before = gs4_state_hash(sim);
+        for (i = 0; i < 3; i++) {
+            const int r = gs4_step(sim, (gs4_real)0.5 * gs4_stable_dt(sim));
+            CHECK(r == GS4_ERROR_NOT_CONVERGED || (c & 4 && r == GS4_OK));
+            if (r != GS4_OK) CHECK(strstr(gs4_last_error(sim), "solver_tolerance") != NULL && gs4_state_hash(sim) == before);
+            before = gs4_state_hash(sim);
+        }
+        if (!(c & 4)) CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)0.01), GS4_ERROR_NOT_CONVERGED);
+        CHECK(heat_is_finite(sim));
+        gs4_destroy(sim);
+    }
+}
+
+/* Hot pours into cold; then all of it leaves through open walls, and what comes after finds an empty scene. */
+static void test_heat_poured(void)
+{
+    int c, i;
+    for (c = 0; c < 2; c++) {
+        gs4_sim_desc d = scene_cube(8);
+        gs4_material m = scene_liquid(1000, 0.1, 10);
+        gs4_fill f = scene_fill(at(0, 0, 0));
+        gs4_emitter e;
+        gs4_sim *sim;
+        memset(&e, 0, sizeof e);
+        if (c & 1) d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER;
+        d.gravity = at(0, -20, 0); d.walls[2] = GS4_WALL_OPEN; d.air_is_isothermal = 1; d.ambient_temperature = -30;
+        m.heat_capacity = 1000; m.conductivity = 1000; m.can_melt = 1; m.latent_heat = 1e4; m.flux_relaxation_time = (gs4_real)1e-3;
+        sim = physics_create(&d, &m);
+        f.temperature = -20;
+        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0, 0.1, 0), at(1, 0.3, 1)), &f), GS4_OK);
+        e.shape = gs4_box(at(0.4, 0.6, 0.4), at(0.6, 0.7, 0.6)); e.fill.velocity = at(0, -2, 0); e.fill.temperature = 500; e.stop = (gs4_real)0.2;
+        CHECK_RESULT(sim, gs4_add_emitter(sim, &e), GS4_OK);
+        for (i = 0; i < 40; i++) {
+            CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)0.025), GS4_OK);
+            CHECK(heat_is_finite(sim) && gs4_get_stats(sim).max_temperature < 550 && gs4_get_stats(sim).min_temperature > -80);
+        }
+        CHECK(gs4_get_stats(sim).particles == 0 && gs4_get_stats(sim).thermal_energy == 0);
+        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_sphere(at(0.5, 0.5, 0.5), (gs4_real)0.2), &f), GS4_OK);
+        CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)0.01), GS4_OK);
+        gs4_destroy(sim);
+    }
+}
+
 /* Random numbers of a draw: the same on every machine. */
 static double heat_random(uint64_t *state, double low, double high)
 {

@@ -308,7 +308,7 @@ typedef struct gs4_material {
     gs4_real local_fraction;        /* F_v in [0,1]; ignored (taken as 1) for GS4_NEWTONIAN */
     gs4_real relaxation_time;       /* lambda_b, s, > 0 for viscoelastic liquids; G0 = (1 - F_v) mu / lambda_b */
     gs4_real stretch_time;          /* lambda_0s, s, > 0 for GS4_POM_POM */
-    gs4_real anisotropy;            /* alpha, >= 0 */
+    gs4_real anisotropy;            /* alpha, 0 to 1e6 */
     gs4_real arms;                  /* Q, >= 1; nu = 2/Q */
     gs4_viscosity_law viscosity_law;
     struct {                        /* mu = mu0 / (1 + a (mu0 rate)^n), mu0 = d1 exp(-a1 (T - t1) / (T - t2)); */
@@ -2379,8 +2379,9 @@ static int gs4i_find_pockets(gs4i_setup *u)
 }
 
 /* Everything that depends on the matrix. The solver keeps nothing of `d`, and its memory from setup to setup. */
-static int gs4i_solver_setup(gs4i_solver *s, const gs4_poisson_desc *d, int slabs)
+static int gs4i_solver_setup(gs4i_solver *s, const gs4_poisson_desc *d)
 {
+    const int slabs = d->threads > 1 ? 2 * d->threads : d->parallel_for ? 8 : 1;
     gs4i_setup u;
     int l;
     memset(&u, 0, sizeof u);
@@ -2389,7 +2390,7 @@ static int gs4i_solver_setup(gs4i_solver *s, const gs4_poisson_desc *d, int slab
     if (gs4i_take(&u) != GS4_OK) return s->fault ? GS4_ERROR_ARGUMENT : GS4_ERROR_MEMORY;
     gs4i_parallel_for(s->tasks, s->level[1].n[2], gs4i_build_planes, &u);
     gs4i_parallel_for(s->tasks, s->level[1].n[2], gs4i_build_inverse, &u);
-    for (l = 0; l < 2; l++) gs4i_cut(s, l, slabs < 1 ? 1 : slabs > GS4I_SLABS ? GS4I_SLABS : slabs);
+    for (l = 0; l < 2; l++) gs4i_cut(s, l, slabs > GS4I_SLABS ? GS4I_SLABS : slabs);
     if (gs4i_build_groups(&u) != GS4_OK) return GS4_ERROR_MEMORY;
     while (s->graph[s->graphs - 1].n > GS4I_DIRECT) if (gs4i_coarsen_graph(s) != GS4_OK) return GS4_ERROR_MEMORY;
     gs4i_clear(s, s->x[0], s->level[0].count * sizeof(double));
@@ -4731,7 +4732,7 @@ static void gs4i_correct_turning(const gs4i_solid_laws *l, gs4i_deformation *e, 
             const gs4i_wide LL = (L[k][0][b] * L[0][j][b] + L[k][1][b] * L[1][j][b] + L[k][2][b] * L[2][j][b])
                                - (L[j][0][b] * L[0][k][b] + L[j][1][b] * L[1][k][b] + L[j][2][b] * L[2][k][b]);
             const gs4i_wide rate = GS4I_C(0.5) * (kicks->acc[k][j][b] - kicks->acc[j][k][b] - LL), at_once = GS4I_C(0.5) * (kicks->jump[k][j][b] - kicks->jump[j][k][b]);
-            const gs4i_wide stage = (rate + decay * (seen - (w + (rule->reach.ahead - rule->s) * r))) * rule->damped, change = (stage - r) * inv_alpha_m;
+            const gs4i_wide stage = (rate + decay * (seen - (w + rule->before * r))) * rule->damped, change = (stage - r) * inv_alpha_m;
             const gs4i_wide next = ((w + rule->dt * r) + rule->gamma * rule->dt * change) + at_once, next_rate = r + change;
             const gs4i_wide_mask solid = l->modulus[b] > GS4I_C(0);
             GS4I_CHOOSE(e->turning[i][b], solid, next, zero);
@@ -4866,8 +4867,7 @@ GS4I_INLINE void gs4i_warm(const gs4i_heat_laws *l, gs4i_lanes rise, gs4i_lanes 
     if (plain) { GS4I_BATCH_LOOP(b) T[b] += rise[b]; return; }
     for (b = 0; b < GS4I_BATCH; b++) {
         gs4_real own = GS4I_NTH(T, b), part = GS4I_NTH(fraction, b);
-        if (l->of[b]->is.can_melt) gs4i_warm_one(l->of[b], GS4I_NTH(rise, b), &own, &part);
-        else own += GS4I_NTH(rise, b);
+        gs4i_warm_one(l->of[b], GS4I_NTH(rise, b), &own, &part);
         GS4I_NTH(T, b) = own; GS4I_NTH(fraction, b) = part;
     }
 }
@@ -4881,6 +4881,13 @@ static void gs4i_temperature_ahead(const gs4i_heat_laws *l, const gs4i_heat *h, 
     memcpy(T, h->T, sizeof h->T);
     memcpy(fraction, h->fraction, sizeof fraction);
     gs4i_warm(l, rise, T, fraction);
+}
+
+/* k_eff = k (F t + s) / (t + s), of what the rule takes implicitly. */
+GS4I_INLINE void gs4i_conducts(const gs4i_heat_laws *l, const gs4i_rule *rule, gs4i_lanes k)
+{
+    int b;
+    GS4I_BATCH_LOOP(b) k[b] = l->conductivity[b] * ((l->fourier[b] * l->flux_time[b] + rule->s) / (l->flux_time[b] + rule->s));
 }
 
 /* q** + s L q~, with q~ predicted: what the non-local flux brings to the stage. */
@@ -4906,12 +4913,12 @@ static void gs4i_send_heat(const gs4i_heat_laws *l, const gs4i_heat *h, const gs
     const gs4i_wide least = (mass[0] - mass[0]) + GS4I_INSULATES;
     int b, c;
     gs4i_temperature_ahead(l, h, rule->before, T);
+    gs4i_conducts(l, rule, resists);
     GS4I_BATCH_LOOP(b) {
         capacity[b] = mass[b] * l->capacity[b];
         content[b] = capacity[b] * T[b];
         mixes[b] = GS4I_MIXING * rule->inv_area * l->conductivity[b] * volume[b] / capacity[b];
         mixes[b] = capacity[b] * mixes[b] * (l->fourier[b] + (GS4I_C(1) - l->fourier[b]) / (GS4I_C(1) + mixes[b] * l->flux_time[b]));
-        resists[b] = l->conductivity[b] * ((l->fourier[b] * l->flux_time[b] + rule->s) / (l->flux_time[b] + rule->s));
         GS4I_WIDE_MAX(resists[b], resists[b], least);
         resists[b] = volume[b] / resists[b];
     }
@@ -4950,9 +4957,10 @@ static void gs4i_receive_heat(const gs4i_heat_laws *l, const gs4i_rule *rule, gs
     }
     if (!with_flux) return;
     gs4i_flux_before(h, rule, L, q);
+    gs4i_conducts(l, rule, drives);
     GS4I_BATCH_LOOP(b) {
-        const gs4i_wide one = (h->T[b] - h->T[b]) + GS4I_C(1), conducts = l->conductivity[b] * ((l->fourier[b] * l->flux_time[b] + rule->s) / (l->flux_time[b] + rule->s));
-        gs4i_wide resists = conducts * slope[3][b];
+        const gs4i_wide one = (h->T[b] - h->T[b]) + GS4I_C(1);
+        gs4i_wide resists = drives[b] * slope[3][b];
         GS4I_WIDE_MAX(resists, resists, one);
         drives[b] = (GS4I_C(1) - l->fourier[b]) * l->conductivity[b] / resists;
     }
@@ -5522,17 +5530,17 @@ static void gs4i_put_back(const gs4i_boundary *b, const gs4i_grid *g, gs4_real x
     }
 }
 
-/* In the mouth of an emitter a particle goes with the flow: at its velocity, uncompressed, without rates. Is it in one? */
-static int gs4i_hold_in_mouth(const gs4i_boundary *b, const gs4_real x[3], gs4_real v[4])
+/* In the mouth of an emitter a particle goes with the flow: at its velocity, uncompressed, without rates. The mouth, NULL outside of all. */
+static const gs4i_body *gs4i_hold_in_mouth(const gs4i_boundary *b, const gs4_real x[3], gs4_real v[4])
 {
-    int i, held = 0;
+    const gs4i_body *mouth = NULL;
+    int i;
     for (i = 0; i < b->body_count; i++) {
         const gs4i_body *body = &b->bodies[i];
-        if (!body->is_mouth || body->asleep || gs4i_body_distance(body, gs4i_vec3(x[0], x[1], x[2])) >= 0) continue;
-        v[0] = body->flow.x; v[1] = body->flow.y; v[2] = body->flow.z; v[3] = 1;
-        held = 1;
+        if (body->is_mouth && !body->asleep && gs4i_body_distance(body, gs4i_vec3(x[0], x[1], x[2])) < 0) mouth = body;
     }
-    return held;
+    if (mouth) { v[0] = mouth->flow.x; v[1] = mouth->flow.y; v[2] = mouth->flow.z; v[3] = 1; }
+    return mouth;
 }
 
 /* ==== [[state]] what a simulation is =============================================================== */
@@ -5563,7 +5571,7 @@ typedef struct gs4i_conduction {
     int low[3], size[3];                /* the box: its first node, and how many there are along each axis */
     uint8_t *kind; gs4_real *field[GS4I_HEAT_FIELDS]; size_t room;  /* T**; K; m^3 of material per m^3; J/(m^3 K); W/(m^3 K) of mixing; diagonal, J/(m^3 K); J/m^3; T~ - T**; faces of each axis */
     int exposed, linked;                /* air or a body is isothermal; or a wall */
-    double *outer, *wrapped;            /* with periodic walls: x, r, p, A p; and the links around, see gs4i_solve_periodic */
+    double *outer;                      /* with periodic walls: x, r, p, A p, see gs4i_solve_periodic */
     gs4i_solver solver;
     int iterations; double residual;    /* of the last solve */
 } gs4i_conduction;
@@ -6075,7 +6083,7 @@ GS4I_INLINE void gs4i_stage_forces(const gs4i_particles *p, size_t i, int n, con
     int b, c;
     GS4I_BATCH_LOOP(b) {
         const gs4i_wide div = L[0][0][b] + L[1][1][b] + L[2][2][b];
-        J[b] = (q->v[3][b] + (rule->reach.ahead - rule->s) * q->a[3][b]) / (GS4I_C(1) - rule->s * div);
+        J[b] = (q->v[3][b] + rule->before * q->a[3][b]) / (GS4I_C(1) - rule->s * div);
     }
     gs4i_liquid_stress(l, J, L, sigma, mu);
     if (p->elastic_reals) gs4i_add_elastic(p, i, n, rule, l, &past->elastic, L, sigma, seen, report);
@@ -6248,7 +6256,7 @@ GS4I_INLINE void gs4i_correct_batch(gs4i_rule r, const gs4i_corrections *k, gs4i
     for (c = 0; c < 3; c++)
         GS4I_BATCH_LOOP(b) {
             const gs4i_wide v = q->v[c][b], a = q->a[c][b], move = q->move[c][b] + k->jump[c][b];
-            const gs4i_wide stage_a = (k->A[c][b] + decay[b] * (k->U[c][b] - (v + (r.reach.ahead - r.s) * a))) * damped[b];
+            const gs4i_wide stage_a = (k->A[c][b] + decay[b] * (k->U[c][b] - (v + r.before * a))) * damped[b];
             const gs4i_wide da = (stage_a - a) * r.inv_alpha_m, change = (k->U[c][b] - move) * r.inv_alpha_m;
             q->v[c][b] = ((v + r.dt * a) + r.gamma * r.dt * da) + k->jump[c][b];
             q->a[c][b] = a + da;
@@ -6296,33 +6304,23 @@ GS4I_INLINE int gs4i_has_left(const gs4i_grid *g, const gs4_real x[3])
           && x[2] >= g->origin.z && x[2] < g->origin.z + GS4I_C(g->cells[2]) * g->h);
 }
 
-/* In a mouth material is as warm as what it gives. */
-static void gs4i_hold_warmth(const gs4_sim *sim, size_t i, const gs4_real x[3])
-{
-    const gs4i_particles *p = &sim->particles;
-    int e;
-    for (e = 0; e < sim->emitter_count; e++) {
-        const gs4i_body *mouth = &sim->boundary.bodies[sim->emitters[e].body];
-        if (mouth->asleep || gs4i_body_distance(mouth, gs4i_vec3(x[0], x[1], x[2])) >= 0) continue;
-        gs4i_begin_heat(p, i, &sim->laws[p->material[i]], sim->emitters[e].is.fill.temperature);
-    }
-}
-
 /* Walls, bodies and mouths on each particle after the step. */
 static void gs4i_correct_contact(gs4_sim *sim, size_t i, int n, gs4i_stored *o, gs4i_gathered *L, gs4i_report *report)
 {
     gs4_real *elastic = sim->particles.elastic_reals ? sim->particles.elastic + (size_t)sim->particles.elastic_reals * i : NULL;
     int b;
     for (b = 0; b < n; b++) {
+        const gs4i_body *mouth;
         if (!sim->boundary.body_count && !gs4i_has_left(&sim->grid, o->x + 4 * b)) continue;
         gs4i_put_back(&sim->boundary, &sim->grid, o->x + 4 * b, o->v + 4 * b);
-        if (gs4i_hold_in_mouth(&sim->boundary, o->x + 4 * b, o->v + 4 * b)) {
+        mouth = gs4i_hold_in_mouth(&sim->boundary, o->x + 4 * b, o->v + 4 * b);
+        if (mouth) {
             memset(o->a + 4 * b, 0, 4 * sizeof *o->a);
             memset(o->lag + 4 * b, 0, 4 * sizeof *o->lag);
             memset(L->dx + 4 * b, 0, 4 * sizeof *L->dx);
             memset(L->dy + 4 * b, 0, 4 * sizeof *L->dy);
             memset(L->dz + 4 * b, 0, 4 * sizeof *L->dz);
-            if (sim->particles.with_heat) gs4i_hold_warmth(sim, i + (size_t)b, o->x + 4 * b);
+            if (sim->particles.with_heat) gs4i_begin_heat(&sim->particles, i + (size_t)b, &sim->laws[sim->particles.material[i + (size_t)b]], mouth->is.temperature);
             if (sim->particles.deformation_reals) gs4i_undeform(&sim->particles, i + (size_t)b, 1);
             if (elastic) memset(elastic + (size_t)sim->particles.elastic_reals * (size_t)b, 0, (size_t)sim->particles.elastic_reals * sizeof *elastic);
         }
@@ -6406,7 +6404,7 @@ static void gs4i_gather_heat(const gs4_sim *sim, size_t i, int n, const gs4i_ste
     gs4i_receive_heat(&w->laws, &sim->warm, value, slope, L, p->with_flux, &w->h);
     gs4i_store_heat(p, i, n, &w->h);
     for (b = 0; b < n && w->laws.melts; b++)                /* hysteresis: in between the phase stays */
-        if (l->of[b]->is.can_melt && (GS4I_NTH(w->h.fraction, b) >= 1 || GS4I_NTH(w->h.fraction, b) <= 0)) gs4i_set_phase(p, i + (size_t)b, GS4I_NTH(w->h.fraction, b) > 0);
+        if (GS4I_NTH(w->h.fraction, b) >= 1 || GS4I_NTH(w->h.fraction, b) <= 0) gs4i_set_phase(p, i + (size_t)b, GS4I_NTH(w->h.fraction, b) > 0);
 }
 
 /* What nodes give to particle n beside velocity; solids want its gradient too. */
@@ -6434,7 +6432,7 @@ static void gs4i_advance_history(const gs4_sim *sim, size_t i, int n, gs4i_batch
     if (p->deformation_reals) gs4i_advance_solid(p, i, n, &sim->rule, laws, &past->solid, L, kicks, J, report, commit);
 }
 
-/* S7: gather and correct. With `commit` 0 nothing is written: a rehearsal that only reports. */
+/* S7: gather and correct. With `commit` 0 nothing is written: a rehearsal that only reports, of blocks that are not calm. */
 static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_warmth *warmth)
 {
     gs4_sim *sim = pass->sim;
@@ -6455,6 +6453,7 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_warm
     gs4i_stored out;
     int row = 0;
     size_t i = (size_t)grid->first[o], end = (size_t)grid->first[o + 1];
+    if (!commit && gs4i_is_calm(pass, index)) return;
     gs4i_tile_load(grid, o, report->rows, grid->momentum, u_nodes);
     gs4i_tile_load(grid, o, report->rows, grid->force, a_nodes);
     gs4i_see_nothing(&seen);
@@ -6495,29 +6494,10 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_warm
     if (commit) gs4i_report_motion(report, &seen);
 }
 
-static void gs4i_correct_task(int index, void *context)
-{
-    gs4i_correct((const gs4i_pass *)context, index, 1, NULL);
-}
-
-static void gs4i_correct_with_heat_task(int index, void *context)
-{
-    gs4i_warmth warmth;
-    gs4i_correct((const gs4i_pass *)context, index, 1, &warmth);
-}
-
-static void gs4i_rehearse_task(int index, void *context)
-{
-    const gs4i_pass *pass = (const gs4i_pass *)context;
-    if (!gs4i_is_calm(pass, index)) gs4i_correct(pass, index, 0, NULL);
-}
-
-static void gs4i_rehearse_with_heat_task(int index, void *context)
-{
-    const gs4i_pass *pass = (const gs4i_pass *)context;
-    gs4i_warmth warmth;
-    if (!gs4i_is_calm(pass, index)) gs4i_correct(pass, index, 0, &warmth);
-}
+static void gs4i_correct_task(int index, void *context) { gs4i_correct((const gs4i_pass *)context, index, 1, NULL); }
+static void gs4i_rehearse_task(int index, void *context) { gs4i_correct((const gs4i_pass *)context, index, 0, NULL); }
+static void gs4i_correct_with_heat_task(int index, void *context) { gs4i_warmth warmth; gs4i_correct((const gs4i_pass *)context, index, 1, &warmth); }
+static void gs4i_rehearse_with_heat_task(int index, void *context) { gs4i_warmth warmth; gs4i_correct((const gs4i_pass *)context, index, 0, &warmth); }
 
 /* --- symplectic Euler -------------------------------------------------------------------------------- */
 
@@ -6643,6 +6623,7 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, gs4i
     gs4i_stored out;
     int row = 0;
     size_t i = (size_t)grid->first[o], end = (size_t)grid->first[o + 1];
+    if (!commit && gs4i_is_calm(pass, index)) return;
     for (c = 0; c < 27; c++) edge |= grid->jump_of[grid->neighbour[27 * (size_t)o + (size_t)c]];
     gs4i_tile_load(grid, o, report->rows, grid->momentum, nodes);
     gs4i_see_nothing(&seen);
@@ -6677,29 +6658,10 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, gs4i
     if (commit) gs4i_report_motion(report, &seen);
 }
 
-static void gs4i_gather_euler_task(int index, void *context)
-{
-    gs4i_gather_euler((const gs4i_pass *)context, index, 1, NULL);
-}
-
-static void gs4i_gather_euler_with_heat_task(int index, void *context)
-{
-    gs4i_warmth warmth;
-    gs4i_gather_euler((const gs4i_pass *)context, index, 1, &warmth);
-}
-
-static void gs4i_rehearse_euler_task(int index, void *context)
-{
-    const gs4i_pass *pass = (const gs4i_pass *)context;
-    if (!gs4i_is_calm(pass, index)) gs4i_gather_euler(pass, index, 0, NULL);
-}
-
-static void gs4i_rehearse_euler_with_heat_task(int index, void *context)
-{
-    const gs4i_pass *pass = (const gs4i_pass *)context;
-    gs4i_warmth warmth;
-    if (!gs4i_is_calm(pass, index)) gs4i_gather_euler(pass, index, 0, &warmth);
-}
+static void gs4i_gather_euler_task(int index, void *context) { gs4i_gather_euler((const gs4i_pass *)context, index, 1, NULL); }
+static void gs4i_rehearse_euler_task(int index, void *context) { gs4i_gather_euler((const gs4i_pass *)context, index, 0, NULL); }
+static void gs4i_gather_euler_with_heat_task(int index, void *context) { gs4i_warmth warmth; gs4i_gather_euler((const gs4i_pass *)context, index, 1, &warmth); }
+static void gs4i_rehearse_euler_with_heat_task(int index, void *context) { gs4i_warmth warmth; gs4i_gather_euler((const gs4i_pass *)context, index, 0, &warmth); }
 
 /* Run a scattering kernel over all occupied blocks, colour after colour. */
 static void gs4i_scatter(gs4_sim *sim, gs4_task_fn kernel)
@@ -6827,15 +6789,15 @@ static int gs4i_heat_box(gs4_sim *sim)
         const int periodic = sim->grid.periodic[0] || sim->grid.periodic[1] || sim->grid.periodic[2];
         reals = (gs4_real *)gs4i_alloc(m, room, GS4I_HEAT_FIELDS * sizeof *reals);
         kind = (uint8_t *)gs4i_alloc(m, room, 1);
-        if (periodic) outer = (double *)gs4i_alloc(m, room, 5 * sizeof *outer);
+        if (periodic) outer = (double *)gs4i_alloc(m, room, 4 * sizeof *outer);
         if (!reals || !kind || (periodic && !outer)) {
-            gs4i_free(m, outer, room, 5 * sizeof *outer);
+            gs4i_free(m, outer, room, 4 * sizeof *outer);
             gs4i_free(m, reals, room, GS4I_HEAT_FIELDS * sizeof *reals); gs4i_free(m, kind, room, 1);
             return GS4_ERROR_MEMORY;
         }
         gs4i_free(m, k->field[0], k->room, GS4I_HEAT_FIELDS * sizeof *reals); gs4i_free(m, k->kind, k->room, 1);
-        gs4i_free(m, k->outer, k->room, 5 * sizeof *outer);
-        k->kind = kind; k->room = room; k->outer = outer; k->wrapped = outer ? outer + 4 * room : NULL;
+        gs4i_free(m, k->outer, k->room, 4 * sizeof *outer);
+        k->kind = kind; k->room = room; k->outer = outer;
         for (a = 0; a < GS4I_HEAT_FIELDS; a++) k->field[a] = reals + room * (size_t)a;
     }
     return GS4_OK;
@@ -6844,6 +6806,15 @@ static int gs4i_heat_box(gs4_sim *sim)
 GS4I_INLINE size_t gs4i_heat_cell(const gs4i_conduction *k, int x, int y, int z)
 {
     return ((size_t)z * (size_t)k->size[1] + (size_t)y) * (size_t)k->size[0] + (size_t)x;
+}
+
+/* Node i of the block at `block` in the box: coordinates, and its cell; 0 if it is outside. */
+GS4I_INLINE int gs4i_heat_cell_of(const gs4i_conduction *k, const int block[3], int i, int at[3], size_t *cell)
+{
+    at[0] = 4 * (block[0] - 1) + (i & 3) - k->low[0]; at[1] = 4 * (block[1] - 1) + (i >> 2 & 3) - k->low[1]; at[2] = 4 * (block[2] - 1) + (i >> 4) - k->low[2];
+    if (at[0] < 0 || at[1] < 0 || at[2] < 0 || at[0] >= k->size[0] || at[1] >= k->size[1] || at[2] >= k->size[2]) return 0;
+    *cell = gs4i_heat_cell(k, at[0], at[1], at[2]);
+    return 1;
 }
 
 /* Nodes of a group of blocks into the box: T**, conductivity, fill, m c per volume, sources. */
@@ -6856,16 +6827,14 @@ static void gs4i_heat_nodes(int index, void *context)
     const gs4_real inv_cell = 1 / (g->h * g->h * g->h);
     int s, i;
     for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
-        int at[3];
-        gs4i_block_coordinates(g, g->block[s], at);
+        int block[3], at[3];
+        gs4i_block_coordinates(g, g->block[s], block);
         for (i = 0; i < GS4I_BLOCK_NODES; i++) {
             const size_t node = 4 * ((size_t)s * GS4I_BLOCK_NODES + (size_t)i);
             const gs4_real *q = k->content + node;
-            const int x = 4 * (at[0] - 1) + (i & 3) - k->low[0], y = 4 * (at[1] - 1) + (i >> 2 & 3) - k->low[1], z = 4 * (at[2] - 1) + (i >> 4) - k->low[2];
             size_t cell;
-            if (x < 0 || y < 0 || z < 0 || x >= k->size[0] || y >= k->size[1] || z >= k->size[2]) continue;
+            if (!gs4i_heat_cell_of(k, block, i, at, &cell)) continue;
             if (!(g->momentum[node + 3] > pass->lightest) || !(q[0] > 0) || !(q[3] > 0)) continue;
-            cell = gs4i_heat_cell(k, x, y, z);
             k->kind[cell] = GS4_CELL_LIQUID;
             k->field[GS4I_HEAT_T][cell] = q[1] / q[0];
             k->field[GS4I_HEAT_K][cell] = q[3] / q[2];      /* one behind the other, as heat goes where two materials meet */
@@ -7047,20 +7016,16 @@ static void gs4i_heat_back(int index, void *context)
     const gs4_real *X = k->field[GS4I_HEAT_X], *T = k->field[GS4I_HEAT_T], *holds = k->field[GS4I_HEAT_HOLDS], *mix = k->field[GS4I_HEAT_MIX], *wall = sim->desc.wall_temperature;
     int s, i, a;
     for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
-        int first[3];
-        gs4i_block_coordinates(g, g->block[s], first);
+        int block[3], at[3];
+        gs4i_block_coordinates(g, g->block[s], block);
         for (i = 0; i < GS4I_BLOCK_NODES; i++) {
             const size_t node = 4 * ((size_t)s * GS4I_BLOCK_NODES + (size_t)i);
             const gs4_real capacity = k->content[node] * g->inv_h * g->inv_h * g->inv_h;
             gs4_real *q = k->content + node, *flux = sim->particles.with_flux ? k->source + node : NULL, x[3], t[3], sum;
             size_t cell;
-            int at[3];
-            at[0] = 4 * (first[0] - 1) + (i & 3) - k->low[0]; at[1] = 4 * (first[1] - 1) + (i >> 2 & 3) - k->low[1]; at[2] = 4 * (first[2] - 1) + (i >> 4) - k->low[2];
             memset(q, 0, 4 * sizeof *q);
             if (flux) memset(flux, 0, 4 * sizeof *flux);
-            if (at[0] < 0 || at[1] < 0 || at[2] < 0 || at[0] >= k->size[0] || at[1] >= k->size[1] || at[2] >= k->size[2]) continue;
-            cell = gs4i_heat_cell(k, at[0], at[1], at[2]);
-            if (k->kind[cell] != GS4_CELL_LIQUID) continue;
+            if (!gs4i_heat_cell_of(k, block, i, at, &cell) || k->kind[cell] != GS4_CELL_LIQUID) continue;
             sum = gs4i_second_differences(sim, X, holds, NULL, at, x);
             q[0] = X[cell] - GS4I_C(0.25) * sum;
             if (mix[cell] > 0) {
@@ -7082,24 +7047,6 @@ GS4I_INLINE void gs4i_heat_faces_of(const gs4i_conduction *k, const int at[3], s
     face[0] = (z * ny + y) * (nx + 1) + x;   face[1] = face[0] + 1;
     face[2] = (z * (ny + 1) + y) * nx + x;   face[3] = face[2] + nx;
     face[4] = (z * ny + y) * nx + x;         face[5] = face[4] + nx * ny;
-}
-
-/* Adds the links around the periodic axes to the diagonal, and remembers them. */
-static void gs4i_wrap_diagonal(const gs4_sim *sim)
-{
-    const gs4i_conduction *k = &sim->conduction;
-    const gs4_real per_area = sim->grid.inv_h * sim->grid.inv_h;
-    size_t i = 0, face[6];
-    int at[3], side;
-    for (at[2] = 0; at[2] < k->size[2]; at[2]++)
-        for (at[1] = 0; at[1] < k->size[1]; at[1]++)
-            for (at[0] = 0; at[0] < k->size[0]; at[0]++, i++) {
-                const gs4_real before = k->field[GS4I_HEAT_DIAGONAL][i];
-                gs4i_heat_faces_of(k, at, face);
-                for (side = 0; side < 6; side++)
-                    if (at[side / 2] == (side & 1 ? k->size[side / 2] - 1 : 0)) k->field[GS4I_HEAT_DIAGONAL][i] += per_area * k->field[GS4I_HEAT_FACES + side / 2][face[side]];
-                k->wrapped[i] = (double)k->field[GS4I_HEAT_DIAGONAL][i] - (double)before;
-            }
 }
 
 /* --- periodic walls: conjugate gradients around the solver, which knows of none --------------------------- */
@@ -7129,7 +7076,7 @@ static void gs4i_heat_apply_plane(int z, void *context)
                 if (to[side / 2] < 0) to[side / 2] = k->size[side / 2] - 1; else if (to[side / 2] == k->size[side / 2]) to[side / 2] = 0;
                 flow += (double)k->field[GS4I_HEAT_FACES + side / 2][face[side]] * (task->p[gs4i_heat_cell(k, to[0], to[1], to[2])] - task->p[i]);
             }
-            task->out[i] = ((double)k->field[GS4I_HEAT_DIAGONAL][i] - k->wrapped[i]) * task->p[i] - per_area * flow;
+            task->out[i] = (double)k->field[GS4I_HEAT_DIAGONAL][i] * task->p[i] - per_area * flow;
         }
 }
 
@@ -7141,7 +7088,26 @@ static double gs4i_heat_dot(const double *a, const double *b, size_t n)
     return sum;
 }
 
-/* The links around count as links to 0 in the preconditioner, one solve without them: what is left has few eigenvalues far from 1. */
+/* The diagonal of the preconditioner, in X until that is needed: the links around the periodic axes count as links to 0. */
+static const gs4_real *gs4i_unwrapped_diagonal(const gs4_sim *sim)
+{
+    const gs4i_conduction *k = &sim->conduction;
+    const gs4_real per_area = sim->grid.inv_h * sim->grid.inv_h;
+    gs4_real *diagonal = k->field[GS4I_HEAT_X];
+    size_t i = 0, face[6];
+    int at[3], side;
+    for (at[2] = 0; at[2] < k->size[2]; at[2]++)
+        for (at[1] = 0; at[1] < k->size[1]; at[1]++)
+            for (at[0] = 0; at[0] < k->size[0]; at[0]++, i++) {
+                gs4i_heat_faces_of(k, at, face);
+                diagonal[i] = k->field[GS4I_HEAT_DIAGONAL][i];
+                for (side = 0; side < 6; side++)
+                    if (at[side / 2] == (side & 1 ? k->size[side / 2] - 1 : 0)) diagonal[i] += per_area * k->field[GS4I_HEAT_FACES + side / 2][face[side]];
+            }
+    return diagonal;
+}
+
+/* One solve without the links around is the preconditioner: what is left has few eigenvalues far from 1. */
 static int gs4i_solve_periodic(gs4_sim *sim, double tolerance, gs4_solve_stats *stats)
 {
     gs4i_conduction *k = &sim->conduction;
@@ -7186,10 +7152,10 @@ static int gs4i_solve_heat(gs4_sim *sim)
     int a, result;
     memset(&d, 0, sizeof d); memset(&stats, 0, sizeof stats);
     for (a = 0; a < 3; a++) { d.cells[a] = k->size[a]; d.coefficient[a] = k->field[GS4I_HEAT_FACES + a]; }
-    d.cell_size = sim->grid.h; d.kind = k->kind; d.diagonal = k->field[GS4I_HEAT_DIAGONAL];
+    d.cell_size = sim->grid.h; d.kind = k->kind; d.diagonal = k->outer ? gs4i_unwrapped_diagonal(sim) : k->field[GS4I_HEAT_DIAGONAL];
+    d.threads = sim->desc.threads; d.parallel_for = sim->desc.parallel_for;
     k->solver.memory = &sim->memory; k->solver.tasks = &sim->tasks;
-    if (k->outer) gs4i_wrap_diagonal(sim);
-    result = gs4i_solver_setup(&k->solver, &d, sim->desc.threads > 1 ? 2 * sim->desc.threads : sim->desc.parallel_for ? 8 : 1);
+    result = gs4i_solver_setup(&k->solver, &d);
     if (result == GS4_ERROR_MEMORY) return gs4i_fail_memory(sim);
     if (result == GS4_OK)
         result = k->outer ? gs4i_solve_periodic(sim, tolerance, &stats)
@@ -7206,7 +7172,7 @@ static void gs4i_free_heat(gs4i_memory *m, gs4i_conduction *k)
     const size_t node = GS4I_NODE_REALS * sizeof(gs4_real), slots = (size_t)k->slots;
     gs4i_free(m, k->content, slots, node); gs4i_free(m, k->source, slots, node);
     gs4i_free(m, k->field[0], k->room, GS4I_HEAT_FIELDS * sizeof(gs4_real)); gs4i_free(m, k->kind, k->room, 1);
-    gs4i_free(m, k->outer, k->room, 5 * sizeof *k->outer);
+    gs4i_free(m, k->outer, k->room, 4 * sizeof *k->outer);
     k->solver.memory = m;
     gs4i_solver_free(&k->solver);
 }
@@ -8639,6 +8605,7 @@ static int gs4i_check_viscoelastic(gs4_sim *sim, const gs4_material *m)
     }
     GS4I_TRY(gs4i_check(sim, "stretch_time", m->stretch_time, GS4I_POSITIVE));
     GS4I_TRY(gs4i_check(sim, "anisotropy", m->anisotropy, GS4I_NOT_NEGATIVE));
+    if (m->anisotropy > GS4I_C(1e6)) return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "anisotropy is ", (double)m->anisotropy, "; it must be up to 1e6: beyond, rounding alone stretches the pom-poms");
     GS4I_TRY(gs4i_check(sim, "arms", m->arms, GS4I_POSITIVE));
     if (m->arms < 1) return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "arms is ", (double)m->arms, "; a pom-pom has 1 or more");
     return GS4_OK;
@@ -9311,7 +9278,7 @@ GS4_API int gs4_add_emitter(gs4_sim *sim, const gs4_emitter *emitter)
     GS4I_TRY(gs4i_check_emitter(sim, &e));
     if (!gs4i_clip_shape(sim, &e.shape, (double)e.fill.spacing, from, to, low, n)) return gs4i_bad_argument(sim, "shape lies outside of the grid");
     memset(&mouth, 0, sizeof mouth);
-    mouth.shape = e.shape; mouth.velocity = e.travel;
+    mouth.shape = e.shape; mouth.velocity = e.travel; mouth.temperature = e.fill.temperature;
     GS4I_TRY(gs4i_grow(sim, (void **)&sim->emitters, sim->emitter_count, &sim->emitter_capacity, sizeof *sim->emitters));
     GS4I_TRY(gs4i_grow(sim, (void **)&sim->boundary.bodies, sim->boundary.body_count, &sim->boundary.body_capacity, sizeof *sim->boundary.bodies));
     body = &sim->boundary.bodies[sim->boundary.body_count];
@@ -9752,7 +9719,7 @@ static int gs4i_init_poisson(gs4_sim *fake, gs4_poisson *p)
         if (!p->tasks.pool) return gs4i_fail(fake, GS4_ERROR_MEMORY, "the threads could not be started");
     }
 #endif
-    r = gs4i_solver_setup(&p->solver, d, d->threads > 1 ? 2 * d->threads : d->parallel_for ? 8 : 1);
+    r = gs4i_solver_setup(&p->solver, d);
     p->setup_seconds = gs4i_poisson_now(p) - start;
     p->desc.kind = NULL; p->desc.diagonal = p->desc.coefficient[0] = p->desc.coefficient[1] = p->desc.coefficient[2] = NULL;
     if (r == GS4_ERROR_MEMORY) return gs4i_fail_memory(fake);

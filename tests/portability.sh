@@ -120,22 +120,25 @@ few_warnings() {
 
 # ==== several translation units ================================================================================
 
-# link BUILD_OF_USER USER BUILD_OF_IMPLEMENTATION IMPLEMENTATION
-linked() {
-    $1 -I. -c "$tmp/$2" -o "$tmp/user.o" && $3 -I. -c "$tmp/$4" -o "$tmp/unit.o" && $1 "$tmp/user.o" "$tmp/unit.o" -o "$tmp/linked" -lm
-}
+# object NAME FILE BUILD...: $tmp/NAME.o
+object() { name=$1 file=$2; shift 2; check "$* $file" "$@" -I. -c "$tmp/$file" -o "$tmp/$name.o"; }
 
+# linked LINKER OBJECT OBJECT
+linked() { $1 "$tmp/$2.o" "$tmp/$3.o" -o "$tmp/linked" -lm; }
 runs_linked() { linked "$@" && "$tmp/linked"; }
 
 units() {
-    check "two units" runs_linked "$CC" user.c "$CC" implementation.c
-    check "two units in double" runs_linked "$CC -DGS4_DOUBLE" user.c "$CC -DGS4_DOUBLE" implementation.c
-    check "float and double in one program" runs_linked "$CC" half.c "$CC -DGS4_DOUBLE" half.c
-    check "a user in float does not link with an implementation in double" refused linked "$CC" user.c "$CC -DGS4_DOUBLE" implementation.c
-    check "nor the other way round" refused linked "$CC -DGS4_DOUBLE" user.c "$CC" implementation.c
+    for f in user implementation; do object $f $f.c $CC; object ${f}64 $f.c $CC -DGS4_DOUBLE; done
+    object half half.c $CC; object half64 half.c $CC -DGS4_DOUBLE
+    check "two units" runs_linked $CC user implementation
+    check "two units in double" runs_linked $CC user64 implementation64
+    check "float and double in one program" runs_linked $CC half half64
+    check "a user in float does not link with an implementation in double" refused linked $CC user implementation64
+    check "nor the other way round" refused linked $CC user64 implementation
     have g++ || return
-    check "C++ uses C" runs_linked g++ user.cpp "$CC" implementation.c
-    check "C uses C++" runs_linked "$CC" user.c g++ implementation.cpp
+    for f in user implementation; do object ${f}_cpp $f.cpp g++; done
+    check "C++ uses C" runs_linked g++ user_cpp implementation
+    check "C uses C++" runs_linked g++ user implementation_cpp
 }
 
 # Programs in the manual and in README.md, each of which has a main
@@ -143,7 +146,7 @@ snippets() {
     sed -n 's/^ \*     //p' gs4mpm.h | awk '/^#include <stdio.h>/ { on = 1 } on; on && /^}/ { exit }' > "$tmp/snippet0.c"
     awk -v name="$tmp/snippet" '/^```/ { on = /^```c$/; n += on; next } on { print > (name n ".c") }' README.md 2> "$tmp/m" || skip "no README.md yet"
     for f in $(grep -l 'int main' "$tmp"/snippet*.c); do
-        check "$(head -n 3 "$f" | tail -n 1)" $CC -std=c99 -O1 -Wall -Wpedantic -Werror -I. "$f" -o "$tmp/linked" -lm
+        check "$(head -n 3 "$f" | tail -n 1)" $CC -std=c99 -Wall -Wpedantic -Werror -I. "$f" -o "$tmp/linked" -lm
     done
 }
 
@@ -254,6 +257,7 @@ threads_and_checkpoint() {
 }
 
 few_hashes() {
+    threaded="$CC -O1 -DGS4_PTHREADS -pthread"
     reference "" 40
     same "-O0" "$CC -O0" ""
     same "GS4_NO_VECTORS" "$CC -O0 -DGS4_NO_VECTORS" ""
@@ -427,7 +431,7 @@ link() {
     check "a program needs no other library" needs_only
 }
 asks_only() {
-    $CC -O1 -fno-stack-protector -U_FORTIFY_SOURCE $2 -I. -c "$tmp/implementation.c" -o "$tmp/link.o" || return 1
+    $CC -fno-stack-protector -U_FORTIFY_SOURCE $2 -I. -c "$tmp/implementation.c" -o "$tmp/link.o" || return 1
     nm -u "$tmp/link.o" | awk '{ print $NF }' | grep -vxF -f "$tmp/libm" | grep -vxE "$1|_GLOBAL_OFFSET_TABLE_" > "$tmp/m"
     refused grep . "$tmp/m"
 }

@@ -23,10 +23,10 @@ tests() {
     $CC -O2 $native ${CFLAGS:-} $2 -DGS4_PTHREADS -pthread -I. tests/main.c -o "$tmp/$1" -lm && (cd "$tmp" && "./$1" $slow)
 }
 
-tests float '' > "$tmp/float.log" 2>&1 &
 tests double -DGS4_DOUBLE > "$tmp/double.log" 2>&1 &
-wait
+tests float '' > "$tmp/float.log" 2>&1
 sh tests/portability.sh $part > "$tmp/portability.log" 2>&1
+wait
 
 passed=0 failed=0 skipped=0
 for log in float double portability; do

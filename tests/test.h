@@ -1,5 +1,5 @@
 /* A test is a function; a check prints its place, its expression and its numbers when it fails.
- *   CHECK(condition)   CHECK_CLOSE(value, expected, tolerance)   CHECK_RESULT(sim, call, code)   RUN(test)
+ *   CHECK(condition)   CHECK_CLOSE(value, expected, tolerance)   CHECK_RESULT(sim, call, code)   RUN(test)   RUN_ONCE(test)
  * Arguments of the program: a part of a name runs the tests that contain it; --slow adds the long ones. */
 #ifndef TEST_H
 #define TEST_H
@@ -35,6 +35,9 @@ static void test_close(double value, double expected, double tolerance, const ch
     if (!test_good) printf("    %d: %s\n", test_r, gs4_last_error(sim)); } while (0)
 #define RUN(test) do { test_name = #test; if (strstr(test_name, test_filter)) { const clock_t test_start = clock(); test(); \
     if (test_filter[0]) printf("%s: %.1f s\n", test_name, (double)(clock() - test_start) / CLOCKS_PER_SEC); } } while (0)
+
+/* In float only where tests are quick: what double would say again. */
+#define RUN_ONCE(test) do { if (test_slow || sizeof(gs4_real) == 4) RUN(test); } while (0)
 
 static int test_finish(void)
 {

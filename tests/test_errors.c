@@ -48,30 +48,14 @@ static gs4_sim *err_scene(void)
     return sim;
 }
 
-static int err_view_is_finite(gs4_view v)
-{
-    int i, c;
-    for (i = 0; i < v.count; i++)
-        for (c = 0; c < v.components; c++) if (!(fabs((double)v.data[(size_t)i * (size_t)v.stride + (size_t)c]) < 1e300)) return 0;
-    return 1;
-}
-
-static int err_is_finite(const gs4_sim *sim)
-{
-    return err_view_is_finite(gs4_particles(sim, GS4_FIELD_POSITION)) && err_view_is_finite(gs4_particles(sim, GS4_FIELD_VELOCITY))
-        && err_view_is_finite(gs4_particles(sim, GS4_FIELD_VOLUME_RATIO)) && err_view_is_finite(gs4_particles(sim, GS4_FIELD_MASS))
-        && err_view_is_finite(gs4_particles(sim, GS4_FIELD_TEMPERATURE)) && err_view_is_finite(gs4_particles(sim, GS4_FIELD_LIQUID_FRACTION))
-        && err_view_is_finite(gs4_particles(sim, GS4_FIELD_FLUX));
-}
-
 /* A few steps of half the limit and one gs4_advance: each is taken, or refused with a sentence; all stays finite. */
 static int err_goes_on(gs4_sim *sim)
 {
-    int i, good = err_is_finite(sim);
+    int i, good = physics_is_finite(sim);
     for (i = 0; i < 4 && good; i++) {
         const gs4_real limit = gs4_stable_dt(sim), dt = (gs4_real)0.5 * (limit < (gs4_real)0.01 ? limit : (gs4_real)0.01);
         const int r = i < 3 ? gs4_step(sim, dt) : gs4_advance(sim, 2 * dt);
-        good = limit >= 0 && r <= 0 && (r == GS4_OK || gs4_last_error(sim)[0]) && err_is_finite(sim);
+        good = limit >= 0 && r <= 0 && (r == GS4_OK || gs4_last_error(sim)[0]) && physics_is_finite(sim);
     }
     return good;
 }
@@ -582,7 +566,7 @@ static void test_errors_sdf(void)
             n = gs4_add_particles(sim, gs4_box(at(0.25, 0.25, 0.25), at(0.75, 0.75, 0.75)), &f);
             CHECK_RESULT(sim, gs4_add_collider(sim, &c), 0);
             CHECK(gs4_advance(sim, (gs4_real)0.05) <= 0);
-            CHECK(err_is_finite(sim));
+            CHECK(physics_is_finite(sim));
             CHECK(gs4_get_stats(sim).particles == n);
             gs4_destroy(sim);
         }
@@ -708,7 +692,7 @@ static void test_errors_edit(void)
         e = gs4_edit_particles(sim, field ? GS4_FIELD_VELOCITY : GS4_FIELD_POSITION);
         e.data[7 * e.stride + c] = keep;
         CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)0.01), 0);
-        CHECK(err_is_finite(sim) && gs4_get_stats(sim).particles == 64);
+        CHECK(physics_is_finite(sim) && gs4_get_stats(sim).particles == 64);
         gs4_destroy(sim);
     }
 }
@@ -852,7 +836,7 @@ static void test_errors_refused_step(void)
             ERR_REFUSED(sim, gs4_step(sim, (gs4_real)1e6 * limit), GS4_ERROR_UNSTABLE, "dt");
             CHECK_RESULT(sim, gs4_step(sim, (gs4_real)0.7 * limit), 0);
         }
-        CHECK(err_is_finite(sim));
+        CHECK(physics_is_finite(sim));
         gs4_destroy(sim);
     }
 }
@@ -879,7 +863,7 @@ static void test_errors_viscosity_callback(void)
             }
             law.value = (gs4_real)0.1;
             CHECK_RESULT(sim, gs4_step(sim, dt), 0);
-            CHECK(err_is_finite(sim));
+            CHECK(physics_is_finite(sim));
         }
         law.value = (gs4_real)ERR_NAN;
         if (gs4_get_stats(sim).particles) CHECK(gs4_advance(sim, (gs4_real)0.01) == GS4_ERROR_UNSTABLE);
@@ -912,7 +896,7 @@ static void test_errors_no_end(void)
         if (gs4_add_particles(sim, gs4_box(at(h, h, h), at(3 * h, 3 * h, 3 * h)), &f) > 0) {
             r = gs4_advance(sim, (gs4_real)hard[i].duration);
             err_report(r == GS4_OK ? i == ERR_COUNT(hard) - 1 : gs4_last_error(sim)[0] != 0, "hard", "scene", i, r, gs4_last_error(sim));
-            CHECK(err_is_finite(sim));
+            CHECK(physics_is_finite(sim));
             CHECK((double)(clock() - start) / CLOCKS_PER_SEC < (i == ERR_COUNT(hard) - 1 ? 10 : 1));
         }
         gs4_destroy(sim);
@@ -976,7 +960,7 @@ static void test_errors_max_particles(void)
     }
     CHECK(gs4_get_stats(sim).particles == 100 && seen[1] > 0);
     ERR_REFUSED(sim, gs4_add_points(sim, x, 1, (gs4_real)1e-4, &f), GS4_ERROR_MEMORY, "max_particles");
-    CHECK(err_is_finite(sim));
+    CHECK(physics_is_finite(sim));
     gs4_destroy(sim);
 }
 

@@ -998,7 +998,7 @@ static void test_files_other_scene(void)
 static void run_files(void)
 {
     files_begin();
-    RUN(test_files_memory);
+    RUN_ONCE(test_files_memory);
     RUN(test_files_load_refused);
     RUN(test_files_frames);
     RUN(test_files_places);

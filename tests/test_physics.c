@@ -16,6 +16,19 @@ static gs4_sim *physics_create(const gs4_sim_desc *d, const gs4_material *m)
     return sim;
 }
 
+/* Is all that a particle has a number, and not an absurd one? */
+static int physics_is_finite(const gs4_sim *sim)
+{
+    const double absurd = sizeof(gs4_real) == 8 ? 1e200 : 1e37;
+    int field, i, c;
+    for (field = 0; field <= GS4_FIELD_MASS; field++) {
+        const gs4_view v = gs4_particles(sim, (gs4_field)field);
+        for (i = 0; i < v.count; i++)
+            for (c = 0; c < v.components; c++) if (!(fabs((double)v.data[(size_t)i * (size_t)v.stride + (size_t)c]) < absurd)) return 0;
+    }
+    return 1;
+}
+
 static gs4_integrator physics_integrators[2] = { GS4_INTEGRATOR_GS4, GS4_INTEGRATOR_SYMPLECTIC_EULER };
 
 /* x0 + v0 t + g t^2 / 2 to rounding for any dt where rho_inf_spurious is 0; else an error that falls as dt^2. */
@@ -459,25 +472,21 @@ static void test_couette_surface(void)
         }
 }
 
-/* A drop on a sticky floor, Re 5, Fr 2.26 (2021, figure 9 left): width over D against t U/D from an axisymmetric volume-of-fluid
- * computation (finest level), allowed 3 %. Just after the impact (t U/D 1.58) the foot of the drop is 5 % too wide: not held yet. */
-static void test_drop_impact(void)
+/* A drop of diameter D falls on a sticky floor, Re 5, Fr 2.26 (2021, figure 9 left), 12 cells over D: its width over D at `count` times t U/D. */
+static void physics_drop_widths(const gs4_material *m, const double reference[][2], int count, double tolerance)
 {
-    static const double reference[3][2] = { { 2.38, 1.39293 }, { 3.18, 1.42262 }, { 3.98, 1.44785 } };
     const double D = 0.02;
     const int n = 12;
     gs4_sim_desc d = scene_cube(1);
-    gs4_material m = scene_liquid(1000, 4, 20);
     gs4_fill f = scene_fill(at(0, -1, 0));
     gs4_sim *sim;
     int i, k;
-    if (!test_slow || sizeof(gs4_real) == 8) return;
-    d.cells[0] = d.cells[2] = 2 * n; d.cells[1] = 33; d.cell_size = (gs4_real)(D / n);
+    d.cells[0] = d.cells[2] = 26; d.cells[1] = 33; d.cell_size = (gs4_real)(D / n);
     d.gravity = at(0, -9.81, 0); d.walls[2] = GS4_WALL_STICK;
-    sim = physics_create(&d, &m);
-    CHECK(gs4_add_particles(sim, gs4_sphere(at(D, 2 * D, D), (gs4_real)(D / 2)), &f) > 0);
-    for (k = 0; k < 3; k++) {
-        double low = 1, high = -1;
+    sim = physics_create(&d, m);
+    CHECK(gs4_add_particles(sim, gs4_sphere(at(1.08 * D, 2 * D, 1.08 * D), (gs4_real)(D / 2)), &f) > 0);
+    for (k = 0; k < count; k++) {
+        double low = 1, high = -1, width;
         gs4_view x;
         CHECK(physics_run(sim, reference[k][0] * D) == 0);
         x = gs4_particles(sim, GS4_FIELD_POSITION);
@@ -486,7 +495,18 @@ static void test_drop_impact(void)
             if (p < low) low = p;
             if (p > high) high = p;
         }
-        CHECK_CLOSE((high - low) / D + 0.5 / n, reference[k][1], 0.03 * reference[k][1]);      /* particles are centres of h/2 */
+        width = (high - low) / D + 0.5 / n;                 /* particles are centres of h/2 */
+        if (test_filter[0]) printf("drop at t U/D %g: width %.3f D, reference %.3f D\n", reference[k][0], width, reference[k][1]);
+        CHECK_CLOSE(width, reference[k][1], tolerance * reference[k][1]);
     }
     gs4_destroy(sim);
+}
+
+/* Against an axisymmetric volume-of-fluid computation (finest level). Just after the impact (t U/D 1.58) the foot of the drop is 5 % too
+ * wide: not held yet. */
+static void test_drop_impact(void)
+{
+    static const double reference[3][2] = { { 2.38, 1.39293 }, { 3.18, 1.42262 }, { 3.98, 1.44785 } };
+    const gs4_material m = scene_liquid(1000, 4, 20);
+    if (test_slow) physics_drop_widths(&m, reference, 3, 0.03);
 }

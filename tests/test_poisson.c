@@ -329,7 +329,7 @@ static void test_poisson_reuse(void)
         gs4_real *x = poisson_array(p.count);
         CHECK_RESULT(NULL, pois_solve(&p, &stats), GS4_OK);
         memset(&stats, 0, sizeof stats);
-        CHECK(gs4i_solver_setup(&s, &p.desc, 1) == GS4_OK);
+        CHECK(gs4i_solver_setup(&s, &p.desc) == GS4_OK);
         CHECK(gs4i_solver_solve(&s, p.rhs, x, 1e-8, 200, &stats) == GS4_OK);
         CHECK(memcmp(x, p.x, p.count * sizeof *x) == 0);
         free(x);
@@ -503,7 +503,7 @@ static void run_poisson(void)
     RUN(test_poisson_order);
     RUN(test_poisson_guess_and_units);
     RUN(test_poisson_symmetry);
-    RUN(test_poisson_same_bits);
+    RUN_ONCE(test_poisson_same_bits);
     RUN(test_poisson_reuse);
     RUN(test_poisson_limit);
     RUN(test_poisson_breakdown);

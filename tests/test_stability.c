@@ -104,7 +104,7 @@ static const char *stability_fault(gs4_sim *sim, const stability_scene *s, int i
     const double h = s->cell_size, speed2 = s->flight * h * s->flight * h + 4 * s->gravity * h;
     if (result > 0 || (result < 0 && !gs4_last_error(sim)[0])) return "neither taken nor refused with a sentence";
     if (i == 20 && result < 0 && speed2 < s->sound_speed * s->sound_speed) return "gives up";
-    if (!err_is_finite(sim)) return "not finite";
+    if (!physics_is_finite(sim)) return "not finite";
     if (s->gravity == 0 && !(stability_energy(sim, s->sound_speed) < 1.1 * energy)) return "energy from nowhere";
     return NULL;
 }

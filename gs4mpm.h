@@ -3898,9 +3898,9 @@ static int gs4i_preset(const char *name, gs4_material *m)
  *
  * The conformation c = S + I is positive definite: its eigenvalues are squares of stretches. Two integrators of second order:
  * rule 1 of the manual, in lanes, with the relaxation f s implicit, where the step resolves the material; and, particle by
- * particle where it does not, the split c <- E c E^T, E = exp(L h), between two half relaxations in the eigenbasis of c, in
- * which each eigenvalue obeys dc_k/dt = -[f c_k - 1 + alpha (c_k - 1)^2] / lambda_b: positive by construction, in substeps h
- * chosen by comparing one with two halves. For alpha > 1 an eigenvalue below 1 - 1/alpha falls without end: the model leaves the cone in
+ * particle where it does not, one that keeps c positive definite by construction: UCM and Oldroyd-B exactly; a pom-pom by the split
+ * c <- E c E^T, E = exp(L h), between two half relaxations dc/dt = -[f c - I + alpha (c - I)^2] / lambda_b, in substeps h chosen by
+ * comparing one with two halves. For alpha > 1 an eigenvalue below 1 - 1/alpha falls without end: the model leaves the cone in
  * finite time. Then, and only then, it relaxes there without the term of alpha, none relaxes to less, none is above 1e6, and how
  * often is counted. */
 
@@ -4004,43 +4004,94 @@ static void gs4i_eigen(const double m[6], double values[3], double Q[3][3])
     for (i = 0; i < 3; i++) values[i] = a[i][i];
 }
 
-/* f, and how fast it changes with the stretch */
-static double gs4i_relaxation(const gs4i_split *p, const double c[3], double *stiff)
+/* f, and how fast it changes with the stretch; `trace` and `squares` of S = c - I */
+static double gs4i_relaxation(const gs4i_split *p, double trace, double squares, double *stiff)
 {
-    const double S[3] = { c[0] - 1, c[1] - 1, c[2] - 1 };
     double f1;
-    *stiff = 0;
-    if (!(p->stretch > 0)) return 1;
-    gs4i_pom_pom(p->stretch, p->nu, p->alpha, (S[0] + S[1] + S[2]) / 3, S[0] * S[0] + S[1] * S[1] + S[2] * S[2], &f1, stiff);
+    gs4i_pom_pom(p->stretch, p->nu, p->alpha, trace / 3, squares, &f1, stiff);
     return f1 + 1;
 }
 
-/* Relax for the time h: with f frozen, twice (half way ahead, then all the way with f from there), each eigenvalue goes
- * exactly by dc/dt = -(g c - (1 - alpha)) / lambda_b, g = f + alpha (c - 2). */
+static double gs4i_relaxation_at(const gs4i_split *p, const double m[6], double *stiff)
+{
+    const double x = m[0] - 1, y = m[1] - 1, z = m[2] - 1;
+    return gs4i_relaxation(p, x + y + z, x * x + y * y + z * z + 2 * (m[3] * m[3] + m[4] * m[4] + m[5] * m[5]), stiff);
+}
+
+/* Is the smallest eigenvalue more than what rounding of the largest makes of it? By det / (sum of principal minors), a third of it at least. */
+static int gs4i_is_round(const double m[6])
+{
+    const double minors = (m[0] * m[1] - m[3] * m[3]) + (m[0] * m[2] - m[4] * m[4]) + (m[1] * m[2] - m[5] * m[5]);
+    const double det = m[0] * (m[1] * m[2] - m[5] * m[5]) - m[3] * (m[3] * m[2] - m[5] * m[4]) + m[4] * (m[3] * m[5] - m[1] * m[4]);
+    return minors > 0 && det > 1e-11 * (m[0] + m[1] + m[2]) * minors;
+}
+
+/* With f frozen dc/dt = -[alpha c^2 + (f - 2 alpha) c - (1 - alpha)], t in units of lambda_b, is Riccati's equation: c = u v^-1 of the linear
+ * (u, v)' = [[-g, 1 - alpha], [alpha, g]] (u, v), g = f/2 - alpha, whose exponential e has no negative entry for alpha in [0, 1]. Exact, and
+ * positive definite as c is: (e00 c + e01)(e10 c + e11)^-1. */
+static void gs4i_relax_frozen(double alpha, double f, double t, const double c[6], double to[6])
+{
+    const double g = 0.5 * f - alpha, w = sqrt(g * g + alpha * (1 - alpha));
+    double e00 = 1 - g * t, e11 = 1 + g * t, grown = t, d[6], inverse[6], det;
+    int i, j, k;
+    if (w * t > 1e-9) {                                     /* all times exp(-w t), which cancels */
+        const double q = exp(-2 * w * t), more = 1 + fabs(g) / w, less = alpha * (1 - alpha) / (w * (w + fabs(g)));
+        e00 = 0.5 * (g > 0 ? less + q * more : more + q * less);
+        e11 = 0.5 * (g > 0 ? more + q * less : less + q * more);
+        grown = -expm1(-2 * w * t) / (2 * w);
+    }
+    for (i = 0; i < 6; i++) d[i] = alpha * grown * c[i] + (i < 3 ? e11 : 0);
+    inverse[0] = d[1] * d[2] - d[5] * d[5]; inverse[3] = d[4] * d[5] - d[3] * d[2]; inverse[4] = d[3] * d[5] - d[4] * d[1];
+    inverse[1] = d[0] * d[2] - d[4] * d[4]; inverse[5] = d[3] * d[4] - d[0] * d[5]; inverse[2] = d[0] * d[1] - d[3] * d[3];
+    det = d[0] * inverse[0] + d[3] * inverse[3] + d[4] * inverse[4];
+    for (i = 0; i < 3; i++)
+        for (j = i; j < 3; j++) {
+            double sum = (1 - alpha) * grown * inverse[gs4i_place[i][j]];
+            for (k = 0; k < 3; k++) sum += e00 * c[gs4i_place[i][k]] * inverse[gs4i_place[k][j]];
+            to[gs4i_place[i][j]] = sum / det;
+        }
+}
+
+/* The same for alpha > 1, and where rounding could make an eigenvalue negative: each by itself, dc/dt = -(g c - (1 - alpha)),
+ * g = f + alpha (c - 2) frozen too, and held inside the bounds. */
+static void gs4i_relax_values(gs4i_split *p, double f, double t, const double now[3], const double c[3], double next[3])
+{
+    int k;
+    for (k = 0; k < 3; k++) {
+        const double lost = p->alpha > 1 ? 1 - 1 / p->alpha : 0, alpha = now[k] < lost ? 0 : p->alpha;
+        const double g = f + alpha * (now[k] - 2), x = g * t, phi = fabs(x) < 1e-9 ? 1 - 0.5 * x : -expm1(-x) / x;
+        next[k] = c[k] * exp(-x) + (1 - alpha) * t * phi;
+        if (!(p->alpha > 1)) continue;
+        if (alpha > 1 && !(next[k] >= 0.999 * lost)) { next[k] = 0.999 * lost; p->bounded = 1; }
+        if (alpha < p->alpha || next[k] > 1e6) p->bounded = 1;
+        if (next[k] > 1e6) next[k] = 1e6;
+    }
+}
+
+/* Relax for the time h: with f frozen, twice, half way ahead, then all the way with f from there. */
 static void gs4i_relax(gs4i_split *p, double m[6], double h)
 {
-    double c[3], half[3], next[3], Q[3][3], f, stiff = 0;
-    int i, j, k, stage;
-    gs4i_eigen(m, c, Q);
-    for (i = 0; i < 3; i++) half[i] = c[i] = c[i] > 0 ? c[i] : 1e-30;   /* rounding of a thin ellipsoid */
-    for (stage = 0; stage < 2; stage++) {
-        const double before = stiff;
-        f = gs4i_relaxation(p, half, &stiff);
-        if (stage) p->swing = fmax(p->swing, (fabs(stiff - before) + 2 * stiff) * h * p->inv_lambda);
-        for (k = 0; k < 3; k++) {
-            const double lost = p->alpha > 1 ? 1 - 1 / p->alpha : 0, alpha = half[k] < lost ? 0 : p->alpha;
-            const double g = f + alpha * (half[k] - 2), t = (stage ? h : 0.5 * h) * p->inv_lambda, x = g * t;
-            const double phi = fabs(x) < 1e-9 ? 1 - 0.5 * x : -expm1(-x) / x;
-            next[k] = c[k] * exp(-x) + (1 - alpha) * t * phi;
-            if (alpha > 1 && !(next[k] >= 0.999 * lost)) { next[k] = 0.999 * lost; p->bounded = 1; }
-            if (alpha < p->alpha || next[k] > 1e6) p->bounded = 1;
-            if (p->alpha > 1 && next[k] > 1e6) next[k] = 1e6;
-        }
-        for (k = 0; k < 3; k++) half[k] = next[k];
+    const double t = h * p->inv_lambda;
+    double half[6], c[3], mid[3], next[3], Q[3][3], before, stiff, f;
+    int i, j;
+    if (m[0] == 1 && m[1] == 1 && m[2] == 1 && m[3] == 0 && m[4] == 0 && m[5] == 0) return;     /* at rest */
+    if (p->alpha <= 1 && gs4i_is_round(m)) {
+        gs4i_relax_frozen(p->alpha, gs4i_relaxation_at(p, m, &before), 0.5 * t, m, half);
+        f = gs4i_relaxation_at(p, half, &stiff);
+        gs4i_relax_frozen(p->alpha, f, t, m, half);
+        memcpy(m, half, sizeof half);
+    } else {
+        gs4i_eigen(m, c, Q);
+        for (i = 0; i < 3; i++) c[i] = c[i] > 0 ? c[i] : 1e-30;         /* rounding of a thin ellipsoid */
+        f = gs4i_relaxation(p, c[0] - 1 + (c[1] - 1) + (c[2] - 1), (c[0] - 1) * (c[0] - 1) + (c[1] - 1) * (c[1] - 1) + (c[2] - 1) * (c[2] - 1), &before);
+        gs4i_relax_values(p, f, 0.5 * t, c, c, mid);
+        f = gs4i_relaxation(p, mid[0] - 1 + (mid[1] - 1) + (mid[2] - 1), (mid[0] - 1) * (mid[0] - 1) + (mid[1] - 1) * (mid[1] - 1) + (mid[2] - 1) * (mid[2] - 1), &stiff);
+        gs4i_relax_values(p, f, t, mid, c, next);
+        for (i = 0; i < 3; i++)
+            for (j = i; j < 3; j++)
+                m[gs4i_place[i][j]] = Q[i][0] * next[0] * Q[j][0] + Q[i][1] * next[1] * Q[j][1] + Q[i][2] * next[2] * Q[j][2];
     }
-    for (i = 0; i < 3; i++)
-        for (j = i; j < 3; j++)
-            m[gs4i_place[i][j]] = Q[i][0] * next[0] * Q[j][0] + Q[i][1] * next[1] * Q[j][1] + Q[i][2] * next[2] * Q[j][2];
+    p->swing = fmax(p->swing, (fabs(stiff - before) + 2 * stiff) * t);
 }
 
 static void gs4i_multiply3(double a[3][3], double b[3][3], double r[3][3])
@@ -4076,7 +4127,38 @@ static void gs4i_convect(double E[3][3], double m[6])
     for (i = 0; i < 3; i++) for (j = i; j < 3; j++) m[gs4i_place[i][j]] = T[i][0] * E[j][0] + T[i][1] * E[j][1] + T[i][2] * E[j][2];
 }
 
-#define GS4I_SPLIT_TOLERANCE 2e-5       /* of a substep, relative to S */
+/* UCM and Oldroyd-B: dS/dt = K S + S K^T + L + L^T, K = L - I/(2 lambda_b), is linear: S <- A S A^T + H, A = exp(K dt), by series over a
+ * time so short that they need few terms, then doubled. Exact for constant L. */
+static void gs4i_linear_advance(const gs4i_split *p, double c[6], double dt)
+{
+    double K[3][3], A[3][3], M[3][3], T[3][3], H[6] = { 0, 0, 0, 0, 0, 0 }, size = 0, factor;
+    int i, j, k, n = 0;
+    for (i = 0; i < 3; i++)
+        for (j = 0; j < 3; j++) {
+            K[i][j] = p->L[i][j] - (i == j ? 0.5 * p->inv_lambda : 0); M[i][j] = p->L[i][j] + p->L[j][i];
+            size = fmax(size, fabs(K[i][j]) * dt);
+        }
+    while (size > 1.0 / 64 && n < 1000) { size *= 0.5; n++; }
+    dt = ldexp(dt, -n);
+    gs4i_exponential(K, dt, A);
+    for (k = 1, factor = dt; k <= 8; k++, factor *= dt / k) {       /* H = sum of dt^k/k! M_k, M_1 = L + L^T, M_(k+1) = K M_k + M_k K^T */
+        for (i = 0; i < 3; i++) for (j = i; j < 3; j++) H[gs4i_place[i][j]] += factor * M[i][j];
+        gs4i_multiply3(K, M, T);
+        for (i = 0; i < 3; i++) for (j = 0; j < 3; j++) M[i][j] = T[i][j] + T[j][i];
+    }
+    for (k = 0; k < n; k++) {
+        double later[6];
+        memcpy(later, H, sizeof later);
+        gs4i_convect(A, later);
+        for (i = 0; i < 6; i++) H[i] += later[i];
+        gs4i_multiply3(A, A, A);
+    }
+    for (i = 0; i < 3; i++) c[i] -= 1;
+    gs4i_convect(A, c);
+    for (i = 0; i < 6; i++) c[i] += H[i] + (i < 3);
+}
+
+#define GS4I_SPLIT_TOLERANCE 1e-5       /* of a substep, relative to S */
 #define GS4I_SPLIT_LIMIT 20000          /* substeps; more means that nothing settles */
 
 /* Conformation after the time dt under constant L. 0, or GS4_ERROR_UNSTABLE where it overflows or takes too long. */
@@ -4084,6 +4166,7 @@ static int gs4i_split_advance(gs4i_split *p, double c[6], double dt)
 {
     double h = fmin(dt, 0.25 / p->inv_lambda), left = dt, E[3][3], half[3][3];      /* over a longer one any two answers agree: all has relaxed */
     int n, i;
+    if (!(p->stretch > 0)) { gs4i_linear_advance(p, c, dt); left = 0; }
     for (n = 0; n < GS4I_SPLIT_LIMIT && left > 0; n++) {
         double one[6], two[6], error = 0, change = 0, before = 0, after = 0, size, ratio;
         if (h > left * (1 - 1e-12)) h = left;

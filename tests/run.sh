@@ -9,7 +9,7 @@ cd "$(dirname "$0")/.." || exit 1
 CC=${CC:-cc}; export CC
 case "${1:-}" in
     '') slow='' part=quick ;;
-    --full) slow='' part=full ;;
+    --full) slow=--full part=full ;;
     --nightly) slow=--slow part=full ;;
     *) echo "usage: sh tests/run.sh [--full | --nightly]"; exit 2 ;;
 esac

@@ -1,6 +1,6 @@
 /* A test is a function; a check prints its place, its expression and its numbers when it fails.
  *   CHECK(condition)   CHECK_CLOSE(value, expected, tolerance)   CHECK_RESULT(sim, call, code)   RUN(test)   RUN_ONCE(test)
- * Arguments of the program: a part of a name runs the tests that contain it; --slow adds the long ones. */
+ * Arguments of the program: a part of a name runs the tests that contain it; --slow adds the long ones, --full those of a minute. */
 #ifndef TEST_H
 #define TEST_H
 #include <math.h>
@@ -9,7 +9,7 @@
 #include <string.h>
 #include <time.h>
 
-static int test_passed, test_failed, test_slow;
+static int test_passed, test_failed, test_slow, test_full;
 static const char *test_filter = "", *test_name = "";
 
 static void test_report(int good, const char *file, int line, const char *what)
@@ -48,6 +48,10 @@ static int test_finish(void)
 static void test_arguments(int count, char **values)
 {
     int i;
-    for (i = 1; i < count; i++) { if (strcmp(values[i], "--slow") == 0) test_slow = 1; else test_filter = values[i]; }
+    for (i = 1; i < count; i++) {
+        if (strcmp(values[i], "--slow") == 0) test_slow = 1;
+        else if (strcmp(values[i], "--full") == 0) test_full = 1;
+        else test_filter = values[i];
+    }
 }
 #endif

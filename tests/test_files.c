@@ -1003,7 +1003,7 @@ static void run_files(void)
     RUN(test_files_frames);
     RUN(test_files_places);
     RUN(test_files_previous);
-    RUN(test_files_continue);
+    RUN_ONCE(test_files_continue);
     RUN(test_files_continue_frozen);
     RUN(test_files_continue_edited);
     RUN(test_files_bad_edit);

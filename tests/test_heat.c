@@ -793,7 +793,7 @@ static gs4_sim *heat_draw_scene(uint64_t *r, int open)
 /* Edits every few steps: all, one, or something that must be refused and is mended. */
 static void heat_draw_edit(uint64_t *r, gs4_sim *sim)
 {
-    static const double wrong[5] = { (double)NAN, (double)INFINITY, -(double)INFINITY, 1e30, -1e30 };
+    const double wrong[5] = { (double)NAN, (double)INFINITY, -(double)INFINITY, 1e30, -1e30 };
     gs4_edit T = gs4_edit_particles(sim, GS4_FIELD_TEMPERATURE);
     const int which = heat_choice(r, 5 - 2 * (sizeof(gs4_real) == 8)), one = T.count ? heat_choice(r, T.count) : 0;
     gs4_real keep;

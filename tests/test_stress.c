@@ -181,7 +181,10 @@ static void stress_split_fixed(gs4i_split *p, double c[6], double time, int step
     double E[3][3];
     int i;
     gs4i_exponential(p->L, h, E);
-    for (i = 0; i < steps; i++) { gs4i_relax(p, c, 0.5 * h); gs4i_convect(E, c); gs4i_relax(p, c, 0.5 * h); }
+    for (i = 0; i < steps; i++) {
+        if (p->stretch > 0) { gs4i_relax(p, c, 0.5 * h); gs4i_convect(E, c); gs4i_relax(p, c, 0.5 * h); }
+        else gs4i_linear_advance(p, c, h);
+    }
 }
 
 static double stress_split_error(const double c[6], const double S[4])
@@ -231,7 +234,7 @@ static void test_stress_split(void)
         stress_split_follow(rows, n, 200, fine); stress_split_follow(rows, n, 400, finer);
         for (k = 0; k < n; k++) {
             worst[1] = fmax(worst[1], fine[k]);
-            CHECK(fine[k] < 1e-2);
+            CHECK(fine[k] < (rows->set < 0 ? 1e-9 : 1e-2));     /* UCM and Oldroyd-B: exact */
             if (finer[k] < 1e-9) continue;
             CHECK(log2(fine[k] / finer[k]) >= 1.9); orders++;
             if (test_filter[0] && (fine[k] > 1e-3 || !(log2(fine[k] / finer[k]) >= 1.9)))
@@ -522,7 +525,7 @@ static void stress_walks(long steps, double strain_max, int wild)
 
 static void test_stress_random(void)
 {
-    const long steps = test_slow ? 307692 : 280;            /* a million in all at night; the split takes about 1 ms where dt is thousands of relaxation times */
+    const long steps = test_slow ? 307692 : test_full ? 3077 : 280;       /* a million in all at night, ten thousand with --full */
     stress_seed = 20;
     stress_walks(2 * steps, 1, 0);                          /* what a simulation allows */
     stress_walks(steps / 4, 1, 1);
@@ -623,7 +626,7 @@ static void run_stress(void)
     RUN(test_stress_rigid_rotation);
     RUN(test_stress_pitfalls);
     RUN(test_stress_short_memory);
-    RUN(test_stress_random);
+    RUN_ONCE(test_stress_random);
     RUN(test_stress_bounded);
     RUN(test_stress_bad_arguments);
 }

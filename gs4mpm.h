@@ -4004,18 +4004,13 @@ static void gs4i_eigen(const double m[6], double values[3], double Q[3][3])
     for (i = 0; i < 3; i++) values[i] = a[i][i];
 }
 
-/* f, and how fast it changes with the stretch; `trace` and `squares` of S = c - I */
-static double gs4i_relaxation(const gs4i_split *p, double trace, double squares, double *stiff)
-{
-    double f1;
-    gs4i_pom_pom(p->stretch, p->nu, p->alpha, trace / 3, squares, &f1, stiff);
-    return f1 + 1;
-}
-
-static double gs4i_relaxation_at(const gs4i_split *p, const double m[6], double *stiff)
+/* f of the conformation m, and how fast it changes with the stretch */
+static double gs4i_relaxation(const gs4i_split *p, const double m[6], double *stiff)
 {
     const double x = m[0] - 1, y = m[1] - 1, z = m[2] - 1;
-    return gs4i_relaxation(p, x + y + z, x * x + y * y + z * z + 2 * (m[3] * m[3] + m[4] * m[4] + m[5] * m[5]), stiff);
+    double f1;
+    gs4i_pom_pom(p->stretch, p->nu, p->alpha, (x + y + z) / 3, x * x + y * y + z * z + 2 * (m[3] * m[3] + m[4] * m[4] + m[5] * m[5]), &f1, stiff);
+    return f1 + 1;
 }
 
 /* Is the smallest eigenvalue more than what rounding of the largest makes of it? By det / (sum of principal minors), a third of it at least. */
@@ -4072,21 +4067,18 @@ static void gs4i_relax_values(gs4i_split *p, double f, double t, const double no
 static void gs4i_relax(gs4i_split *p, double m[6], double h)
 {
     const double t = h * p->inv_lambda;
-    double half[6], c[3], mid[3], next[3], Q[3][3], before, stiff, f;
+    double half[6] = { 0, 0, 0, 0, 0, 0 }, c[6] = { 0, 0, 0, 0, 0, 0 }, next[3], Q[3][3], before, stiff;
     int i, j;
     if (m[0] == 1 && m[1] == 1 && m[2] == 1 && m[3] == 0 && m[4] == 0 && m[5] == 0) return;     /* at rest */
     if (p->alpha <= 1 && gs4i_is_round(m)) {
-        gs4i_relax_frozen(p->alpha, gs4i_relaxation_at(p, m, &before), 0.5 * t, m, half);
-        f = gs4i_relaxation_at(p, half, &stiff);
-        gs4i_relax_frozen(p->alpha, f, t, m, half);
-        memcpy(m, half, sizeof half);
+        memcpy(c, m, sizeof c);
+        gs4i_relax_frozen(p->alpha, gs4i_relaxation(p, c, &before), 0.5 * t, c, half);
+        gs4i_relax_frozen(p->alpha, gs4i_relaxation(p, half, &stiff), t, c, m);
     } else {
         gs4i_eigen(m, c, Q);
         for (i = 0; i < 3; i++) c[i] = c[i] > 0 ? c[i] : 1e-30;         /* rounding of a thin ellipsoid */
-        f = gs4i_relaxation(p, c[0] - 1 + (c[1] - 1) + (c[2] - 1), (c[0] - 1) * (c[0] - 1) + (c[1] - 1) * (c[1] - 1) + (c[2] - 1) * (c[2] - 1), &before);
-        gs4i_relax_values(p, f, 0.5 * t, c, c, mid);
-        f = gs4i_relaxation(p, mid[0] - 1 + (mid[1] - 1) + (mid[2] - 1), (mid[0] - 1) * (mid[0] - 1) + (mid[1] - 1) * (mid[1] - 1) + (mid[2] - 1) * (mid[2] - 1), &stiff);
-        gs4i_relax_values(p, f, t, mid, c, next);
+        gs4i_relax_values(p, gs4i_relaxation(p, c, &before), 0.5 * t, c, c, half);
+        gs4i_relax_values(p, gs4i_relaxation(p, half, &stiff), t, half, c, next);
         for (i = 0; i < 3; i++)
             for (j = i; j < 3; j++)
                 m[gs4i_place[i][j]] = Q[i][0] * next[0] * Q[j][0] + Q[i][1] * next[1] * Q[j][1] + Q[i][2] * next[2] * Q[j][2];

@@ -2713,11 +2713,11 @@ GS4I_INLINE void gs4i_row_of_quad(gs4i_row *r, const gs4i_quad *q)
 }
 
 #ifdef GS4I_VECTORS
-/* r[i] = (from[i] from[4 + i] from[8 + i] from[12 + i]) */
-GS4I_INLINE void gs4i_transpose(const gs4_real *from, gs4i_quad r[4])
+/* r[i] = (from[i] from[apart + i] from[2 apart + i] from[3 apart + i]) */
+GS4I_INLINE void gs4i_transpose(const gs4_real *from, int apart, gs4i_quad r[4])
 {
     gs4i_quad a, b, c, d, low, high, Low, High;
-    GS4I_LOAD(a, from); GS4I_LOAD(b, from + 4); GS4I_LOAD(c, from + 8); GS4I_LOAD(d, from + 12);
+    GS4I_LOAD(a, from); GS4I_LOAD(b, from + apart); GS4I_LOAD(c, from + 2 * apart); GS4I_LOAD(d, from + 3 * apart);
     low = __builtin_shufflevector(a, b, 0, 4, 1, 5); high = __builtin_shufflevector(a, b, 2, 6, 3, 7);
     Low = __builtin_shufflevector(c, d, 0, 4, 1, 5); High = __builtin_shufflevector(c, d, 2, 6, 3, 7);
     r[0] = __builtin_shufflevector(low, Low, 0, 1, 4, 5); r[1] = __builtin_shufflevector(low, Low, 2, 3, 6, 7);
@@ -2796,12 +2796,26 @@ GS4I_INLINE int gs4i_all(const gs4i_wide_mask *mask)
 #endif
 }
 
-/* (a b c d) of each of sixteen particles into four lanes */
-GS4I_INLINE void gs4i_sixteen_to_lanes(const gs4_real *from, gs4i_lanes to[4])
+#if GS4I_WIDTH == 16
+/* (a b c d) of each of four particles, one after the other */
+GS4I_INLINE void gs4i_load_four(const gs4_real *from, int apart, gs4i_wide *p)
+{
+    gs4i_quad a, b, c, d;
+    gs4i_pair ab, cd;
+    if (apart == 4) { GS4I_LOAD(*p, from); return; }
+    GS4I_LOAD(a, from); GS4I_LOAD(b, from + apart); GS4I_LOAD(c, from + 2 * apart); GS4I_LOAD(d, from + 3 * apart);
+    ab = __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7); cd = __builtin_shufflevector(c, d, 0, 1, 2, 3, 4, 5, 6, 7);
+    *p = __builtin_shufflevector(ab, cd, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+}
+#endif
+
+/* (a b c d) of each of sixteen particles, whose numbers are `apart`, into four lanes */
+GS4I_INLINE void gs4i_sixteen_to_lanes(const gs4_real *from, int apart, gs4i_lanes to[4])
 {
 #if GS4I_WIDTH == 16
     gs4i_wide p0, p1, p2, p3, xy, zw, XY, ZW;
-    GS4I_LOAD(p0, from); GS4I_LOAD(p1, from + 16); GS4I_LOAD(p2, from + 32); GS4I_LOAD(p3, from + 48);
+    gs4i_load_four(from, apart, &p0); gs4i_load_four(from + 4 * apart, apart, &p1);
+    gs4i_load_four(from + 8 * apart, apart, &p2); gs4i_load_four(from + 12 * apart, apart, &p3);
     xy = __builtin_shufflevector(p0, p1, 0, 4, 8, 12, 16, 20, 24, 28, 1, 5, 9, 13, 17, 21, 25, 29);
     zw = __builtin_shufflevector(p0, p1, 2, 6, 10, 14, 18, 22, 26, 30, 3, 7, 11, 15, 19, 23, 27, 31);
     XY = __builtin_shufflevector(p2, p3, 0, 4, 8, 12, 16, 20, 24, 28, 1, 5, 9, 13, 17, 21, 25, 29);
@@ -2813,8 +2827,8 @@ GS4I_INLINE void gs4i_sixteen_to_lanes(const gs4_real *from, gs4i_lanes to[4])
 #elif GS4I_WIDTH > 1
     gs4i_quad c[4][4];
     int b, q, i;
-    for (b = 0; b < GS4I_BATCH / GS4I_WIDTH; b++, from += 4 * GS4I_WIDTH) {
-        for (q = 0; q < GS4I_WIDTH / 4; q++) gs4i_transpose(from + 16 * q, c[q]);
+    for (b = 0; b < GS4I_BATCH / GS4I_WIDTH; b++, from += apart * GS4I_WIDTH) {
+        for (q = 0; q < GS4I_WIDTH / 4; q++) gs4i_transpose(from + 4 * apart * q, apart, c[q]);
 #if GS4I_WIDTH == 8
         for (i = 0; i < 4; i++) to[i][b] = __builtin_shufflevector(c[0][i], c[1][i], 0, 1, 2, 3, 4, 5, 6, 7);
 #else
@@ -2823,7 +2837,7 @@ GS4I_INLINE void gs4i_sixteen_to_lanes(const gs4_real *from, gs4i_lanes to[4])
     }
 #else
     int b, i;
-    for (b = 0; b < GS4I_BATCH; b++) for (i = 0; i < 4; i++) to[i][b] = from[4 * b + i];
+    for (b = 0; b < GS4I_BATCH; b++) for (i = 0; i < 4; i++) to[i][b] = from[apart * b + i];
 #endif
 }
 
@@ -2837,7 +2851,7 @@ GS4I_INLINE void gs4i_to_lanes(const gs4_real *from, int n, gs4i_lanes to[4])
         for (b = n; b < GS4I_BATCH; b++) memcpy(filled + 4 * b, from, 4 * sizeof *from);
         from = filled;
     }
-    gs4i_sixteen_to_lanes(from, to);
+    gs4i_sixteen_to_lanes(from, 4, to);
 }
 
 /* And back: (x y z w) of each particle. */
@@ -2865,7 +2879,7 @@ GS4I_INLINE void gs4i_from_lanes(const gs4i_wide *x, const gs4i_wide *y, const g
         int i;
         memcpy(four, (const gs4_real *)x + b, 4 * sizeof *four); memcpy(four + 4, (const gs4_real *)y + b, 4 * sizeof *four);
         memcpy(four + 8, (const gs4_real *)z + b, 4 * sizeof *four); memcpy(four + 12, (const gs4_real *)w + b, 4 * sizeof *four);
-        gs4i_transpose(four, c);
+        gs4i_transpose(four, 4, c);
         for (i = 0; i < 4; i++) GS4I_STORE(to + 4 * (b + i), c[i]);
     }
 #else
@@ -2882,6 +2896,7 @@ GS4I_INLINE void gs4i_numbers_to_lanes(const gs4_real *from, int reals, int n, g
     gs4i_lanes last[4];
     int part, b;
     for (part = 0; 4 * part + 4 <= reals; part++) {
+        if (n == GS4I_BATCH) { gs4i_sixteen_to_lanes(from + 4 * part, reals, l + 4 * part); continue; }
         for (b = 0; b < n; b++) memcpy(four + 4 * b, from + reals * b + 4 * part, 4 * sizeof *four);
         gs4i_to_lanes(four, n, l + 4 * part);
     }

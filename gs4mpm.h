@@ -5424,11 +5424,24 @@ static int gs4i_list_images(gs4i_memory *m, gs4i_boundary *b, const gs4i_grid *g
     return GS4_OK;
 }
 
+/* How far in front of a sticky body nodes are held, in cells: then it acts as a wall where its surface is, within 0.43 cells
+ * (symplectic Euler: within 1.02; tests: couette_surface). Without, a plane of nodes just in front left liquid next to no node to stick to. */
+#define GS4I_STICKY_REACH GS4I_C(0.75)
+
+/* Can a body hold any node of a block? By its distance from the midst: half the diagonal of the block's nodes, and its reach. */
+static int gs4i_body_is_near(const gs4i_body *b, const gs4i_grid *g, int slot)
+{
+    int at[3];
+    gs4_vec3 midst;
+    gs4i_block_coordinates(g, g->block[slot], at);
+    midst = gs4i_add(g->origin, gs4i_scale(gs4i_vec3(GS4I_C(4 * at[0] - 2), GS4I_C(4 * at[1] - 2), GS4I_C(4 * at[2] - 2)), g->h));
+    return gs4i_body_distance(b, midst) < (GS4I_C(2.7) + GS4I_STICKY_REACH) * g->h;
+}
+
 /* Give a place for jumps to the blocks that touch a wall or a body. */
 static int gs4i_place_jumps(gs4i_memory *m, const gs4i_boundary *b, gs4i_grid *g)
 {
     int wall, i, s, n = 0;
-    gs4_real reach = GS4I_C(2.7) * g->h;                    /* half the diagonal of a block's nodes */
     memset(g->jump_of, 0, (size_t)g->active * sizeof *g->jump_of);
     for (wall = 0; wall < 6; wall++)
         for (i = 0; i < b->image_count[wall] && b->walls[wall] < GS4_WALL_OPEN; i++) {
@@ -5436,14 +5449,7 @@ static int gs4i_place_jumps(gs4i_memory *m, const gs4i_boundary *b, gs4i_grid *g
             g->jump_of[b->images[wall][i].mirror / 64] = 1;
         }
     for (i = 0; i < b->body_count; i++)
-        for (s = 0; s < g->active; s++) {
-            int at[3];
-            gs4_vec3 centre;
-            if (g->jump_of[s]) continue;
-            gs4i_block_coordinates(g, g->block[s], at);
-            centre = gs4i_add(g->origin, gs4i_scale(gs4i_vec3(GS4I_C(4 * at[0] - 2), GS4I_C(4 * at[1] - 2), GS4I_C(4 * at[2] - 2)), g->h));
-            g->jump_of[s] = gs4i_body_distance(&b->bodies[i], centre) < reach;
-        }
+        for (s = 0; s < g->active; s++) g->jump_of[s] = g->jump_of[s] || gs4i_body_is_near(&b->bodies[i], g, s);
     for (s = 0; s < g->active; s++) if (g->jump_of[s]) g->jump_of[s] = ++n;
     g->jump_count = n;
     if (n > g->jump_capacity) {
@@ -5549,10 +5555,6 @@ static void gs4i_fill_images(const gs4i_boundary *b, const gs4i_grid *g, gs4_rea
         }
     }
 }
-
-/* How far in front of a sticky body nodes are held, in cells: then it acts as a wall where its surface is, within 0.43 cells
- * (symplectic Euler: within 1.02; tests: couette_surface). Without, a plane of nodes just in front left liquid next to no node to stick to. */
-#define GS4I_STICKY_REACH GS4I_C(0.75)
 
 /* What body `b` does to a node at p that would go with velocity v and acceleration acc over the time dt: both become
  * those of the body in the components that contact holds. Returns whether it holds any. */
@@ -6394,14 +6396,31 @@ GS4I_INLINE int gs4i_has_left(const gs4i_grid *g, const gs4_real x[3])
           && x[2] >= g->origin.z && x[2] < g->origin.z + GS4I_C(g->cells[2]) * g->h);
 }
 
+/* Is any of n positions inside of a body, or may be? By the ball around their box. */
+static int gs4i_may_touch(const gs4i_boundary *b, const gs4_real *x, int n, gs4_real h)
+{
+    gs4_real low[3], high[3], reach;
+    gs4_vec3 midst;
+    int i, a;
+    for (a = 0; a < 3; a++) {
+        for (low[a] = high[a] = x[a], i = 1; i < n; i++) { low[a] = gs4i_min(low[a], x[4 * i + a]); high[a] = gs4i_max(high[a], x[4 * i + a]); }
+        low[a] *= GS4I_C(0.5); high[a] *= GS4I_C(0.5);
+    }
+    midst = gs4i_vec3(low[0] + high[0], low[1] + high[1], low[2] + high[2]);
+    reach = gs4i_length(gs4i_vec3(high[0] - low[0], high[1] - low[1], high[2] - low[2])) + GS4I_C(0.1) * h;
+    for (i = 0; i < b->body_count; i++) if (!b->bodies[i].asleep && !(gs4i_body_distance(&b->bodies[i], midst) > reach)) return 1;
+    return 0;
+}
+
 /* Walls, bodies and mouths on each particle after the step. */
 static void gs4i_correct_contact(gs4_sim *sim, size_t i, int n, gs4i_stored *o, gs4i_gathered *L, gs4i_report *report)
 {
     gs4_real *elastic = sim->particles.elastic_reals ? sim->particles.elastic + (size_t)sim->particles.elastic_reals * i : NULL;
+    const int touches = gs4i_may_touch(&sim->boundary, o->x, n, sim->grid.h);
     int b;
     for (b = 0; b < n; b++) {
         const gs4i_body *mouth;
-        if (!sim->boundary.body_count && !gs4i_has_left(&sim->grid, o->x + 4 * b)) continue;
+        if (!touches && !gs4i_has_left(&sim->grid, o->x + 4 * b)) continue;
         gs4i_put_back(&sim->boundary, &sim->grid, o->x + 4 * b, o->v + 4 * b);
         mouth = gs4i_hold_in_mouth(&sim->boundary, o->x + 4 * b, o->v + 4 * b);
         if (mouth) {
@@ -7527,15 +7546,19 @@ static void gs4i_hold_nodes(const gs4_sim *sim, int slot, gs4_real *velocity, gs
     gs4_real none[3], before[3];
     int b, i, c;
     if (!sim->grid.jump_of[slot]) return;
-    for (b = 0; b < sim->boundary.body_count; b++)
-        for (i = 0; i < GS4I_BLOCK_NODES && !sim->boundary.bodies[b].asleep; i++) {
+    for (b = 0; b < sim->boundary.body_count; b++) {
+        const gs4i_body *body = &sim->boundary.bodies[b];
+        if (body->asleep || !gs4i_body_is_near(body, &sim->grid, slot)) continue;
+        for (i = 0; i < GS4I_BLOCK_NODES; i++) {
             gs4_real *v = velocity + 4 * i;
+            if (!(v[3] > 0)) continue;                      /* no particle sees it */
             none[0] = none[1] = none[2] = 0;
             for (c = 0; c < 3; c++) before[c] = v[c];
-            if (!gs4i_body_hold(&sim->boundary.bodies[b], gs4i_node_position(&sim->grid, slot, i), sim->grid.h, sim->rule.dt,
+            if (!gs4i_body_hold(body, gs4i_node_position(&sim->grid, slot, i), sim->grid.h, sim->rule.dt,
                                 v, acceleration ? acceleration + 4 * i : none)) continue;
-            for (c = 0; c < 3 && jump && v[3] > 0; c++) jump[4 * i + c] += v[c] - before[c];
+            for (c = 0; c < 3 && jump; c++) jump[4 * i + c] += v[c] - before[c];
         }
+    }
 }
 
 /* v_i = (m v)_i / m_i, as bodies let it be. */

@@ -26,6 +26,7 @@ int main(int count, char **values)
     RUN(test_stokes_first);
     RUN(test_couette);
     RUN(test_couette_surface);
+    RUN(test_sticky_askew);
     RUN_ONCE(test_column_at_rest);
     RUN(test_sound_speed);
     RUN(test_drop_at_rest);

@@ -472,6 +472,33 @@ static void test_couette_surface(void)
         }
 }
 
+/* A sticky body that lies askew holds all nodes that it can reach, wherever they are in their blocks. */
+static void test_sticky_askew(void)
+{
+    gs4_sim_desc d = scene_cube(24);
+    const gs4_material m = scene_liquid(1000, 1, 10);
+    const gs4_fill f = scene_fill(at(0, 0, 0));
+    const gs4_vec3 origin = at(0.47, 0.5, 0.556), normal = at(1, 1, 1);
+    gs4_collider body;
+    gs4_sim *sim = physics_create(&d, &m);
+    int s, i, held = 0, free = 0;
+    memset(&body, 0, sizeof body);
+    body.shape = gs4_plane(origin, normal); body.velocity = at(0.1, 0, -0.1); body.contact = GS4_WALL_STICK;
+    CHECK_RESULT(sim, gs4_add_collider(sim, &body), GS4_OK);
+    CHECK(gs4_add_particles(sim, gs4_box(at(0.2, 0.2, 0.2), at(0.8, 0.8, 0.8)), &f) > 0);
+    CHECK_RESULT(sim, gs4_step(sim, gs4_stable_dt(sim) / 2), GS4_OK);
+    for (s = 0; s < sim->grid.active; s++)
+        for (i = 0; i < 64; i++) {
+            const gs4_real *u = sim->grid.momentum + 4 * ((size_t)s * 64 + (size_t)i);
+            const gs4_vec3 p = gs4i_node_position(&sim->grid, s, i);
+            const double away = ((double)(p.x - origin.x) + (double)(p.y - origin.y) + (double)(p.z - origin.z)) / sqrt(3.0) * 24;
+            if (!(u[3] > 0) || away > 0.74) continue;
+            if (u[0] == body.velocity.x && u[1] == 0 && u[2] == body.velocity.z) held++; else free++;
+        }
+    CHECK(held > 200); CHECK(free == 0);
+    gs4_destroy(sim);
+}
+
 /* A drop of diameter D falls on a sticky floor, Re 5, Fr 2.26 (2021, figure 9 left), 12 cells over D: its width over D at `count` times t U/D. */
 static void physics_drop_widths(const gs4_material *m, const double reference[][2], int count, double tolerance)
 {

@@ -95,7 +95,7 @@
  *     S3  m_i = sum w m,   v_i = sum w m v~ / m_i;   solids: v~ + w~ x (x_i - x~), w how the particle turns (below)
  *     S4  L~ = sum v_i (x) grad w;   J~ by (4), implicit in J for known div v;   s~ by (4), (5);   F~ by (4), (6);   sigma there by (2), (3)
  *     S5  f_i = - sum V sigma grad w + sum w m g
- *         heat: (m c)_i, (m c T**)_i, T** = T + (alpha_f dt - s) r; then (m c)_i (T~_i - T**_i) / s = (7) at T~, by multigrid ([[conduction]])
+ *         heat: (m c)_i, (m c T**)_i, T** = T + (alpha_f dt - s) r; then (m c)_i (T~_i - T**_i) / s = (7) at T~, an elliptic solve ([[conduction]])
  *     S6  acc_i = f_i / m_i;   u_i = v_i + s (acc_i - ag_i), s = alpha_f gamma dt / alpha_m;   ag_i += (acc_i - ag_i) / alpha_m
  *         is what the node remembers; walls and bodies
  *     S7  A = sum w acc_i, U = sum w u_i; v by (4) with dv/dt = A - (v - U) / flip_decay_time; J, s, F by (4) with grad u; T by (4) with
@@ -4683,6 +4683,15 @@ static int gs4i_fit_volume(const gs4i_solid_laws *l, gs4i_matrix F, const gs4i_w
     return all;
 }
 
+/* S7 of liquids alone: F = J^(1/3) I, M = L, no turning. */
+static void gs4i_let_flow(gs4i_gradient L, const gs4i_wide *J, gs4i_deformation *e)
+{
+    int b, i;
+    memset(e, 0, sizeof *e);
+    memcpy(e->rate, L, sizeof e->rate);
+    for (i = 0; i < 3; i++) GS4I_BATCH_LOOP(b) gs4i_cube_root(&J[b], &e->F[i][i][b]);
+}
+
 /* S7: F and M for known grad u = L, to the volume ratio J; n particles of the batch. */
 static void gs4i_correct_solid(const gs4i_solid_laws *l, gs4i_deformation *e, const gs4i_rule *rule, gs4i_gradient L, const gs4i_wide *J, int n,
                                gs4i_solid_count *count)
@@ -4695,8 +4704,10 @@ static void gs4i_correct_solid(const gs4i_solid_laws *l, gs4i_deformation *e, co
         for (j = 0; j < 3; j++)
             GS4I_BATCH_LOOP(b) {
                 const gs4i_wide change = (L[i][j][b] - e->rate[i][j][b]) * inv_alpha_m;
+                const gs4i_wide_mask solid = l->modulus[b] > GS4I_C(0);
+                const gs4i_wide next = e->rate[i][j][b] + change;
                 X[i][j][b] = rule->dt * (e->rate[i][j][b] + rule->gamma * change);
-                e->rate[i][j][b] += change;
+                GS4I_CHOOSE(e->rate[i][j][b], solid, next, L[i][j][b]);
             }
     memcpy(old, e->F, sizeof old);
     small = gs4i_deform(X, e->F, squared);
@@ -5950,11 +5961,13 @@ static void gs4i_advance_solid(const gs4i_particles *p, size_t i, int n, const g
     gs4i_solid_count count = { 0, 0, 0 };
     gs4_real *at = p->deformation + (size_t)p->deformation_reals * i;
     gs4i_rule euler = *rule;
-    gs4i_take_solid_laws(laws, l);
-    gs4i_load_deformation(at, p->deformation_reals, n, &e);
-    euler.alpha_m = euler.alpha_f = euler.gamma = 1; euler.afresh = 0;
-    gs4i_correct_solid(l, &e, p->with_rates ? rule : &euler, L, J, n, &count);
-    if (p->with_rates) gs4i_correct_turning(l, &e, rule, L, kicks);
+    if (!gs4i_take_solid_laws(laws, l)) gs4i_let_flow(L, J, &e);
+    else {
+        gs4i_load_deformation(at, p->deformation_reals, n, &e);
+        euler.alpha_m = euler.alpha_f = euler.gamma = 1; euler.afresh = 0;
+        gs4i_correct_solid(l, &e, p->with_rates ? rule : &euler, L, J, n, &count);
+        if (p->with_rates) gs4i_correct_turning(l, &e, rule, L, kicks);
+    }
     if (count.failed) gs4i_see_bad(report, GS4I_BAD_DEFORMATION, p->id[i + (size_t)count.failed - 1]);
     if (!commit) return;
     report->split += count.split; report->bounded += count.bounded;
@@ -7060,25 +7073,31 @@ static gs4_real gs4i_isothermal_links(const gs4_sim *sim, const int at[3], gs4_r
     return all;
 }
 
+/* What flows through the faces of cell i = (x, y, z) into it, times h^2, where T is the temperature. Faces without a cell beyond are closed. */
+GS4I_INLINE gs4_real gs4i_heat_flow(const gs4i_conduction *k, const gs4_real *T, int x, int y, int z, size_t i)
+{
+    const int nx = k->size[0], ny = k->size[1], nz = k->size[2];
+    const gs4_real *fx = k->field[GS4I_HEAT_FACES], *fy = k->field[GS4I_HEAT_FACES + 1], *fz = k->field[GS4I_HEAT_FACES + 2];
+    const size_t ix = ((size_t)z * (size_t)ny + (size_t)y) * (size_t)(nx + 1) + (size_t)x, iy = ((size_t)z * (size_t)(ny + 1) + (size_t)y) * (size_t)nx + (size_t)x;
+    const size_t row = (size_t)nx, plane = row * (size_t)ny;
+    return fx[ix] * (T[x ? i - 1 : i + row - 1] - T[i]) + fx[ix + 1] * (T[x < nx - 1 ? i + 1 : i + 1 - row] - T[i])
+         + fy[iy] * (T[y ? i - row : i + plane - row] - T[i]) + fy[iy + row] * (T[y < ny - 1 ? i + row : i + row - plane] - T[i])
+         + fz[i] * (T[z ? i - plane : i + plane * (size_t)(nz - 1)] - T[i]) + fz[i + plane] * (T[z < nz - 1 ? i + plane : i - plane * (size_t)(nz - 1)] - T[i]);
+}
+
 /* One plane of the box: isothermal links, and the heat that flows into each cell at T**, J/m^3. */
 static void gs4i_heat_flows(int z, void *context)
 {
     const gs4_sim *sim = ((const gs4i_node_pass *)context)->sim;
     const gs4i_conduction *k = &sim->conduction;
     const gs4_real *T = k->field[GS4I_HEAT_T], per_area = sim->grid.inv_h * sim->grid.inv_h;
-    const int nx = k->size[0], ny = k->size[1], nz = k->size[2];
-    const gs4_real *fx = k->field[GS4I_HEAT_FACES], *fy = k->field[GS4I_HEAT_FACES + 1], *fz = k->field[GS4I_HEAT_FACES + 2];
     int x, y;
-    for (y = 0; y < ny; y++)
-        for (x = 0; x < nx; x++) {
+    for (y = 0; y < k->size[1]; y++)
+        for (x = 0; x < k->size[0]; x++) {
             const size_t i = gs4i_heat_cell(k, x, y, z);
-            const size_t ix = ((size_t)z * (size_t)ny + (size_t)y) * (size_t)(nx + 1) + (size_t)x, iy = ((size_t)z * (size_t)(ny + 1) + (size_t)y) * (size_t)nx + (size_t)x;
-            const size_t row = (size_t)nx, plane = row * (size_t)ny;
             gs4_real flow;
             if (k->kind[i] != GS4_CELL_LIQUID) continue;
-            flow = fx[ix] * (T[x ? i - 1 : i + row - 1] - T[i]) + fx[ix + 1] * (T[x < nx - 1 ? i + 1 : i + 1 - row] - T[i])
-                 + fy[iy] * (T[y ? i - row : i + plane - row] - T[i]) + fy[iy + row] * (T[y < ny - 1 ? i + row : i + row - plane] - T[i])
-                 + fz[i] * (T[z ? i - plane : i + plane * (size_t)(nz - 1)] - T[i]) + fz[i + plane] * (T[z < nz - 1 ? i + plane : i - plane * (size_t)(nz - 1)] - T[i]);
+            flow = gs4i_heat_flow(k, T, x, y, z, i);
             if (k->linked) {
                 int at[3];
                 gs4_real link, warmth;
@@ -7252,6 +7271,50 @@ static int gs4i_solve_periodic(gs4_sim *sim, double tolerance, gs4_solve_stats *
 
 /* --- the solve --------------------------------------------------------------------------------------------- */
 
+/* What X leaves of the right-hand side, one plane of the box; in the field that says how full cells are, which is not needed any more. */
+static void gs4i_heat_residual(int z, void *context)
+{
+    const gs4_sim *sim = (const gs4_sim *)context;
+    const gs4i_conduction *k = &sim->conduction;
+    const gs4_real *X = k->field[GS4I_HEAT_X], per_area = sim->grid.inv_h * sim->grid.inv_h;
+    int x, y;
+    for (y = 0; y < k->size[1]; y++)
+        for (x = 0; x < k->size[0]; x++) {
+            const size_t i = gs4i_heat_cell(k, x, y, z);
+            if (k->kind[i] != GS4_CELL_LIQUID) continue;
+            k->field[GS4I_HEAT_FILL][i] = (k->field[GS4I_HEAT_RHS][i] - k->field[GS4I_HEAT_DIAGONAL][i] * X[i]) + per_area * gs4i_heat_flow(k, X, x, y, z, i);
+        }
+}
+
+/* X += r / diagonal. The norm of r. */
+static double gs4i_heat_relax(const gs4i_conduction *k, const gs4_real *r)
+{
+    const size_t n = (size_t)k->size[0] * (size_t)k->size[1] * (size_t)k->size[2];
+    double sum = 0;
+    size_t i;
+    for (i = 0; i < n; i++)
+        if (k->kind[i] == GS4_CELL_LIQUID) { sum += (double)r[i] * (double)r[i]; k->field[GS4I_HEAT_X][i] += r[i] / k->field[GS4I_HEAT_DIAGONAL][i]; }
+    return sqrt(sum);
+}
+
+/* Steps of a liquid are short, and heat gets much less far than a cell: then a few sweeps by the diagonal (Jacobi) cost less than a
+ * hierarchy. Given up, X back to 0, where twelve more would not do. */
+static int gs4i_solve_by_sweeps(gs4_sim *sim, double tolerance, gs4_solve_stats *stats)
+{
+    gs4i_conduction *k = &sim->conduction;
+    const double all = gs4i_heat_relax(k, k->field[GS4I_HEAT_RHS]);
+    double before, left = all;
+    do {
+        before = left;
+        gs4i_parallel_for(&sim->tasks, k->size[2], gs4i_heat_residual, sim);
+        left = gs4i_heat_relax(k, k->field[GS4I_HEAT_FILL]);
+        stats->iterations++;
+        if (left <= tolerance * all) { stats->residual = all > 0 ? left / all : 0; return 1; }
+    } while (left * pow(left / before, 12) < tolerance * all);
+    memset(k->field[GS4I_HEAT_X], 0, (size_t)k->size[0] * (size_t)k->size[1] * (size_t)k->size[2] * sizeof(gs4_real));
+    return 0;
+}
+
 static int gs4i_solve_heat(gs4_sim *sim)
 {
     gs4i_conduction *k = &sim->conduction;
@@ -7260,6 +7323,7 @@ static int gs4i_solve_heat(gs4_sim *sim)
     gs4_solve_stats stats;
     int a, result;
     memset(&d, 0, sizeof d); memset(&stats, 0, sizeof stats);
+    if (gs4i_solve_by_sweeps(sim, tolerance, &stats)) { k->iterations = stats.iterations; k->residual = stats.residual; return GS4_OK; }
     for (a = 0; a < 3; a++) { d.cells[a] = k->size[a]; d.coefficient[a] = k->field[GS4I_HEAT_FACES + a]; }
     d.cell_size = sim->grid.h; d.kind = k->kind; d.diagonal = k->outer ? gs4i_unwrapped_diagonal(sim) : k->field[GS4I_HEAT_DIAGONAL];
     d.threads = sim->desc.threads; d.parallel_for = sim->desc.parallel_for;

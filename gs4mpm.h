@@ -4078,12 +4078,21 @@ static void gs4i_relax_values(gs4i_split *p, double f, double t, const double no
     }
 }
 
+/* Q diag(values) Q^T */
+static void gs4i_recompose(double Q[3][3], const double values[3], double m[6])
+{
+    int i, j;
+    for (i = 0; i < 3; i++)
+        for (j = i; j < 3; j++)
+            m[gs4i_place[i][j]] = Q[i][0] * values[0] * Q[j][0] + Q[i][1] * values[1] * Q[j][1] + Q[i][2] * values[2] * Q[j][2];
+}
+
 /* Relax for the time h: with f frozen, twice, half way ahead, then all the way with f from there. */
 static void gs4i_relax(gs4i_split *p, double m[6], double h)
 {
     const double t = h * p->inv_lambda;
     double half[6] = { 0, 0, 0, 0, 0, 0 }, c[6] = { 0, 0, 0, 0, 0, 0 }, next[3], Q[3][3], before, stiff;
-    int i, j;
+    int i;
     if (m[0] == 1 && m[1] == 1 && m[2] == 1 && m[3] == 0 && m[4] == 0 && m[5] == 0) return;     /* at rest */
     if (p->alpha <= 1 && gs4i_is_round(m)) {
         memcpy(c, m, sizeof c);
@@ -4094,9 +4103,7 @@ static void gs4i_relax(gs4i_split *p, double m[6], double h)
         for (i = 0; i < 3; i++) c[i] = c[i] > 0 ? c[i] : 1e-30;         /* rounding of a thin ellipsoid */
         gs4i_relax_values(p, gs4i_relaxation(p, c, &before), 0.5 * t, c, c, half);
         gs4i_relax_values(p, gs4i_relaxation(p, half, &stiff), t, half, c, next);
-        for (i = 0; i < 3; i++)
-            for (j = i; j < 3; j++)
-                m[gs4i_place[i][j]] = Q[i][0] * next[0] * Q[j][0] + Q[i][1] * next[1] * Q[j][1] + Q[i][2] * next[2] * Q[j][2];
+        gs4i_recompose(Q, next, m);
     }
     p->swing = fmax(p->swing, (fabs(stiff - before) + 2 * stiff) * t);
 }
@@ -4138,7 +4145,7 @@ static void gs4i_convect(double E[3][3], double m[6])
  * time so short that they need few terms, then doubled. Exact for constant L. */
 static void gs4i_linear_advance(const gs4i_split *p, double c[6], double dt)
 {
-    double K[3][3], A[3][3], M[3][3], T[3][3], H[6] = { 0, 0, 0, 0, 0, 0 }, size = 0, factor;
+    double K[3][3], A[3][3], M[3][3], T[3][3], H[6] = { 0, 0, 0, 0, 0, 0 }, values[3], size = 0, factor;
     int i, j, k, n = 0;
     for (i = 0; i < 3; i++)
         for (j = 0; j < 3; j++) {
@@ -4159,6 +4166,11 @@ static void gs4i_linear_advance(const gs4i_split *p, double c[6], double dt)
         gs4i_convect(A, later);
         for (i = 0; i < 6; i++) H[i] += later[i];
         gs4i_multiply3(A, A, A);
+    }
+    if (!gs4i_is_round(c)) {                                /* rounding of a thin ellipsoid: flow would draw it out */
+        gs4i_eigen(c, values, T);
+        for (i = 0; i < 3; i++) values[i] = values[i] > 0 ? values[i] : 0;
+        gs4i_recompose(T, values, c);
     }
     for (i = 0; i < 3; i++) c[i] -= 1;
     gs4i_convect(A, c);

@@ -532,6 +532,16 @@ static void test_stress_random(void)
     stress_walks(steps, test_slow ? 1e13 : 10, 0);
 }
 
+/* What rounding to float makes negative of a thin ellipsoid is not drawn out. */
+static void test_stress_thin(void)
+{
+    const double L[9] = { -5, 0, 0, 0, 10, 0, 0, 0, -5 };
+    gs4i_split p = stress_split(-1, L);
+    double c[6] = { 1e11, -1e3, 1, 0, 0, 0 };
+    CHECK(gs4i_split_advance(&p, c, 1) == GS4_OK);
+    CHECK(c[0] > 0 && c[1] > 0 && c[2] > 0);
+}
+
 /* Alpha above 1 has no solution in fast flow (alpha 100: none above Wi 0.005 in shear): eigenvalues stay in the bounds that the header names. */
 static void test_stress_bounded(void)
 {
@@ -627,6 +637,7 @@ static void run_stress(void)
     RUN(test_stress_pitfalls);
     RUN(test_stress_short_memory);
     RUN_ONCE(test_stress_random);
+    RUN(test_stress_thin);
     RUN(test_stress_bounded);
     RUN(test_stress_bad_arguments);
 }

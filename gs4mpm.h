@@ -136,8 +136,9 @@
  *
  * ELLIPTIC SOLVER. gs4_poisson_* solves (diagonal - div coefficient grad) x = rhs on a box of cells that are liquid, air or solid, by
  * itself: multigrid in float preconditions conjugate gradients in double. It needs 6 to 11 iterations for a residual of 1e-8 whatever
- * the size, also where the coefficient jumps by 1000, and up to 20 behind walls with holes of one cell, in spray and in porous
- * matter (tests/test_poisson.c, bench/poisson.c). Parts that nothing holds are found: there the mean of x is 0, and the mean of rhs
+ * the size, also where the coefficient jumps by 1000, and up to 26 behind walls with holes of one cell, in spray and in porous
+ * matter (tests/test_poisson.c, bench/poisson.c). A box that is open at one cell alone is not solved at some sizes (160^3, 256^3:
+ * GS4_ERROR_NOT_CONVERGED). Parts that nothing holds are found: there the mean of x is 0, and the mean of rhs
  * is taken off. At 256^3 it takes 45 bytes a cell where one coefficient serves all faces, 8 more with a diagonal; 58 else, 71 in
  * double. A solve allocates nothing. `threads` and the same bits as below.
  *
@@ -5447,8 +5448,8 @@ static int gs4i_list_images(gs4i_memory *m, gs4i_boundary *b, const gs4i_grid *g
     return GS4_OK;
 }
 
-/* How far in front of a sticky body nodes are held, in cells: then it acts as a wall where its surface is, within 0.43 cells
- * (symplectic Euler: within 1.02; tests: couette_surface). Without, a plane of nodes just in front left liquid next to no node to stick to. */
+/* How far in front of a sticky body nodes are held, in cells: then it acts as a wall where its surface is, within 0.61 cells
+ * (symplectic Euler: within 0.92; tests: couette_surface). Without, a plane of nodes just in front left liquid next to no node to stick to. */
 #define GS4I_STICKY_REACH GS4I_C(0.75)
 
 /* Can a body hold any node of a block? By its distance from the midst: half the diagonal of the block's nodes, and its reach. */
@@ -6427,6 +6428,7 @@ static int gs4i_may_touch(const gs4i_boundary *b, const gs4_real *x, int n, gs4_
     gs4_real low[3], high[3], reach;
     gs4_vec3 midst;
     int i, a;
+    if (!b->body_count) return 0;
     for (a = 0; a < 3; a++) {
         for (low[a] = high[a] = x[a], i = 1; i < n; i++) { low[a] = gs4i_min(low[a], x[4 * i + a]); high[a] = gs4i_max(high[a], x[4 * i + a]); }
         low[a] *= GS4I_C(0.5); high[a] *= GS4I_C(0.5);
@@ -7085,16 +7087,25 @@ static gs4_real gs4i_isothermal_links(const gs4_sim *sim, const int at[3], gs4_r
     return all;
 }
 
-/* What flows through the faces of cell i = (x, y, z) into it, times h^2, where T is the temperature. Faces without a cell beyond are closed. */
-GS4I_INLINE gs4_real gs4i_heat_flow(const gs4i_conduction *k, const gs4_real *T, int x, int y, int z, size_t i)
+/* Where the faces of a cell are among those of their axis, in the order of gs4_sim_desc's walls. */
+GS4I_INLINE void gs4i_heat_faces_of(const gs4i_conduction *k, const int at[3], size_t face[6])
 {
-    const int nx = k->size[0], ny = k->size[1], nz = k->size[2];
+    const size_t nx = (size_t)k->size[0], ny = (size_t)k->size[1], x = (size_t)at[0], y = (size_t)at[1], z = (size_t)at[2];
+    face[0] = (z * ny + y) * (nx + 1) + x;   face[1] = face[0] + 1;
+    face[2] = (z * (ny + 1) + y) * nx + x;   face[3] = face[2] + nx;
+    face[4] = (z * ny + y) * nx + x;         face[5] = face[4] + nx * ny;
+}
+
+/* What flows through the faces of cell i = at into it, times h^2, where T is the temperature. Faces without a cell beyond are closed. */
+GS4I_INLINE gs4_real gs4i_heat_flow(const gs4i_conduction *k, const gs4_real *T, const int at[3], size_t i)
+{
+    const size_t row = (size_t)k->size[0], plane = row * (size_t)k->size[1], x_round = row - 1, y_round = plane - row, z_round = plane * (size_t)(k->size[2] - 1);
     const gs4_real *fx = k->field[GS4I_HEAT_FACES], *fy = k->field[GS4I_HEAT_FACES + 1], *fz = k->field[GS4I_HEAT_FACES + 2];
-    const size_t ix = ((size_t)z * (size_t)ny + (size_t)y) * (size_t)(nx + 1) + (size_t)x, iy = ((size_t)z * (size_t)(ny + 1) + (size_t)y) * (size_t)nx + (size_t)x;
-    const size_t row = (size_t)nx, plane = row * (size_t)ny;
-    return fx[ix] * (T[x ? i - 1 : i + row - 1] - T[i]) + fx[ix + 1] * (T[x < nx - 1 ? i + 1 : i + 1 - row] - T[i])
-         + fy[iy] * (T[y ? i - row : i + plane - row] - T[i]) + fy[iy + row] * (T[y < ny - 1 ? i + row : i + row - plane] - T[i])
-         + fz[i] * (T[z ? i - plane : i + plane * (size_t)(nz - 1)] - T[i]) + fz[i + plane] * (T[z < nz - 1 ? i + plane : i - plane * (size_t)(nz - 1)] - T[i]);
+    size_t face[6];
+    gs4i_heat_faces_of(k, at, face);
+    return fx[face[0]] * (T[at[0] ? i - 1 : i + x_round] - T[i]) + fx[face[1]] * (T[at[0] < k->size[0] - 1 ? i + 1 : i - x_round] - T[i])
+         + fy[face[2]] * (T[at[1] ? i - row : i + y_round] - T[i]) + fy[face[3]] * (T[at[1] < k->size[1] - 1 ? i + row : i - y_round] - T[i])
+         + fz[face[4]] * (T[at[2] ? i - plane : i + z_round] - T[i]) + fz[face[5]] * (T[at[2] < k->size[2] - 1 ? i + plane : i - z_round] - T[i]);
 }
 
 /* One plane of the box: isothermal links, and the heat that flows into each cell at T**, J/m^3. */
@@ -7103,17 +7114,16 @@ static void gs4i_heat_flows(int z, void *context)
     const gs4_sim *sim = ((const gs4i_node_pass *)context)->sim;
     const gs4i_conduction *k = &sim->conduction;
     const gs4_real *T = k->field[GS4I_HEAT_T], per_area = sim->grid.inv_h * sim->grid.inv_h;
-    int x, y;
-    for (y = 0; y < k->size[1]; y++)
-        for (x = 0; x < k->size[0]; x++) {
-            const size_t i = gs4i_heat_cell(k, x, y, z);
+    int at[3];
+    at[2] = z;
+    for (at[1] = 0; at[1] < k->size[1]; at[1]++)
+        for (at[0] = 0; at[0] < k->size[0]; at[0]++) {
+            const size_t i = gs4i_heat_cell(k, at[0], at[1], z);
             gs4_real flow;
             if (k->kind[i] != GS4_CELL_LIQUID) continue;
-            flow = gs4i_heat_flow(k, T, x, y, z, i);
+            flow = gs4i_heat_flow(k, T, at, i);
             if (k->linked) {
-                int at[3];
                 gs4_real link, warmth;
-                at[0] = x; at[1] = y; at[2] = z;
                 link = gs4i_isothermal_links(sim, at, &warmth) * sim->warm.s * k->field[GS4I_HEAT_K][i];
                 k->field[GS4I_HEAT_DIAGONAL][i] += per_area * link;
                 flow += sim->warm.s * k->field[GS4I_HEAT_K][i] * warmth - link * T[i];
@@ -7178,15 +7188,6 @@ static void gs4i_heat_back(int index, void *context)
             for (a = 0; a < 3; a++) flux[a] = T[cell] + X[cell] - GS4I_C(0.25) * sum + GS4I_C(1.0 / 12) * (t[a] + x[a]);
         }
     }
-}
-
-/* Where the faces of a cell are among those of their axis, in the order of gs4_sim_desc's walls. */
-GS4I_INLINE void gs4i_heat_faces_of(const gs4i_conduction *k, const int at[3], size_t face[6])
-{
-    const size_t nx = (size_t)k->size[0], ny = (size_t)k->size[1], x = (size_t)at[0], y = (size_t)at[1], z = (size_t)at[2];
-    face[0] = (z * ny + y) * (nx + 1) + x;   face[1] = face[0] + 1;
-    face[2] = (z * (ny + 1) + y) * nx + x;   face[3] = face[2] + nx;
-    face[4] = (z * ny + y) * nx + x;         face[5] = face[4] + nx * ny;
 }
 
 /* --- periodic walls: conjugate gradients around the solver, which knows of none --------------------------- */
@@ -7289,12 +7290,13 @@ static void gs4i_heat_residual(int z, void *context)
     const gs4_sim *sim = (const gs4_sim *)context;
     const gs4i_conduction *k = &sim->conduction;
     const gs4_real *X = k->field[GS4I_HEAT_X], per_area = sim->grid.inv_h * sim->grid.inv_h;
-    int x, y;
-    for (y = 0; y < k->size[1]; y++)
-        for (x = 0; x < k->size[0]; x++) {
-            const size_t i = gs4i_heat_cell(k, x, y, z);
+    int at[3];
+    at[2] = z;
+    for (at[1] = 0; at[1] < k->size[1]; at[1]++)
+        for (at[0] = 0; at[0] < k->size[0]; at[0]++) {
+            const size_t i = gs4i_heat_cell(k, at[0], at[1], z);
             if (k->kind[i] != GS4_CELL_LIQUID) continue;
-            k->field[GS4I_HEAT_FILL][i] = (k->field[GS4I_HEAT_RHS][i] - k->field[GS4I_HEAT_DIAGONAL][i] * X[i]) + per_area * gs4i_heat_flow(k, X, x, y, z, i);
+            k->field[GS4I_HEAT_FILL][i] = (k->field[GS4I_HEAT_RHS][i] - k->field[GS4I_HEAT_DIAGONAL][i] * X[i]) + per_area * gs4i_heat_flow(k, X, at, i);
         }
 }
 

@@ -1,6 +1,6 @@
 #!/bin/sh
 # The tests: sh tests/run.sh            under a minute: all quick tests in float and in double, and the cheap part of portability.sh
-#            sh tests/run.sh --full     the quick tests, and all compilers, machines and sanitizers that are installed
+#            sh tests/run.sh --full     the quick tests with more random draws, and all compilers, machines and sanitizers that are installed
 #            sh tests/run.sh --nightly  the slow tests, too
 # CC and CFLAGS choose compiler and flags of the quick tests. The last line counts.
 # shellcheck disable=SC2086             # flags are split on purpose

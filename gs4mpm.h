@@ -136,11 +136,10 @@
  *
  * ELLIPTIC SOLVER. gs4_poisson_* solves (diagonal - div coefficient grad) x = rhs on a box of cells that are liquid, air or solid, by
  * itself: multigrid in float preconditions conjugate gradients in double. It needs 6 to 11 iterations for a residual of 1e-8 whatever
- * the size, also where the coefficient jumps by 1000, and up to 26 behind walls with holes of one cell, in spray and in porous
- * matter (tests/test_poisson.c, bench/poisson.c). A box that is open at one cell alone is not solved at some sizes (160^3, 256^3:
- * GS4_ERROR_NOT_CONVERGED). Parts that nothing holds are found: there the mean of x is 0, and the mean of rhs
- * is taken off. At 256^3 it takes 45 bytes a cell where one coefficient serves all faces, 8 more with a diagonal; 58 else, 71 in
- * double. A solve allocates nothing. `threads` and the same bits as below.
+ * the size, also where the coefficient jumps by 1000, and up to 20 behind walls with holes of one cell, in spray, in porous matter and
+ * in serpentines; a maze of corridors one cell wide takes 60 to 80 (tests/test_poisson.c, bench/poisson.c). Parts that nothing holds
+ * are found: there the mean of x is 0, and the mean of rhs is taken off. At 256^3 it takes 45 bytes a cell where one coefficient serves
+ * all faces, 8 more with a diagonal; 58 else, 71 in double. A solve allocates nothing. `threads` and the same bits as below.
  *
  * OPTIONS (macros)             meaning                                                    define it
  *     GS4MPM_IMPLEMENTATION    compile the implementation here                            in one file
@@ -2011,6 +2010,14 @@ GS4I_INLINE float gs4i_series(float w, float link, float other)
     return series > 0.35f * w ? series : 0.35f * w;
 }
 
+/* The same within a block of blocks, where groups are chains and heaps without an axis: from the end of a chain of n it is (n-1)/2 links
+ * to its middle, in heaps less. 0.12 to 0.18 are alike; without it a serpentine of plates takes 30 iterations instead of 20. */
+GS4I_INLINE float gs4i_chain(float w, float links, int n, float other_links, int other_n)
+{
+    const float chain = 1 / (1 / w + (n > 1 ? 0.15f * (float)(n - 1) / links : 0) + (other_n > 1 ? 0.15f * (float)(other_n - 1) / other_links : 0));
+    return chain > 0.1f * w ? chain : 0.1f * w;
+}
+
 /* What the air next to a cell is to the coarse cell: 3/4 at a surface, measured best; all of it where it is small beside the cell's links,
  * as a bubble of one cell is on coarse levels. */
 GS4I_INLINE float gs4i_air(float air, float link)
@@ -2170,23 +2177,26 @@ static int gs4i_build_groups(gs4i_setup *u)
 
 #define GS4I_LOWEST_BITS ((uint64_t)1 | (uint64_t)1 << 21 | (uint64_t)1 << 42)
 
-/* Nodes of a graph joined by edges within a block of blocks; g->parent becomes a node of the next graph. */
-static void gs4i_join_nodes(gs4i_graph *g, float strong, int32_t *number, int *reds, int *blacks)
+/* Nodes of a graph joined by edges within a block of blocks, at most `most` of them, the stronger edges first; g->parent becomes a node
+ * of the next graph. */
+static void gs4i_join_nodes(gs4i_graph *g, float strong, int most, int32_t *number, int *reds, int *blacks)
 {
     int32_t *root = g->parent;
-    int i, e;
+    int i, e, pass;
     *reds = *blacks = 0;
     for (i = 0; i < g->n; i++) {                            /* x: the strongest edge, while setting up */
         g->x[i] = 0;
         for (e = g->start[i]; e < g->start[i + 1]; e++) if (g->w[e] > g->x[i]) g->x[i] = g->w[e];
     }
-    for (i = 0; i < g->n; i++) root[i] = g->start[i] < g->start[i + 1] ? i : -1;
-    for (i = 0; i < g->n; i++) for (e = g->start[i]; e < g->start[i + 1]; e++) {
+    for (i = 0; i < g->n; i++) { root[i] = g->start[i] < g->start[i + 1] ? i : -1; number[i] = 1; }
+    for (pass = 2; pass > 0; pass--) for (i = 0; i < g->n; i++) for (e = g->start[i]; e < g->start[i + 1]; e++) {
         int32_t a = i, b = g->to[e];
-        if ((g->block[a] ^ g->block[b]) & ~GS4I_LOWEST_BITS || !gs4i_is_strong(g->w[e], g->x[a], g->x[b], strong)) continue;
+        if ((g->block[a] ^ g->block[b]) & ~GS4I_LOWEST_BITS || !gs4i_is_strong(g->w[e], g->x[a], g->x[b], (float)pass * strong)) continue;
         while (root[a] != a) a = root[a] = root[root[a]];
         while (root[b] != b) b = root[b] = root[root[b]];
-        if (a < b) root[b] = a; else root[a] = b;
+        if (a == b || number[a] + number[b] > most) continue;
+        if (a > b) { const int32_t m = a; a = b; b = m; }
+        root[b] = a; number[a] += number[b];
     }
     for (i = 0; i < g->n; i++) {
         const uint64_t block = g->block[i] >> 1;
@@ -2200,27 +2210,35 @@ static void gs4i_join_nodes(gs4i_graph *g, float strong, int32_t *number, int *r
 /* Axis along which the blocks of two joined nodes are neighbours. */
 GS4I_INLINE int gs4i_axis(uint64_t a, uint64_t b) { return (a ^ b) >> 42 ? 2 : (a ^ b) >> 21 ? 1 : 0; }
 
-/* Links of each node along each axis within its block of blocks. */
-static void gs4i_find_links(const gs4i_graph *g, float *link)
+/* Links of each node within its group: along each axis, and all. */
+static void gs4i_find_links(const gs4i_graph *g, float (*link)[4])
 {
     int i, e;
-    memset(link, 0, 3 * (size_t)g->n * sizeof *link);
-    for (i = 0; i < g->n; i++) for (e = g->start[i]; e < g->start[i + 1]; e++)
-        if (g->parent[g->to[e]] == g->parent[i] && g->block[g->to[e]] != g->block[i])
-            link[3 * (size_t)i + (size_t)gs4i_axis(g->block[i], g->block[g->to[e]])] += g->w[e];
+    memset(link, 0, (size_t)g->n * sizeof *link);
+    for (i = 0; i < g->n; i++) for (e = g->start[i]; e < g->start[i + 1]; e++) {
+        if (g->parent[g->to[e]] != g->parent[i]) continue;
+        if (g->block[g->to[e]] != g->block[i]) link[i][gs4i_axis(g->block[i], g->block[g->to[e]])] += g->w[e];
+        link[i][3] += g->w[e];
+    }
 }
 
-/* The next graph from the last. Its tables are in x, which is larger: 24 bytes a node, at most a node for eight cells. */
+/* The next graph from the last. Its tables are in x, which is larger: 28 bytes a node, at most a node for eight cells. */
 static int gs4i_coarsen_graph(gs4i_solver *s)
 {
     gs4i_graph *g = &s->graph[s->graphs - 1], *up = &s->graph[s->graphs];
     int32_t *first, *child, *place;
-    float *link;
-    float strong = GS4I_STRONG;
-    int reds, blacks, i, j, e, pass;
+    float (*link)[4];
+    const int all = s->graphs > GS4I_GRAPHS / 2;            /* blocks grow, so graphs end */
+    const int bulk = (int)(3 * (int64_t)g->start[g->n] / g->n) - 4;         /* blocks in the bulk, four of a chain */
+    float strong = all ? 0 : GS4I_STRONG;
+    int most = all ? g->n : bulk > 4 ? bulk : 4, reds, blacks, i, j, e, pass;
     first = (int32_t *)(void *)s->x[0]; child = first + g->n + 2; place = child + g->n;
-    do gs4i_join_nodes(g, strong, first, &reds, &blacks); while (5 * (int64_t)(reds + blacks) > 4 * (int64_t)g->n && (strong *= 0.25f) > 1e-3f);
-    link = (float *)(place + g->n);
+    for (;;) {
+        gs4i_join_nodes(g, strong, most, first, &reds, &blacks);
+        if (5 * (int64_t)(reds + blacks) <= 4 * (int64_t)g->n || strong < 1e-3f) break;
+        strong *= 0.25f; most = most < g->n / 4 ? 4 * most : g->n;
+    }
+    link = (float (*)[4])(void *)(place + g->n);
     gs4i_find_links(g, link);
     if (gs4i_reserve_nodes(s, up, reds + blacks, reds) != GS4_OK) return GS4_ERROR_MEMORY;
     memset(first, 0, ((size_t)up->n + 2) * sizeof *first);
@@ -2239,10 +2257,12 @@ static int gs4i_coarsen_graph(gs4i_solver *s)
             for (j = first[i]; j < first[i + 1]; j++) for (e = g->start[child[j]]; e < g->start[child[j] + 1]; e++) {
                 const int32_t to = g->parent[g->to[e]];
                 const uint64_t from = g->block[child[j]], into = g->block[g->to[e]];
-                const int axis = (from ^ into) & ~GS4I_LOWEST_BITS ? gs4i_axis(from, into) : -1;        /* -1: a weak link within the block */
+                const int inside = !((from ^ into) & ~GS4I_LOWEST_BITS), axis = inside ? 3 : gs4i_axis(from, into);
+                const float one = link[child[j]][axis], other = link[g->to[e]][axis];
                 if (to == i) continue;
                 if (place[to] < begin) { place[to] = next++; if (pass) { up->to[place[to]] = to; up->w[place[to]] = 0; } }
-                if (pass) up->w[place[to]] += axis < 0 ? g->w[e] : gs4i_series(g->w[e], link[3 * child[j] + axis], link[3 * g->to[e] + axis]);
+                if (pass) up->w[place[to]] += inside ? gs4i_chain(g->w[e], one, first[i + 1] - first[i], other, first[to + 1] - first[to])
+                                                     : gs4i_series(g->w[e], one, other);
             }
             if (!pass) up->start[i + 1] = next - begin;
         }

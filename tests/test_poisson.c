@@ -94,21 +94,57 @@ static void test_poisson_agrees_with_oracle(void)
 }
 
 /* Iterations, and the residual as the definition has it. */
+static void pois_iterations(const char *name, int n)
+{
+    poisson_case p = poisson_make(name, n);
+    gs4_solve_stats stats;
+    double bound, residual;
+    CHECK_RESULT(NULL, pois_solve(&p, &stats), GS4_OK);
+    CHECK(stats.iterations > 0 && stats.iterations <= (name[0] == 'P' && !name[2] ? 11 : 20));
+    residual = poisson_residual(&p, p.x, &bound);
+    CHECK(residual <= 1.001e-8 + bound);
+    CHECK(fabs(residual - stats.residual) <= 1e-3 * stats.residual + bound);
+    poisson_free(&p);
+}
+
 static void test_poisson_iterations(void)
 {
-    static const int sizes[3] = { 24, 37, 64 };
+    static const int sizes[] = { 24, 37, 64, 100, 136, 160, 256 };
+    const int most = test_slow ? 7 : test_full ? 6 : 3;
     int q, k;
-    for (k = 0; k < 3; k++) for (q = 0; q < POISSON_CASES; q++) {
-        poisson_case p = poisson_make(poisson_names[q], sizes[k]);
-        gs4_solve_stats stats;
-        double bound, residual;
-        CHECK_RESULT(NULL, pois_solve(&p, &stats), GS4_OK);
-        CHECK(stats.iterations > 0 && stats.iterations <= (q < 5 ? 11 : 20));
-        residual = poisson_residual(&p, p.x, &bound);
-        CHECK(residual <= 1.001e-8 + bound);
-        CHECK(fabs(residual - stats.residual) <= 1e-3 * stats.residual + bound);
-        poisson_free(&p);
+    for (k = 0; k < most; k++) for (q = 0; q < POISSON_CASES; q++) pois_iterations(poisson_names[q], sizes[k]);
+    pois_iterations("T4", 132);                             /* a chain of corridors longer than what is solved directly */
+}
+
+/* A box of corridors one cell wide, all of them one tree: the way between two cells may be as long as all corridors. */
+static void test_poisson_maze(void)
+{
+    static const int step[6][3] = { { 1, 0, 0 }, { -1, 0, 0 }, { 0, 1, 0 }, { 0, -1, 0 }, { 0, 0, 1 }, { 0, 0, -1 } };
+    enum { N = 31 };
+    poisson_case p = poisson_box(N, N, N, GS4_CELL_SOLID);
+    int *path = (int *)malloc(N * N * N * sizeof *path), length = 0, a, ways[6], open;
+    gs4_solve_stats stats;
+    double bound;
+    if (!path) exit(3);
+    path[length++] = 0; p.kind[0] = GS4_CELL_LIQUID;
+    while (length) {                                        /* on to a cell two steps away that is not reached yet, or back */
+        const int at = path[length - 1], i[3] = { at % N, at / N % N, at / (N * N) };
+        int way;
+        for (open = a = 0; a < 6; a++) {
+            const int x = i[0] + 2 * step[a][0], y = i[1] + 2 * step[a][1], z = i[2] + 2 * step[a][2];
+            if (x >= 0 && y >= 0 && z >= 0 && x < N && y < N && z < N && p.kind[(z * N + y) * N + x] == GS4_CELL_SOLID) ways[open++] = a;
+        }
+        if (!open) { length--; continue; }
+        a = ways[(int)(poisson_random(&p.random) * open)];
+        way = (step[a][2] * N + step[a][1]) * N + step[a][0];
+        p.kind[at + way] = p.kind[at + 2 * way] = GS4_CELL_LIQUID;
+        path[length++] = at + 2 * way;
     }
+    p.kind[0] = GS4_CELL_AIR;
+    CHECK_RESULT(NULL, pois_solve(&p, &stats), GS4_OK);
+    CHECK(poisson_residual(&p, p.x, &bound) <= 1.001e-8 + bound && stats.iterations < 100);
+    free(path);
+    poisson_free(&p);
 }
 
 static void test_poisson_shapes(void)
@@ -498,6 +534,7 @@ static void run_poisson(void)
 {
     RUN(test_poisson_agrees_with_oracle);
     RUN(test_poisson_iterations);
+    RUN(test_poisson_maze);
     RUN(test_poisson_shapes);
     RUN(test_poisson_few_unknowns);
     RUN(test_poisson_order);

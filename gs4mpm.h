@@ -1822,6 +1822,16 @@ static void gs4i_build_row(gs4i_solver *s, const gs4_poisson_desc *d, int j, int
     }
 }
 
+/* Whether eight cells of a row and all their neighbours are liquid. */
+GS4I_INLINE int gs4i_is_deep(const uint8_t *v, ptrdiff_t ny, ptrdiff_t nz)
+{
+    const uint8_t *const around[7] = { v, v - 1, v + 1, v - ny, v + ny, v - nz, v + nz };
+    uint64_t all = ~(uint64_t)0, eight;
+    int a;
+    for (a = 0; a < 7; a++) { memcpy(&eight, around[a], 8); all &= eight; }
+    return all == 0x0303030303030303u;
+}
+
 /* The same where one coefficient serves all faces, for cells `begin` to `end`, which hold all liquid of the row. */
 static void gs4i_build_uniform_row(gs4i_solver *s, const gs4_poisson_desc *d, int j, int k, int begin, int end)
 {
@@ -1830,6 +1840,7 @@ static void gs4i_build_uniform_row(gs4i_solver *s, const gs4_poisson_desc *d, in
     const ptrdiff_t ny = (ptrdiff_t)s->kind_row, nz = (ptrdiff_t)s->kind_plane;
     static const float inverse[7] = { 0, 1, 1 / 2.0f, 1 / 3.0f, 1 / 4.0f, 1 / 5.0f, 1 / 6.0f };
     gs4i_rows q;
+    size_t m;
     int i, c;
     gs4i_open_row(&q, s, d, j, k);
     for (c = 0; c < 2; c++) {
@@ -1842,6 +1853,17 @@ static void gs4i_build_uniform_row(gs4i_solver *s, const gs4_poisson_desc *d, in
         const size_t at = row + (size_t)(i / 2), to = coarse + (size_t)(i / 4);
         const int up = (i / 2 + j / 2 + k / 2) & 1;
         int open, wet;
+        if (!(i & 7) && i + 8 <= end && !q.diagonal && gs4i_is_deep(v, ny, nz)) {       /* eight at once */
+            for (c = 0; c < 2; c++) for (m = 0; m < 4; m++) { g->degree[c][at + m] = 6; g->inverse[c][at + m] = inverse[6]; }
+            for (m = 0; m < 4; m++) {
+                const int up_m = (up + (int)m) & 1;
+                h->w[0][up_m][to + m / 2] += 0.5f;
+                if (j & 1) h->w[1][up_m][to + m / 2] += 1;
+                if (k & 1) h->w[2][up_m][to + m / 2] += 1;
+            }
+            i += 7;
+            continue;
+        }
         if (!(*v & GS4I_IS_LIQUID)) continue;
         c = (i + j + k) & 1;
         open = (v[-1] & 1) + (v[1] & 1) + (v[-ny] & 1) + (v[ny] & 1) + (v[-nz] & 1) + (v[nz] & 1);
@@ -2006,7 +2028,9 @@ static void gs4i_number_groups(int K, void *context)
  * rooms behind them take 48 iterations instead of 19. */
 GS4I_INLINE float gs4i_series(float w, float link, float other)
 {
-    const float series = 1 / (1 / w + (link > 0 ? 0.5f / link : 0) + (other > 0 ? 0.5f / other : 0));
+    float series;
+    if (link == w && other == w) return 0.5f * w;           /* no division in the midst of things */
+    series = 1 / (1 / w + (link > 0 ? 0.5f / link : 0) + (other > 0 ? 0.5f / other : 0));
     return series > 0.35f * w ? series : 0.35f * w;
 }
 
@@ -2058,8 +2082,8 @@ GS4I_INLINE float gs4i_link(const gs4i_masked *g, int c, size_t at, int bits, in
     return !(bits >> a & 1) ? g->w[a][c][at] : g->w[a][!c][a == 0 ? at : at - (a == 1 ? g->stride : g->plane)];
 }
 
-/* Edges from the groups of a block to groups around, each once. */
-static int gs4i_block_edges(const gs4i_solver *s, int I, int J, int K, gs4i_edge *edge)
+/* Edges from the groups of a block to groups around, each once; their w where `weigh`. */
+GS4I_INLINE int gs4i_block_edges(const gs4i_solver *s, int I, int J, int K, gs4i_edge *edge, int weigh)
 {
     const gs4i_masked *g = &s->level[1];
     const size_t block = gs4i_block_of(g, I, J, K);
@@ -2073,8 +2097,9 @@ static int gs4i_block_edges(const gs4i_solver *s, int I, int J, int K, gs4i_edge
             const size_t step = a == 1 ? g->stride : g->plane, beside = a ? (high ? at + step : at - step) : high ? at + (size_t)x : at + (size_t)x - 1;
             const float w = high ? g->w[a][c][at] : g->w[a][!c][beside];
             if (!(w > 0) || s->parent[!c][beside] == s->parent[c][at]) continue;
-            for (e = 0; e < count && !(edge[e].from == s->parent[c][at] && edge[e].to == s->parent[!c][beside]); e++) {}
-            if (e == count) { edge[e].from = s->parent[c][at]; edge[e].to = s->parent[!c][beside]; edge[e].w = 0; count++; }
+            for (e = count - 1; e >= 0 && !(edge[e].from == s->parent[c][at] && edge[e].to == s->parent[!c][beside]); e--) {}
+            if (e < 0) { e = count; edge[e].from = s->parent[c][at]; edge[e].to = s->parent[!c][beside]; edge[e].w = 0; count++; }
+            if (!weigh) continue;
             if ((q >> a & 1) != high) edge[e].w += w;       /* a weak link within the block */
             else edge[e].w += gs4i_series(w, gs4i_link(g, c, at, q, a), gs4i_link(g, !c, beside, q ^ 1 << a, a));
         }
@@ -2089,7 +2114,7 @@ static void gs4i_count_edges(int K, void *context)
     gs4i_edge edge[48];
     int I, J, e;
     for (J = 0; J < (g->n[1] + 1) / 2; J++) for (I = 0; I < (g->n[0] + 1) / 2; I++)
-        for (e = gs4i_block_edges(u->s, I, J, K, edge) - 1; e >= 0; e--) u->s->graph[0].start[edge[e].from + 1]++;
+        for (e = gs4i_block_edges(u->s, I, J, K, edge, 0) - 1; e >= 0; e--) u->s->graph[0].start[edge[e].from + 1]++;
 }
 
 static void gs4i_fill_edges(int K, void *context)
@@ -2100,7 +2125,7 @@ static void gs4i_fill_edges(int K, void *context)
     gs4i_edge edge[48];
     int I, J, e, f, count;
     for (J = 0; J < (g->n[1] + 1) / 2; J++) for (I = 0; I < (g->n[0] + 1) / 2; I++) {
-        count = gs4i_block_edges(u->s, I, J, K, edge);
+        count = gs4i_block_edges(u->s, I, J, K, edge, 1);
         for (e = 0; e < count; e++) {
             int32_t place = up->start[edge[e].from];
             for (f = 0; f < e; f++) place += edge[f].from == edge[e].from;

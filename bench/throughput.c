@@ -1,5 +1,5 @@
 /* Nanoseconds a particle and step: one block of a million particles, 8 a cell, settled and stirred, GS4 and symplectic Euler,
- * beside a textbook MLS-MPM loop (plain_mpm.c) in the same run; then viscoelastic liquids, solids, melting, solids, threads, and what an empty domain around costs.
+ * beside a textbook MLS-MPM loop (plain_mpm.c) in the same run; then viscoelastic liquids, solids, melting, threads, and what an empty domain around costs.
  *   cc -O3 -march=native bench/throughput.c -I. -lm -lpthread -o throughput && ./throughput [--particles N] [--steps N] [--repeats N]
  * CSV on standard output. */
 #define _POSIX_C_SOURCE 200112L

@@ -136,10 +136,11 @@
  *
  * ELLIPTIC SOLVER. gs4_poisson_* solves (diagonal - div coefficient grad) x = rhs on a box of cells that are liquid, air or solid, by
  * itself: multigrid in float preconditions conjugate gradients in double. It needs 6 to 11 iterations for a residual of 1e-8 whatever
- * the size, also where the coefficient jumps by 1000, and up to 20 behind walls with holes of one cell, in spray, in porous matter and
- * in serpentines; a maze of corridors one cell wide takes 60 to 80 (tests/test_poisson.c, bench/poisson.c). Parts that nothing holds
- * are found: there the mean of x is 0, and the mean of rhs is taken off. At 256^3 it takes 45 bytes a cell where one coefficient serves
- * all faces, 8 more with a diagonal; 58 else, 71 in double. A solve allocates nothing. `threads` and the same bits as below.
+ * the size, also where large parts differ by 1000; up to 21 where cells or small blocks do, behind walls with holes of one cell, in spray,
+ * in porous matter and in serpentines; up to 40 where single faces differ by 1000, and 80 in a maze of corridors one cell wide
+ * (tests/test_poisson.c, bench/poisson.c). Parts that nothing holds are found: there the mean of x is 0, and the mean of rhs is taken
+ * off. At 256^3 it takes 45 bytes a cell where one coefficient serves all faces, 58 else, 72 in double, 5 to 9 more with a diagonal;
+ * more in small boxes (64^3: 63). A solve allocates nothing. `threads` and the same bits as below.
  *
  * OPTIONS (macros)             meaning                                                    define it
  *     GS4MPM_IMPLEMENTATION    compile the implementation here                            in one file
@@ -252,8 +253,8 @@ typedef enum gs4_result {
     GS4_ERROR_MEMORY        = -2,
     GS4_ERROR_IO            = -3,  /* a file could not be opened, written whole or read */
     GS4_ERROR_FORMAT        = -4,  /* a file is not what it says it is, or is damaged */
-    GS4_ERROR_UNSTABLE      = -5,  /* the state would become non-finite or leave the physical range: the step
-                                      was not taken, the state is that of the last good step */
+    GS4_ERROR_UNSTABLE      = -5,  /* dt is above the stability limit, or the state would become non-finite or leave the physical
+                                      range: the step was not taken, the state is that of the last good step */
     GS4_ERROR_NOT_CONVERGED = -6,  /* a linear solve did not reach its tolerance; same promise */
     GS4_ERROR_ABI           = -7   /* header and implementation were compiled with different settings */
 } gs4_result;
@@ -298,7 +299,7 @@ typedef double (*gs4_now_fn)(void *user);                                  /* se
 typedef enum gs4_liquid { GS4_NEWTONIAN = 0, GS4_OLDROYD_B, GS4_POM_POM } gs4_liquid; /* UCM: Oldroyd-B, F_v 0 */
 typedef enum gs4_solid  { GS4_NO_SOLID = 0, GS4_NEO_HOOKEAN, GS4_FIXED_COROTATED } gs4_solid;
 typedef enum gs4_viscosity_law { GS4_VISCOSITY_CONSTANT = 0, GS4_VISCOSITY_CROSS_WLF, GS4_VISCOSITY_CALLBACK } gs4_viscosity_law;
-typedef gs4_real (*gs4_viscosity_fn)(gs4_real temperature, gs4_real shear_rate, void *user);   /* Pa s of K and 1/s; thread-safe */
+typedef gs4_real (*gs4_viscosity_fn)(gs4_real temperature, gs4_real shear_rate, void *user);   /* Pa s of temperature and 1/s; thread-safe */
 
 typedef struct gs4_material {
     gs4_real density;               /* kg/m^3, required, > 0 */
@@ -317,7 +318,8 @@ typedef struct gs4_material {
     gs4_viscosity_fn viscosity_fn; void *viscosity_user;
     /* volume response, both phases */
     gs4_real bulk_modulus;          /* K, Pa; 0: density * sound_speed^2 */
-    gs4_real sound_speed;           /* c0, m/s, of the Tait equation (gamma 7); 0: chosen so that compression stays below 1 %, of solids at least sqrt(10 G/rho) */
+    gs4_real sound_speed;           /* c0, m/s, of the Tait equation (gamma 7); 0: 10 sqrt(2 g H + v^2), H the height of the
+                                       domain, v the fastest speed given so far: flow compresses by 1 %, impact by more; solids: at least sqrt(10 G/rho) */
     int      incompressible;        /* non-zero: K is infinite (partitioned and semi-implicit schemes) */
     /* solid phase, below melting_temperature or always when the material never melts */
     gs4_solid solid;                /* with liquid GS4_NEWTONIAN; its viscosity then damps the solid */
@@ -355,7 +357,7 @@ typedef struct gs4_sim_desc {
     gs4_vec3 gravity;               /* m/s^2 */
     gs4_scheme scheme;
     gs4_integrator integrator;
-    gs4_real rho_inf, rho_inf_spurious; /* 0 <= spurious <= rho_inf <= 1 */
+    gs4_real rho_inf, rho_inf_spurious; /* 0 <= spurious <= rho_inf <= 1; explicit: their product at most 0.98, or no step is stable */
     gs4_real flip_decay_time;       /* s over which particle motion that the grid cannot see fades; 0: 0.5 s (symplectic
                                        Euler: at once, affine PIC); INFINITY: pure FLIP */
     gs4_wall walls[6];              /* -x +x -y +y -z +z */
@@ -380,7 +382,9 @@ GS4_API gs4_sim_desc gs4_get_desc(const gs4_sim *sim);        /* with every defa
 GS4_API uint64_t gs4_state_hash(const gs4_sim *sim);          /* of the whole state; equal for any thread count */
 
 GS4_API int gs4_add_material(gs4_sim *sim, const gs4_material *material);      /* id >= 0, or an error */
-GS4_API int gs4_material_preset(const char *name, gs4_material *material);     /* names and sources: [[liquid]] */
+/* water, olive oil, glycerol, honey; viscoelastic: cream, ice cream, boger fluid, polymer melt; melting, in degrees Celsius, with solids much
+ * softer than real ones: chocolate, wax, butter, lava. Sources: [[liquid]] */
+GS4_API int gs4_material_preset(const char *name, gs4_material *material);
 
 typedef struct gs4_fill {
     int      material;
@@ -405,7 +409,7 @@ typedef struct gs4_collider {
 GS4_API int gs4_add_collider(gs4_sim *sim, const gs4_collider *collider);                            /* id */
 GS4_API int gs4_move_collider(gs4_sim *sim, int collider, gs4_vec3 velocity, gs4_vec3 angular_velocity);     /* from now on */
 
-typedef struct gs4_emitter {        /* a nozzle: every particle that leaves it is at rest relative to `velocity` */
+typedef struct gs4_emitter {        /* a nozzle: it is full at `start`, and what leaves it has fill.velocity, of the world */
     gs4_shape shape;                /* the mouth's volume; refilled as material leaves */
     gs4_fill  fill;
     gs4_vec3  travel;               /* velocity of the nozzle itself */
@@ -436,7 +440,7 @@ typedef struct gs4_stats {
     int      particles, active_cells; uint64_t memory_bytes;
     double   mass, momentum[3], angular_momentum[3] /* about the origin of coordinates */, kinetic_energy, thermal_energy, volume;
     double   max_speed, min_volume_ratio, max_volume_ratio, min_temperature, max_temperature;
-    int      pressure_iterations, viscous_iterations, heat_iterations, elastic_iterations; double solver_residual;
+    int      pressure_iterations, viscous_iterations, heat_iterations, elastic_iterations; double solver_residual;     /* explicit: heat alone */
     uint64_t stress_substeps;       /* particles that needed the robust local integrator so far */
     uint64_t stress_bounded;        /* whose stretch had to be bounded: liquids where anisotropy > 1, solids that do not yield beyond 512 */
     double   seconds_transfer, seconds_stress, seconds_solve, seconds_sort, seconds_total;    /* so far */
@@ -447,14 +451,14 @@ GS4_API gs4_stats gs4_get_stats(gs4_sim *sim);
 GS4_API int gs4_write_ply(gs4_sim *sim, const char *path);     /* binary little-endian PLY: x y z, vx vy vz, and the fields the scene has */
 GS4_API int gs4_write_raw(gs4_sim *sim, const char *path);     /* NumPy .npy, one record a particle: numpy.load(path)['velocity'] */
 GS4_API int gs4_save(gs4_sim *sim, const char *path);          /* whole state: loading it continues bit for bit */
-GS4_API int gs4_load(gs4_sim *sim, const char *path);          /* into a simulation made with the same description */
+GS4_API int gs4_load(gs4_sim *sim, const char *path);          /* into one made with the same description, materials, colliders and emitters */
 
 /* One material point: the same code that particles run, for rheometry and teaching. All zero: at rest. A step starts afresh where
  * stress_rate is zero; set it to zero where the flow changes at once. Errors have a sentence in gs4_last_error(NULL). */
 typedef struct gs4_point {
     gs4_real stress[6], stress_rate[6];   /* non-local: xx yy zz xy xz yz, Pa and Pa/s */
     gs4_real deformation[9];              /* F of solids, elastic part, det F > 0; all zero means identity */
-    gs4_real temperature;                 /* K, for viscosity laws */
+    gs4_real temperature;                 /* for viscosity laws */
 } gs4_point;
 GS4_API int gs4_point_step(const gs4_material *material, gs4_point *point, const gs4_real velocity_gradient[9], /* L[3*i+j] = dv_i/dx_j */
                            gs4_real dt, gs4_real rho_inf, gs4_real rho_inf_spurious);
@@ -470,9 +474,9 @@ typedef enum gs4_cell { GS4_CELL_AIR = 0 /* x given */, GS4_CELL_LIQUID = 1 /* u
 
 typedef struct gs4_poisson_desc {       /* the arrays are read by gs4_poisson_create alone */
     int cells[3]; gs4_real cell_size;
-    const uint8_t  *kind;               /* gs4_cell per cell, x fastest; beyond the box is GS4_CELL_SOLID */
+    const uint8_t  *kind;               /* gs4_cell per cell, x fastest, then y; beyond the box is GS4_CELL_SOLID */
     const gs4_real *diagonal;           /* per cell, >= 0; NULL: 0 */
-    const gs4_real *coefficient[3];     /* per face of each axis, (n+1) along that axis, >= 0; NULL: 1 */
+    const gs4_real *coefficient[3];     /* per face of each axis, (n+1) along that axis, face i before cell i, >= 0; NULL: 1 */
     gs4_real tolerance;                 /* relative residual; 0: 1e-6 double, 1e-4 float */
     int      max_iterations;            /* 0: 200 */
     int      threads;                   /* as in gs4_sim_desc, like all that follows */
@@ -490,7 +494,7 @@ typedef struct gs4_solve_stats {
     double   removed_mean;              /* ... the mean of rhs, which no x can meet, is taken off: the largest |mean| */
 } gs4_solve_stats;
 
-/* Every value that matters must be finite; those of solids, and of faces that let nothing through, may be anything. Errors have a
+/* Every value that matters must be finite; those of solids, rhs in the air, and faces that let nothing through may be anything. Errors have a
  * sentence in gs4_last_error(NULL). After GS4_ERROR_NOT_CONVERGED x is the last iterate, the best in the energy norm, and `residual`
  * is true; after other errors x is as it was. */
 GS4_API int  gs4_poisson_create(const gs4_poisson_desc *desc, gs4_poisson **solver);
@@ -2544,6 +2548,7 @@ static double gs4i_true_residual(gs4i_solver *s, gs4i_given *v, int guess, doubl
     double mean;
     v->guess = guess;
     gs4i_parallel_for(s->tasks, s->level[0].n[2], gs4i_load_plane, v);
+    if (guess > 0) gs4i_take_means(s, s->x);
     mean = gs4i_take_means(s, s->level[0].r);
     if (removed) *removed = mean / s->rhs_unit;
     gs4i_sweep_run(s, 0, defect, 1);
@@ -2557,7 +2562,7 @@ static gs4i_end gs4i_iterate(gs4i_solver *s, double goal, int limit, int diagona
 {
     static const gs4i_stage_fn jacobi[] = { gs4i_stage_jacobi, gs4i_stage_dot }, direct[] = { gs4i_stage_direct, gs4i_stage_curvature };
     static const gs4i_stage_fn update[] = { gs4i_stage_update };
-    const int patience = diagonal ? 200 : 10;
+    const int patience = diagonal ? 200 : 30;         /* |r| need not fall in each: over 30 it does where anything does */
     double last = 0, least = *norm, look = *norm;
     int i;
     for (i = 0; *norm > goal; i++) {
@@ -2630,6 +2635,7 @@ static int gs4i_solver_solve(gs4i_solver *s, const gs4_real *rhs, gs4_real *x, d
     stats->pockets = s->pockets;
     norm = size;
     if (guess && size > 0) norm = gs4i_true_residual(s, &v, 1, NULL);
+    if (!(norm <= size)) { norm = gs4i_true_residual(s, &v, 0, NULL); guess = 0; }      /* a guess worse than none is not taken */
     while (norm > tolerance * size) {                       /* until the true residual agrees */
         if (norm > 0.9 * before) { end = GS4I_STAGNATED; break; }
         before = norm;
@@ -2637,7 +2643,7 @@ static int gs4i_solver_solve(gs4i_solver *s, const gs4_real *rhs, gs4_real *x, d
         norm = gs4i_true_residual(s, &v, -1, NULL);
         if (end == GS4I_BROKE_DOWN) {                       /* once more, without the cycle, from where it was last sound */
             gs4i_clear_directions(s);
-            if (!(norm <= DBL_MAX)) norm = gs4i_true_residual(s, &v, 1, NULL);
+            if (!(norm <= DBL_MAX)) norm = gs4i_true_residual(s, &v, guess, NULL);
             if (!diagonal) { diagonal = 1; before = HUGE_VAL; continue; }
         }
         if (end != GS4I_CONVERGED) break;
@@ -5759,6 +5765,7 @@ struct gs4_sim {
     gs4_real fastest;                   /* any speed that was ever set: chooses a sound speed where none is given */
     gs4_real shift;                     /* of the rates of positions, left by the last step */
     int afresh, unsorted, unseen;       /* start rates anew; sort before the next step; `worst` is out of date */
+    gs4_real stage_limit;               /* stable dt by what the stage of the last step saw; 0: it did not get there */
     int edited;                         /* by hand, not checked yet */
     int unturned;                       /* velocities were set by hand: how solids turn must be found out */
     char error[320];
@@ -6408,6 +6415,7 @@ typedef struct gs4i_corrections { gs4i_lanes U[4] /* and mass there */, A[4], ju
 GS4I_INLINE void gs4i_correct_batch(gs4i_rule r, const gs4i_corrections *k, gs4i_batch *q)
 {
     gs4i_lanes decay, damped;
+    const int at_once = r.decay * r.dt > 1;                 /* what fades within a step leaves no rate: a longer step would blow it up */
     int b, c;
     GS4I_BATCH_LOOP(b) {
         const gs4i_wide filled = k->U[3][b] * r.inv_full;
@@ -6422,7 +6430,7 @@ GS4I_INLINE void gs4i_correct_batch(gs4i_rule r, const gs4i_corrections *k, gs4i
             const gs4i_wide stage_a = (k->A[c][b] + decay[b] * (k->U[c][b] - (v + r.before * a))) * damped[b];
             const gs4i_wide da = (stage_a - a) * r.inv_alpha_m, change = (k->U[c][b] - move) * r.inv_alpha_m;
             q->v[c][b] = ((v + r.dt * a) + r.gamma * r.dt * da) + k->jump[c][b];
-            q->a[c][b] = a + da;
+            if (at_once) q->a[c][b] = a + (k->A[c][b] - a) * r.inv_alpha_m; else q->a[c][b] = a + da;
             q->x[c][b] = (q->x[c][b] + r.dt * move) + r.gamma * r.dt * change;
             q->move[c][b] = (q->v[c][b] - (move + change)) - r.next_shift * q->a[c][b];
         }
@@ -7863,7 +7871,8 @@ static int gs4i_check_stage(gs4_sim *sim)
 {
     gs4i_report r = gs4i_all_reports(sim);
     if (r.bad) return gs4i_fail_bad(sim, &r);
-    if (sim->rule.dt > GS4I_C(1.25) * gs4i_stable_dt(sim, &r))
+    sim->stage_limit = gs4i_stable_dt(sim, &r);
+    if (sim->rule.dt > GS4I_C(1.25) * sim->stage_limit)
         return gs4i_fail_value(sim, GS4_ERROR_UNSTABLE, "viscosity or compression rose during the step: dt ", (double)sim->rule.dt,
                                " s is beyond the stability limit there; the step was not taken");
     return GS4_OK;
@@ -7919,21 +7928,23 @@ static gs4_real gs4i_jitter(uint32_t seed, uint64_t number, int axis)
 
 /* The lattice that flows through a mouth: points that are in it now and were not when last looked at. With `sim` const
  * in spirit when `emit` is 0: then only counts. Lattice point n of axis a is at low + (n + 1/2) spacing + drift. */
-static int gs4i_mouth_points(gs4_sim *sim, gs4i_emitter *e, const double drift[3], int emit)
+static int gs4i_mouth_points(gs4_sim *sim, gs4i_emitter *e, const double drift[3], double ahead, int emit)
 {
     const gs4i_body *mouth = &sim->boundary.bodies[e->body];
+    gs4i_body then_there = *mouth;
     const double spacing = (double)e->is.fill.spacing;
     const gs4_real mass = sim->laws[e->is.fill.material].density * e->is.fill.spacing * e->is.fill.spacing * e->is.fill.spacing;
     double low[3], high[3], origin[3], pivot[3], travelled[3];
     gs4_vec3 lo, hi;
     int64_t from[3], to[3], i, j, k;
     int a, n = 0;
+    if (ahead > 0) gs4i_body_move(&then_there, ahead);
     gs4i_to_double(mouth->is.pivot, pivot);
     gs4i_shape_bounds(&e->is.shape, &lo, &hi);
     gs4i_to_double(lo, low); gs4i_to_double(hi, high);
     gs4i_to_double(sim->grid.origin, origin);
     for (a = 0; a < 3; a++) {                               /* the part of the mouth's box that is in the domain */
-        const double moved = mouth->at[a] - pivot[a], size = (double)sim->grid.cells[a] * (double)sim->grid.h;
+        const double moved = then_there.at[a] - pivot[a], size = (double)sim->grid.cells[a] * (double)sim->grid.h;
         const double begin = fmax(low[a], origin[a] - moved), end = fmin(high[a], origin[a] + size - moved);
         from[a] = (int64_t)floor((begin - low[a] - drift[a]) / spacing) - 1;
         to[a] = (int64_t)ceil((end - low[a] - drift[a]) / spacing) + 1;
@@ -7990,7 +8001,7 @@ static int gs4i_prepare_emitters(gs4_sim *sim, double dt)
         if (!gs4i_emitter_is_on(&sim->emitters[e], sim->time + dt)) continue;
         if (sim->emitters[e].begun) gs4i_drift_after(&sim->emitters[e], dt, drift);
         else memset(drift, 0, sizeof drift);
-        if (gs4i_is_due(&sim->emitters[e], drift)) n += gs4i_mouth_points(sim, &sim->emitters[e], drift, 0);
+        if (gs4i_is_due(&sim->emitters[e], drift)) n += gs4i_mouth_points(sim, &sim->emitters[e], drift, dt, 0);
     }
     if (n == 0) return GS4_OK;
     wanted = sim->particles.count + n;
@@ -8014,7 +8025,7 @@ static void gs4i_emit(gs4_sim *sim, double dt)
         else memset(drift, 0, sizeof drift);
         memcpy(m->drift, drift, sizeof drift);
         if (!gs4i_is_due(m, drift)) continue;
-        n = gs4i_mouth_points(sim, m, drift, 1);
+        n = gs4i_mouth_points(sim, m, drift, 0, 1);
         if (n > sim->particles.count - before && sim->desc.log)
             sim->desc.log(1, "an emitter pauses: max_particles is reached", sim->desc.log_user);
         memcpy(m->looked, drift, sizeof drift);
@@ -8106,6 +8117,7 @@ static int gs4i_take_step(gs4_sim *sim, gs4_real dt)
     memset(&nodes, 0, sizeof nodes);
     nodes.sim = sim;
     nodes.lightest = gs4i_max(sim->min_mass * GS4I_EPSILON * GS4I_EPSILON, GS4I_TINY);
+    sim->stage_limit = 0;
     sim->rule = gs4i_make_rule(sim, dt);
     sim->warm = gs4i_make_warm_rule(sim);
     GS4I_TRY(gs4i_prepare_emitters(sim, (double)dt));
@@ -8523,7 +8535,7 @@ static int gs4i_rebuild(gs4_sim *next, const gs4i_head *h, const gs4i_pieces *p)
     if (gs4i_after_occupy(next) != GS4_OK) return GS4_ERROR_MEMORY;
     gs4i_particle_arrays(&next->particles, a);
     for (k = 0; k < GS4I_ARRAYS - 1; k++)
-        if (a[k].wanted) memcpy(*a[k].data, p->at[GS4I_PIECE_PARTICLES + k], p->size[GS4I_PIECE_PARTICLES + k]);
+        if (a[k].wanted && h->particles) memcpy(*a[k].data, p->at[GS4I_PIECE_PARTICLES + k], p->size[GS4I_PIECE_PARTICLES + k]);
     for (k = 0; k < h->particles; k++) if (next->particles.material[k] >= next->material_count) return GS4_ERROR_FORMAT;
     next->particles.count = h->particles;
     return GS4_OK;
@@ -9234,6 +9246,22 @@ static int gs4i_make_history(gs4_sim *sim, const gs4_material *material)
     return result;
 }
 
+/* But not what lies between the members: checkpoints compare materials byte by byte. */
+static void gs4i_copy_members(gs4_material *to, const gs4_material *m)
+{
+    to->density = m->density; to->liquid = m->liquid; to->viscosity = m->viscosity; to->local_fraction = m->local_fraction;
+    to->relaxation_time = m->relaxation_time; to->stretch_time = m->stretch_time; to->anisotropy = m->anisotropy;
+    to->arms = m->arms; to->viscosity_law = m->viscosity_law; to->cross_wlf.a = m->cross_wlf.a; to->cross_wlf.n = m->cross_wlf.n;
+    to->cross_wlf.d1 = m->cross_wlf.d1; to->cross_wlf.a1 = m->cross_wlf.a1; to->cross_wlf.t1 = m->cross_wlf.t1;
+    to->cross_wlf.t2 = m->cross_wlf.t2; to->viscosity_fn = m->viscosity_fn; to->viscosity_user = m->viscosity_user;
+    to->bulk_modulus = m->bulk_modulus; to->sound_speed = m->sound_speed; to->incompressible = m->incompressible;
+    to->solid = m->solid; to->shear_modulus = m->shear_modulus; to->yield_compression = m->yield_compression;
+    to->yield_stretch = m->yield_stretch; to->heat_capacity = m->heat_capacity; to->conductivity = m->conductivity;
+    to->flux_relaxation_time = m->flux_relaxation_time; to->fourier_fraction = m->fourier_fraction;
+    to->melting_temperature = m->melting_temperature; to->latent_heat = m->latent_heat; to->can_melt = m->can_melt;
+    to->viscous_heating = m->viscous_heating;
+}
+
 GS4_API int gs4_add_material(gs4_sim *sim, const gs4_material *material)
 {
     if (!sim) return GS4_ERROR_ARGUMENT;
@@ -9243,7 +9271,8 @@ GS4_API int gs4_add_material(gs4_sim *sim, const gs4_material *material)
     GS4I_TRY(gs4i_grow(sim, (void **)&sim->laws, sim->material_count, &sim->material_capacity, sizeof *sim->laws));
     GS4I_TRY(gs4i_grow(sim, (void **)&sim->frozen, sim->material_count, &sim->frozen_capacity, sizeof *sim->frozen));
     if (gs4i_make_history(sim, material) != GS4_OK) return gs4i_fail_memory(sim);
-    sim->laws[sim->material_count++].is = *material;
+    memset(&sim->laws[sim->material_count].is, 0, sizeof *material);
+    gs4i_copy_members(&sim->laws[sim->material_count++].is, material);
     gs4i_set_laws(sim);
     return sim->material_count - 1;
 }
@@ -9393,6 +9422,28 @@ static int64_t gs4i_collect_points(gs4_sim *sim, const gs4_shape *shape, const g
     return n;
 }
 
+/* After an edit by hand: all that a user may have written, before it can do harm. */
+static int gs4i_check_edit(gs4_sim *sim)
+{
+    const gs4i_particles *p = &sim->particles;
+    gs4_real fastest = 0;
+    int i, c;
+    if (!sim->edited) return GS4_OK;
+    for (i = 0; i < p->count; i++) {
+        const gs4_real *x = p->position + 4 * (size_t)i, *v = p->velocity + 4 * (size_t)i;
+        int good = gs4i_inside_domain(&sim->grid, gs4i_vec3(x[0], x[1], x[2]));
+        for (c = 0; c < 3; c++) good = good && gs4i_finite(x[c]) && gs4i_finite(v[c]) && v[c] < GS4I_HUGE && v[c] > -GS4I_HUGE;
+        if (p->with_heat) good = good && gs4i_abs(p->heat[4 * (size_t)i]) < GS4I_HUGE;
+        if (!good)
+            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "an edit has left particle ", (double)p->id[i], " outside of the grid or with a number that is not finite; edit it again");
+        fastest = gs4i_max(fastest, gs4i_length(gs4i_vec3(v[0], v[1], v[2])));
+    }
+    for (i = 0; i < p->count && p->with_heat; i++) gs4i_settle_phase(p, (size_t)i, &sim->laws[p->material[i]]);
+    gs4i_note_speed(sim, fastest);
+    sim->edited = 0;
+    return GS4_OK;
+}
+
 GS4_API int gs4_add_particles(gs4_sim *sim, gs4_shape shape, const gs4_fill *fill)
 {
     gs4_fill f;
@@ -9403,6 +9454,7 @@ GS4_API int gs4_add_particles(gs4_sim *sim, gs4_shape shape, const gs4_fill *fil
     if (!sim) return GS4_ERROR_ARGUMENT;
     if (!fill) return gs4i_bad_argument(sim, "fill is NULL");
     f = *fill;
+    GS4I_TRY(gs4i_check_edit(sim));
     GS4I_TRY(gs4i_check_fill(sim, &f));
     GS4I_TRY(gs4i_check_shape(sim, &shape));
     lo = hi = shape.a;
@@ -9429,6 +9481,7 @@ GS4_API int gs4_add_points(gs4_sim *sim, const gs4_real *xyz, int count, gs4_rea
     if (!fill || (!xyz && count > 0)) return gs4i_bad_argument(sim, "xyz or fill is NULL");
     if (count < 0) return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "count is ", count, "; it must be 0 or above");
     f = *fill;
+    GS4I_TRY(gs4i_check_edit(sim));
     GS4I_TRY(gs4i_check_fill(sim, &f));
     GS4I_TRY(gs4i_check(sim, "volume_each", volume_each, GS4I_POSITIVE));
     if (volume_each > 8 * sim->grid.h * sim->grid.h * sim->grid.h)
@@ -9549,28 +9602,19 @@ static gs4_real gs4i_limit_now(const gs4_sim *sim)
     return gs4i_stable_dt(sim, &r);
 }
 
-GS4_API gs4_real gs4_stable_dt(const gs4_sim *sim) { return sim ? gs4i_limit_now(sim) : GS4I_C(0); }
-
-/* After an edit by hand: all that a user may have written, before it can do harm. */
-static int gs4i_check_edit(gs4_sim *sim)
+GS4_API gs4_real gs4_stable_dt(const gs4_sim *sim)
 {
-    const gs4i_particles *p = &sim->particles;
+    gs4_sim *noted;                                         /* a default sound speed follows the speeds that an edit has brought */
     gs4_real fastest = 0;
-    int i, c;
-    if (!sim->edited) return GS4_OK;
-    for (i = 0; i < p->count; i++) {
-        const gs4_real *x = p->position + 4 * (size_t)i, *v = p->velocity + 4 * (size_t)i;
-        int good = gs4i_inside_domain(&sim->grid, gs4i_vec3(x[0], x[1], x[2]));
-        for (c = 0; c < 3; c++) good = good && gs4i_finite(x[c]) && gs4i_finite(v[c]) && v[c] < GS4I_HUGE && v[c] > -GS4I_HUGE;
-        if (p->with_heat) good = good && gs4i_abs(p->heat[4 * (size_t)i]) < GS4I_HUGE;
-        if (!good)
-            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "an edit has left particle ", (double)p->id[i], " outside of the grid or with a number that is not finite; edit it again");
-        fastest = gs4i_max(fastest, gs4i_length(gs4i_vec3(v[0], v[1], v[2])));
+    int i;
+    if (!sim) return GS4I_C(0);
+    memcpy(&noted, &sim, sizeof noted);
+    for (i = 0; i < sim->particles.count && sim->edited; i++) {
+        const gs4_real *v = sim->particles.velocity + 4 * (size_t)i, speed = gs4i_length(gs4i_vec3(v[0], v[1], v[2]));
+        if (speed < GS4I_HUGE) fastest = gs4i_max(fastest, speed);
     }
-    for (i = 0; i < p->count && p->with_heat; i++) gs4i_settle_phase(p, (size_t)i, &sim->laws[p->material[i]]);
-    gs4i_note_speed(sim, fastest);
-    sim->edited = 0;
-    return GS4_OK;
+    if (fastest > sim->fastest) gs4i_note_speed(noted, fastest);
+    return gs4i_limit_now(sim);
 }
 
 static int gs4i_try_step(gs4_sim *sim, gs4_real dt)
@@ -9599,6 +9643,13 @@ GS4_API int gs4_step(gs4_sim *sim, gs4_real dt)
 
 #define GS4I_MAX_STEPS 1e8              /* of one gs4_advance: beyond, it would seem to hang */
 
+/* What part of a refused step to try: half, or as much as is stable by what it saw. Liquids that thicken have little to say at rest. */
+static double gs4i_less(const gs4_sim *sim)
+{
+    const double part = (double)sim->stage_limit / (double)sim->rule.dt;
+    return part > 0 && part < 0.5 ? part : 0.5;
+}
+
 GS4_API int gs4_advance(gs4_sim *sim, gs4_real duration)
 {
     double left;
@@ -9608,7 +9659,7 @@ GS4_API int gs4_advance(gs4_sim *sim, gs4_real duration)
     for (left = (double)duration; left > 0;) {
         double fraction = (double)sim->desc.cfl, dt, steps;
         int tries, result = GS4_OK;
-        for (tries = 0; tries < 8; tries++, fraction /= 2) {    /* a refused step is tried again with half of it */
+        for (tries = 0; tries < 8; tries++, fraction *= gs4i_less(sim)) {    /* a refused step is tried again, shorter */
             dt = fraction * (double)gs4i_limit_now(sim);
             if (sim->desc.max_dt > 0 && dt > (double)sim->desc.max_dt) dt = (double)sim->desc.max_dt;
             steps = ceil(left / dt * (1 - 1e-9));
@@ -9663,6 +9714,7 @@ GS4_API gs4_edit gs4_edit_particles(gs4_sim *sim, gs4_field field)
     e.count = e.data ? sim->particles.count : 0;
     e.components = e.data ? components : 0;
     e.stride = e.data ? 4 : 0;
+    if (sim && !e.data) gs4i_bad_argument(sim, "only position, velocity and, in a scene with heat, temperature can be edited");
     if (e.data && field == GS4_FIELD_VELOCITY) { sim->unturned = 1; gs4i_forget_turning(sim); }
     if (e.data) sim->edited = sim->afresh = sim->unsorted = sim->unseen = 1;
     return e;
@@ -9751,8 +9803,20 @@ GS4_API uint64_t gs4_state_hash(const gs4_sim *sim)
 
 /* --- files ------------------------------------------------------------------------------------------------------ */
 
-GS4_API int gs4_write_ply(gs4_sim *sim, const char *path) { return sim ? gs4i_write_ply(sim, path) : GS4_ERROR_ARGUMENT; }
-GS4_API int gs4_write_raw(gs4_sim *sim, const char *path) { return sim ? gs4i_write_raw(sim, path) : GS4_ERROR_ARGUMENT; }
+GS4_API int gs4_write_ply(gs4_sim *sim, const char *path)
+{
+    if (!sim) return GS4_ERROR_ARGUMENT;
+    GS4I_TRY(gs4i_check_edit(sim));
+    return gs4i_write_ply(sim, path);
+}
+
+GS4_API int gs4_write_raw(gs4_sim *sim, const char *path)
+{
+    if (!sim) return GS4_ERROR_ARGUMENT;
+    GS4I_TRY(gs4i_check_edit(sim));
+    return gs4i_write_raw(sim, path);
+}
+
 GS4_API int gs4_save(gs4_sim *sim, const char *path)
 {
     if (!sim) return GS4_ERROR_ARGUMENT;
@@ -9895,7 +9959,12 @@ GS4_API int gs4_point_stress(const gs4_material *material, const gs4_point *poin
 
 GS4_API int gs4_material_preset(const char *name, gs4_material *material)
 {
-    return name && material ? gs4i_preset(name, material) : GS4_ERROR_ARGUMENT;
+    gs4_sim fake;
+    memset(&fake, 0, sizeof fake);
+    if (!name || !material) return gs4i_say(&fake, gs4i_bad_argument(&fake, "gs4_material_preset needs a name and a place for the material"));
+    if (gs4i_preset(name, material) == GS4_OK) return GS4_OK;
+    return gs4i_say(&fake, gs4i_bad_argument(&fake, "there is no such preset; there are water, olive oil, glycerol, honey, cream, ice cream, "
+                                                    "boger fluid, polymer melt, chocolate, wax, butter and lava"));
 }
 
 #if defined(__clang__)

@@ -64,6 +64,9 @@ int main(int count, char **values)
     run_poisson();
     RUN(test_stability);
     RUN(test_extremes);
+    RUN(test_short_decay);
+    RUN(test_thickening);
+    RUN(test_nozzle_from_outside);
     RUN(test_order_as_printed);
     RUN(test_order_in_time);
     return test_finish();

@@ -719,6 +719,32 @@ static void test_errors_edit_repaired(void)
 }
 
 /* A position that is no number must not get anywhere by another way. */
+/* The limit knows the speeds that an edit has brought, and what they do to a default speed of sound. */
+static void test_errors_limit_after_edit(void)
+{
+    gs4_sim_desc d = scene_cube(8);
+    const gs4_material m = scene_liquid(1000, 0.001, 0);
+    const gs4_fill f = scene_fill(at(0, 0, 0));
+    gs4_sim *sim;
+    gs4_edit e;
+    int i;
+    CHECK(gs4_create(&d, &sim) == GS4_OK);
+    CHECK_RESULT(sim, gs4_add_material(sim, &m), 0);
+    CHECK(gs4_add_particles(sim, gs4_box(at(0.25, 0.25, 0.25), at(0.75, 0.75, 0.75)), &f) > 0);
+    e = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
+    for (i = 0; i < e.count; i++) e.data[(size_t)i * (size_t)e.stride] = 1;
+    CHECK_RESULT(sim, gs4_step(sim, (gs4_real)0.9 * gs4_stable_dt(sim)), GS4_OK);
+    CHECK(gs4_edit_particles(sim, GS4_FIELD_MASS).data == NULL && strstr(gs4_last_error(sim), "can be edited"));
+    gs4_destroy(sim);
+}
+
+static void test_errors_preset(void)
+{
+    gs4_material m;
+    CHECK(gs4_material_preset("Honey", &m) == GS4_ERROR_ARGUMENT && strstr(gs4_last_error(NULL), "honey"));
+    CHECK(gs4_material_preset(NULL, &m) == GS4_ERROR_ARGUMENT && strstr(gs4_last_error(NULL), "needs a name"));
+}
+
 static void test_errors_edit_then_add(void)
 {
     const double wrong[] = { ERR_NAN, ERR_INFINITY, -1e30 };
@@ -730,7 +756,9 @@ static void test_errors_edit_then_add(void)
         int r;
         e.data[1] = (gs4_real)wrong[v];
         r = gs4_add_particles(sim, gs4_box(at(0.5, 0.5, 0.5), at(0.75, 0.75, 0.75)), &f);
-        CHECK(r == 64 || r == GS4_ERROR_ARGUMENT);
+        CHECK(r == GS4_ERROR_ARGUMENT);
+        CHECK_RESULT(sim, gs4_write_ply(sim, "edit.ply"), GS4_ERROR_ARGUMENT);
+        CHECK_RESULT(sim, gs4_write_raw(sim, "edit.npy"), GS4_ERROR_ARGUMENT);
         CHECK_RESULT(sim, gs4_step(sim, (gs4_real)1e-4), GS4_ERROR_ARGUMENT);
         gs4_destroy(sim);
     }
@@ -1024,6 +1052,8 @@ static void run_errors(void)
     RUN(test_errors_large_mesh);
     RUN(test_errors_edit);
     RUN(test_errors_edit_repaired);
+    RUN(test_errors_limit_after_edit);
+    RUN(test_errors_preset);
     RUN(test_errors_edit_then_add);
     RUN(test_errors_material_all_or_nothing);
     RUN(test_errors_point);

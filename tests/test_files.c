@@ -942,6 +942,28 @@ static gs4_sim *files_variant(int which)
     return sim;
 }
 
+/* What lies between the members of a material does not make it another one. */
+static void test_files_padding(void)
+{
+    gs4_sim *sim[2];
+    int k;
+    for (k = 0; k < 2; k++) {
+        const gs4_sim_desc d = files_desc(0);
+        const gs4_material all = scene_liquid(1000, 0.1, 6);
+        gs4_material m;
+        const gs4_fill f = scene_fill(at(0, 0, 0));
+        memset(&m, k ? 0xcd : 0, sizeof m);
+        gs4i_copy_members(&m, &all);
+        CHECK(gs4_create(&d, &sim[k]) == GS4_OK);
+        CHECK_RESULT(sim[k], gs4_add_material(sim[k], &m), 0);
+        CHECK_RESULT(sim[k], gs4_add_particles(sim[k], gs4_box(at(0.25, 0.25, 0.25), at(0.5, 0.5, 0.5)), &f), 0);
+        CHECK_RESULT(sim[k], files_steps(sim[k], 3), 0);
+    }
+    CHECK_RESULT(sim[0], gs4_save(sim[0], files_path("s.sav")), 0);
+    CHECK_RESULT(sim[1], gs4_load(sim[1], files_path("s.sav")), 0);
+    gs4_destroy(sim[0]); gs4_destroy(sim[1]);
+}
+
 static void test_files_other_scene(void)
 {
     gs4_sim *from = files_variant(0);
@@ -1010,6 +1032,7 @@ static void run_files(void)
     RUN(test_files_damaged);
     RUN(test_files_endless);
     RUN(test_files_other_desc);
+    RUN(test_files_padding);
     RUN(test_files_other_scene);
     files_end();
 }

@@ -397,6 +397,45 @@ static void test_poisson_limit(void)
     poisson_free(&p);
 }
 
+/* A guess that is far off, and what it has of the null space of a closed pocket, does not stay. */
+static void test_poisson_bad_guess(void)
+{
+    static const char *const names[3] = { "P2", "P5", "T5" };
+    int q, k;
+    size_t i;
+    for (q = 0; q < 3; q++) for (k = 0; k < 2; k++) {
+        poisson_case p = poisson_make(names[q], 24);
+        gs4_solve_stats stats;
+        double bound;
+        for (i = 0; i < p.count; i++) if (p.kind[i] == GS4_CELL_LIQUID) p.x[i] = (gs4_real)(1e6 * (k ? 1 : poisson_random(&p.random)));
+        CHECK_RESULT(NULL, pois_solve(&p, &stats), GS4_OK);
+        CHECK(poisson_residual(&p, p.x, &bound) <= 1.001e-8 + bound);
+        CHECK_CLOSE(pois_distance(&p), 0, 1e-6);
+        poisson_free(&p);
+    }
+}
+
+/* Few cells whose faces differ by up to 1e6: the residual rises and falls for long before it goes down. */
+static void test_poisson_contrast(void)
+{
+    int seed, solved = 0, a;
+    size_t i;
+    for (seed = 1; seed <= 200; seed++) {
+        poisson_case p = poisson_box(5, 4, 3, GS4_CELL_LIQUID);
+        gs4_solve_stats stats;
+        double bound;
+        p.random = (uint64_t)seed * 88172645463325252u;
+        p.kind[0] = GS4_CELL_AIR; p.desc.tolerance = (gs4_real)1e-4;
+        for (a = 0; a < 3; a++) {
+            p.desc.coefficient[a] = p.coefficient[a] = poisson_array(p.faces[a]);
+            for (i = 0; i < p.faces[a]; i++) p.coefficient[a][i] = (gs4_real)pow(10, -6 * poisson_random(&p.random));
+        }
+        if (pois_solve(&p, &stats) == GS4_OK) { solved++; CHECK(poisson_residual(&p, p.x, &bound) <= 1.001e-4 + bound); }
+        poisson_free(&p);
+    }
+    CHECK(solved == 200);
+}
+
 /* A cycle that gives NaN: once more with the diagonal; a diagonal that does too: the guess stays. */
 static void test_poisson_breakdown(void)
 {
@@ -543,6 +582,8 @@ static void run_poisson(void)
     RUN_ONCE(test_poisson_same_bits);
     RUN(test_poisson_reuse);
     RUN(test_poisson_limit);
+    RUN(test_poisson_bad_guess);
+    RUN(test_poisson_contrast);
     RUN(test_poisson_breakdown);
     RUN(test_poisson_arguments);
     RUN(test_poisson_bad_numbers);

@@ -4888,7 +4888,9 @@ typedef struct gs4i_kicks { gs4i_gradient acc, jump; } gs4i_kicks;
  * fades as that of v does; and contact turns at once. */
 static void gs4i_correct_turning(const gs4i_solid_laws *l, gs4i_deformation *e, const gs4i_rule *rule, gs4i_gradient L, gs4i_kicks *kicks)
 {
-    const gs4_real decay = rule->decay, inv_alpha_m = 1 / rule->alpha_m;
+    const int fades_at_once = rule->decay * rule->dt > 1;
+    const gs4_real decay = fades_at_once ? 0 : rule->decay, damped = fades_at_once ? 1 : rule->damped, inv_alpha_m = 1 / rule->alpha_m;
+    const gs4_real fading = fades_at_once ? 1 - rule->damped : 0;
     int b, i;
     for (i = 0; i < 3; i++) {
         const int j = (i + 1) % 3, k = (i + 2) % 3;
@@ -4897,8 +4899,9 @@ static void gs4i_correct_turning(const gs4i_solid_laws *l, gs4i_deformation *e, 
             const gs4i_wide LL = (L[k][0][b] * L[0][j][b] + L[k][1][b] * L[1][j][b] + L[k][2][b] * L[2][j][b])
                                - (L[j][0][b] * L[0][k][b] + L[j][1][b] * L[1][k][b] + L[j][2][b] * L[2][k][b]);
             const gs4i_wide rate = GS4I_C(0.5) * (kicks->acc[k][j][b] - kicks->acc[j][k][b] - LL), at_once = GS4I_C(0.5) * (kicks->jump[k][j][b] - kicks->jump[j][k][b]);
-            const gs4i_wide stage = (rate + decay * (seen - (w + rule->before * r))) * rule->damped, change = (stage - r) * inv_alpha_m;
-            const gs4i_wide next = ((w + rule->dt * r) + rule->gamma * rule->dt * change) + at_once, next_rate = r + change;
+            const gs4i_wide stage = (rate + decay * (seen - (w + rule->before * r))) * damped, change = (stage - r) * inv_alpha_m;
+            const gs4i_wide all = ((w + rule->dt * r) + rule->gamma * rule->dt * change) + at_once, next_rate = r + change;
+            const gs4i_wide next = all - fading * (w + rule->before * r + rule->s * stage - seen);
             const gs4i_wide_mask solid = l->modulus[b] > GS4I_C(0);
             GS4I_CHOOSE(e->turning[i][b], solid, next, zero);
             GS4I_CHOOSE(e->turning_rate[i][b], solid, next_rate, zero);
@@ -6410,18 +6413,20 @@ GS4I_INLINE void gs4i_unseen(const gs4i_wide *filled, gs4i_wide *unseen)
 typedef struct gs4i_corrections { gs4i_lanes U[4] /* and mass there */, A[4], jump[4] /* and the share of images */; gs4i_gradient L; } gs4i_corrections;
 
 /* S7. Velocity by rule 1, the motion that the grid cannot see (v - U) decaying at its rate k, implicit in itself; J by 2021
- * (57), implicit in J for known div u; position by rule 1 with the grid's velocity U. In: move is dx/dt; out: what the new
+ * (57), implicit in J for known div u; what fades within a step is taken off the velocity, not put into the rate: a longer step would blow
+ * that up, and with rho_inf 1 it would not fade; position by rule 1 with the grid's velocity U. In: move is dx/dt; out: what the new
  * dx/dt lags behind v - shift a. */
 GS4I_INLINE void gs4i_correct_batch(gs4i_rule r, const gs4i_corrections *k, gs4i_batch *q)
 {
     gs4i_lanes decay, damped;
-    const int at_once = r.decay * r.dt > 1;                 /* what fades within a step leaves no rate: a longer step would blow it up */
+    const int at_once = r.decay * r.dt > 1;
+    const gs4_real slow = at_once ? 0 : r.decay, fading = at_once ? 1 - r.damped : 0;
     int b, c;
     GS4I_BATCH_LOOP(b) {
         const gs4i_wide filled = k->U[3][b] * r.inv_full;
         gs4i_wide unseen;
         gs4i_unseen(&filled, &unseen);
-        decay[b] = r.decay + (unseen + k->jump[3][b]) * r.fast_decay;
+        decay[b] = slow + (unseen + k->jump[3][b]) * r.fast_decay;
         damped[b] = GS4I_C(1) / (GS4I_C(1) + r.s * decay[b]);
     }
     for (c = 0; c < 3; c++)
@@ -6430,7 +6435,8 @@ GS4I_INLINE void gs4i_correct_batch(gs4i_rule r, const gs4i_corrections *k, gs4i
             const gs4i_wide stage_a = (k->A[c][b] + decay[b] * (k->U[c][b] - (v + r.before * a))) * damped[b];
             const gs4i_wide da = (stage_a - a) * r.inv_alpha_m, change = (k->U[c][b] - move) * r.inv_alpha_m;
             q->v[c][b] = ((v + r.dt * a) + r.gamma * r.dt * da) + k->jump[c][b];
-            if (at_once) q->a[c][b] = a + (k->A[c][b] - a) * r.inv_alpha_m; else q->a[c][b] = a + da;
+            q->a[c][b] = a + da;
+            if (at_once) q->v[c][b] -= fading * (v + r.before * a + r.s * stage_a - k->U[c][b]);
             q->x[c][b] = (q->x[c][b] + r.dt * move) + r.gamma * r.dt * change;
             q->move[c][b] = (q->v[c][b] - (move + change)) - r.next_shift * q->a[c][b];
         }

@@ -143,15 +143,16 @@ static const char *stability_try(const stability_scene *s, int number, int *refu
  * block at rest stays calm when steps of a thousandth come between. */
 static void test_short_decay(void)
 {
-    static const double decays[3] = { 1e-5, 1e-7, 1e-30 };
-    int k, i, wall;
-    for (k = 0; k < 3; k++) {
+    static const double decays[3] = { 1e-5, 1e-7, 1e-30 }, rhos[3][2] = { { 0, 0 }, { 0.6, 0.1 }, { 1, 0.5 } };
+    int k, i, wall, rho;
+    for (rho = 0; rho < 3; rho++) for (k = 0; k < 3; k++) {
         gs4_sim_desc d = scene_cube(16);
         gs4_material m = scene_liquid(1000, 0.1, 20);
         gs4_fill f = scene_fill(at(1, -5, 0));
         gs4_sim *sim;
         double energy;
         d.cell_size = (gs4_real)0.01; d.gravity = at(0, -9.81, 0); d.flip_decay_time = (gs4_real)decays[k];
+        d.rho_inf = (gs4_real)rhos[rho][0]; d.rho_inf_spurious = (gs4_real)rhos[rho][1];
         m.solid = GS4_NEO_HOOKEAN; m.shear_modulus = 10000;
         for (wall = 0; wall < 2; wall++) {
             d.walls[2] = wall ? GS4_WALL_SLIP : GS4_WALL_STICK;

@@ -138,7 +138,7 @@
  * ELLIPTIC SOLVER. gs4_poisson_* solves (diagonal - div coefficient grad) x = rhs on a box of cells that are liquid, air or solid, by
  * itself: multigrid in float preconditions conjugate gradients in double. It needs 6 to 11 iterations for a residual of 1e-8 whatever
  * the size, also where large parts differ by 1000; up to 21 where cells or small blocks do, behind walls with holes of one cell, in spray,
- * in porous matter and in serpentines; up to 40 where single faces differ by 1000, and 80 in a maze of corridors one cell wide
+ * in porous matter and in serpentines; up to 41 where single faces differ by 1000, and 80 in a maze of corridors one cell wide
  * (tests/test_poisson.c, bench/poisson.c). Parts that nothing holds are found: there the mean of x is 0, and the mean of rhs is taken
  * off. At 256^3 it takes 45 bytes a cell where one coefficient serves all faces, 58 else, 72 in double, 5 to 9 more with a diagonal;
  * more in small boxes (64^3: 63). A solve allocates nothing. `threads` and the same bits as below.
@@ -2027,24 +2027,28 @@ static void gs4i_number_groups(int K, void *context)
     }
 }
 
+/* Of a face in series with the ways to it on either side, at least `least` of the face's own. */
+GS4I_INLINE float gs4i_conductance(float w, float way, float other, float least)
+{
+    const float series = 1 / (1 / w + way + other);
+    return series > least * w ? series : least * w;
+}
+
 /* What a face adds to that between two groups: the face in series with half of the link that either cell has along the same axis within
  * its group, which is the conductance between their centres. Half the face in the midst of things, more of it where a wall has left
  * one layer, and at a door in a wall it stays what it is however coarse the graph: halved as on the grids, doors all but close, and
  * rooms behind them take 48 iterations instead of 19. */
 GS4I_INLINE float gs4i_series(float w, float link, float other)
 {
-    float series;
     if (link == w && other == w) return 0.5f * w;           /* no division in the midst of things */
-    series = 1 / (1 / w + (link > 0 ? 0.5f / link : 0) + (other > 0 ? 0.5f / other : 0));
-    return series > 0.35f * w ? series : 0.35f * w;
+    return gs4i_conductance(w, link > 0 ? 0.5f / link : 0, other > 0 ? 0.5f / other : 0, 0.35f);
 }
 
 /* The same within a block of blocks, where groups are chains and heaps without an axis: from the end of a chain of n it is (n-1)/2 links
- * to its middle, in heaps less. 0.12 to 0.18 are alike; without it a serpentine of plates takes 30 iterations instead of 20. */
+ * to its middle, in heaps less. 0.12 to 0.18 are alike; without it a serpentine of plates takes 29 iterations instead of 20. */
 GS4I_INLINE float gs4i_chain(float w, float links, int n, float other_links, int other_n)
 {
-    const float chain = 1 / (1 / w + (n > 1 ? 0.15f * (float)(n - 1) / links : 0) + (other_n > 1 ? 0.15f * (float)(other_n - 1) / other_links : 0));
-    return chain > 0.1f * w ? chain : 0.1f * w;
+    return gs4i_conductance(w, n > 1 ? 0.15f * (float)(n - 1) / links : 0, other_n > 1 ? 0.15f * (float)(other_n - 1) / other_links : 0, 0.1f);
 }
 
 /* What the air next to a cell is to the coarse cell: 3/4 at a surface, measured best; all of it where it is small beside the cell's links,
@@ -2563,7 +2567,7 @@ static gs4i_end gs4i_iterate(gs4i_solver *s, double goal, int limit, int diagona
 {
     static const gs4i_stage_fn jacobi[] = { gs4i_stage_jacobi, gs4i_stage_dot }, direct[] = { gs4i_stage_direct, gs4i_stage_curvature };
     static const gs4i_stage_fn update[] = { gs4i_stage_update };
-    const int patience = diagonal ? 200 : 30;         /* |r| need not fall in each: over 30 it does where anything does */
+    const int patience = diagonal ? 200 : 30;               /* |r| need not fall in each: over 30 it does where anything does */
     double last = 0, least = *norm, look = *norm;
     int i;
     for (i = 0; *norm > goal; i++) {
@@ -3449,6 +3453,8 @@ typedef struct gs4i_rule {
     gs4_real s;                         /* alpha_f gamma dt / alpha_m: weight of the new rate at the stage */
     gs4_real before;                    /* y** = y + before r: alpha_f dt - s, 0 for symplectic Euler */
     gs4_real decay, damped;             /* k = 1 / flip_decay_time, 1/s; 1 / (1 + s k) */
+    gs4_real fading;                    /* where that is shorter than dt k is 0, and this much of what the grid cannot see goes at once: a rate
+                                           of it would be blown up by a longer step, and with rho_inf 1 it would not fade */
     gs4_real mixing;                    /* 1/s: at most, of temperatures, see [[heat]] */
     gs4_real inv_area;                  /* 1 / h^2 */
     gs4_real fast_decay;                /* what is added to k where the grid sees little: c0 / h */
@@ -4889,9 +4895,7 @@ typedef struct gs4i_kicks { gs4i_gradient acc, jump; } gs4i_kicks;
  * fades as that of v does; and contact turns at once. */
 static void gs4i_correct_turning(const gs4i_solid_laws *l, gs4i_deformation *e, const gs4i_rule *rule, gs4i_gradient L, gs4i_kicks *kicks)
 {
-    const int fades_at_once = rule->decay * rule->dt > 1;
-    const gs4_real decay = fades_at_once ? 0 : rule->decay, damped = fades_at_once ? 1 : rule->damped, inv_alpha_m = 1 / rule->alpha_m;
-    const gs4_real fading = fades_at_once ? 1 - rule->damped : 0;
+    const gs4_real decay = rule->decay, inv_alpha_m = 1 / rule->alpha_m;
     int b, i;
     for (i = 0; i < 3; i++) {
         const int j = (i + 1) % 3, k = (i + 2) % 3;
@@ -4900,9 +4904,9 @@ static void gs4i_correct_turning(const gs4i_solid_laws *l, gs4i_deformation *e, 
             const gs4i_wide LL = (L[k][0][b] * L[0][j][b] + L[k][1][b] * L[1][j][b] + L[k][2][b] * L[2][j][b])
                                - (L[j][0][b] * L[0][k][b] + L[j][1][b] * L[1][k][b] + L[j][2][b] * L[2][k][b]);
             const gs4i_wide rate = GS4I_C(0.5) * (kicks->acc[k][j][b] - kicks->acc[j][k][b] - LL), at_once = GS4I_C(0.5) * (kicks->jump[k][j][b] - kicks->jump[j][k][b]);
-            const gs4i_wide stage = (rate + decay * (seen - (w + rule->before * r))) * damped, change = (stage - r) * inv_alpha_m;
+            const gs4i_wide stage = (rate + decay * (seen - (w + rule->before * r))) * rule->damped, change = (stage - r) * inv_alpha_m;
             const gs4i_wide all = ((w + rule->dt * r) + rule->gamma * rule->dt * change) + at_once, next_rate = r + change;
-            const gs4i_wide next = all - fading * (w + rule->before * r + rule->s * stage - seen);
+            const gs4i_wide next = all - rule->fading * (w + rule->before * r + rule->s * stage - seen);
             const gs4i_wide_mask solid = l->modulus[b] > GS4I_C(0);
             GS4I_CHOOSE(e->turning[i][b], solid, next, zero);
             GS4I_CHOOSE(e->turning_rate[i][b], solid, next_rate, zero);
@@ -6414,20 +6418,17 @@ GS4I_INLINE void gs4i_unseen(const gs4i_wide *filled, gs4i_wide *unseen)
 typedef struct gs4i_corrections { gs4i_lanes U[4] /* and mass there */, A[4], jump[4] /* and the share of images */; gs4i_gradient L; } gs4i_corrections;
 
 /* S7. Velocity by rule 1, the motion that the grid cannot see (v - U) decaying at its rate k, implicit in itself; J by 2021
- * (57), implicit in J for known div u; what fades within a step is taken off the velocity, not put into the rate: a longer step would blow
- * that up, and with rho_inf 1 it would not fade; position by rule 1 with the grid's velocity U. In: move is dx/dt; out: what the new
+ * (57), implicit in J for known div u; position by rule 1 with the grid's velocity U. In: move is dx/dt; out: what the new
  * dx/dt lags behind v - shift a. */
 GS4I_INLINE void gs4i_correct_batch(gs4i_rule r, const gs4i_corrections *k, gs4i_batch *q)
 {
     gs4i_lanes decay, damped;
-    const int at_once = r.decay * r.dt > 1;
-    const gs4_real slow = at_once ? 0 : r.decay, fading = at_once ? 1 - r.damped : 0;
     int b, c;
     GS4I_BATCH_LOOP(b) {
         const gs4i_wide filled = k->U[3][b] * r.inv_full;
         gs4i_wide unseen;
         gs4i_unseen(&filled, &unseen);
-        decay[b] = slow + (unseen + k->jump[3][b]) * r.fast_decay;
+        decay[b] = r.decay + (unseen + k->jump[3][b]) * r.fast_decay;
         damped[b] = GS4I_C(1) / (GS4I_C(1) + r.s * decay[b]);
     }
     for (c = 0; c < 3; c++)
@@ -6437,7 +6438,7 @@ GS4I_INLINE void gs4i_correct_batch(gs4i_rule r, const gs4i_corrections *k, gs4i
             const gs4i_wide da = (stage_a - a) * r.inv_alpha_m, change = (k->U[c][b] - move) * r.inv_alpha_m;
             q->v[c][b] = ((v + r.dt * a) + r.gamma * r.dt * da) + k->jump[c][b];
             q->a[c][b] = a + da;
-            if (at_once) q->v[c][b] -= fading * (v + r.before * a + r.s * stage_a - k->U[c][b]);
+            if (r.fading > 0) q->v[c][b] -= r.fading * (v + r.before * a + r.s * stage_a - k->U[c][b]);
             q->x[c][b] = (q->x[c][b] + r.dt * move) + r.gamma * r.dt * change;
             q->move[c][b] = (q->v[c][b] - (move + change)) - r.next_shift * q->a[c][b];
         }
@@ -7601,6 +7602,13 @@ static void gs4i_family(gs4i_rule *k, gs4_real r, gs4_real s, int afresh)
     k->gamma = afresh ? GS4I_C(1) : 1 / (1 + s);
 }
 
+/* Temperatures mix as velocities fade, but no faster than a step can follow; 2 s is at least dt. */
+static gs4_real gs4i_mixing(const gs4i_rule *k)
+{
+    const gs4_real most = GS4I_C(0.5) / k->s;
+    return k->fading > 0 ? most : gs4i_min(k->decay, most);
+}
+
 static gs4i_rule gs4i_make_rule(const gs4_sim *sim, gs4_real dt)
 {
     const gs4_real r = sim->desc.rho_inf, s = sim->desc.rho_inf_spurious;
@@ -7618,8 +7626,10 @@ static gs4i_rule gs4i_make_rule(const gs4_sim *sim, gs4_real dt)
     k.decay = sim->desc.flip_decay_time > 0 && gs4i_finite(sim->desc.flip_decay_time)
             ? 1 / gs4i_max(sim->desc.flip_decay_time, GS4I_C(1e-6) * dt) : GS4I_C(0);    /* faster makes no difference */
     k.damped = 1 / (1 + k.s * k.decay);
+    k.fading = 0;
+    if (k.decay * dt > 1) { k.fading = 1 - k.damped; k.decay = 0; k.damped = 1; }
     k.inv_area = sim->grid.inv_h * sim->grid.inv_h;
-    k.mixing = sim->particles.with_rates ? gs4i_min(k.decay, GS4I_C(0.5) / k.s) : GS4I_C(0.5) / k.s;
+    k.mixing = sim->particles.with_rates ? gs4i_mixing(&k) : GS4I_C(0.5) / k.s;
     k.inv_alpha_m = 1 / k.alpha_m;
     k.fast_decay = 0; k.inv_full = 0;
     for (i = 0; i < sim->material_count; i++) {
@@ -7640,7 +7650,7 @@ static gs4i_rule gs4i_make_warm_rule(const gs4_sim *sim)
         k.reach.ahead = k.before = 0;
         k.s = k.alpha_f * k.gamma * k.dt / k.alpha_m;
         k.inv_alpha_m = 1 / k.alpha_m;
-        k.mixing = gs4i_min(k.decay, GS4I_C(0.5) / k.s);
+        k.mixing = gs4i_mixing(&k);
     }
     return k;
 }
@@ -7934,24 +7944,24 @@ static gs4_real gs4i_jitter(uint32_t seed, uint64_t number, int axis)
 }
 
 /* The lattice that flows through a mouth: points that are in it now and were not when last looked at. With `sim` const
- * in spirit when `emit` is 0: then only counts. Lattice point n of axis a is at low + (n + 1/2) spacing + drift. */
+ * in spirit when `emit` is 0: then only counts, where the mouth will be in the time `ahead`. Lattice point n of axis a is at low + (n + 1/2) spacing + drift. */
 static int gs4i_mouth_points(gs4_sim *sim, gs4i_emitter *e, const double drift[3], double ahead, int emit)
 {
     const gs4i_body *mouth = &sim->boundary.bodies[e->body];
-    gs4i_body then_there = *mouth;
+    gs4i_body placed = *mouth;
     const double spacing = (double)e->is.fill.spacing;
     const gs4_real mass = sim->laws[e->is.fill.material].density * e->is.fill.spacing * e->is.fill.spacing * e->is.fill.spacing;
     double low[3], high[3], origin[3], pivot[3], travelled[3];
     gs4_vec3 lo, hi;
     int64_t from[3], to[3], i, j, k;
     int a, n = 0;
-    if (ahead > 0) gs4i_body_move(&then_there, ahead);
+    if (ahead > 0) gs4i_body_move(&placed, ahead);
     gs4i_to_double(mouth->is.pivot, pivot);
     gs4i_shape_bounds(&e->is.shape, &lo, &hi);
     gs4i_to_double(lo, low); gs4i_to_double(hi, high);
     gs4i_to_double(sim->grid.origin, origin);
     for (a = 0; a < 3; a++) {                               /* the part of the mouth's box that is in the domain */
-        const double moved = then_there.at[a] - pivot[a], size = (double)sim->grid.cells[a] * (double)sim->grid.h;
+        const double moved = placed.at[a] - pivot[a], size = (double)sim->grid.cells[a] * (double)sim->grid.h;
         const double begin = fmax(low[a], origin[a] - moved), end = fmin(high[a], origin[a] + size - moved);
         from[a] = (int64_t)floor((begin - low[a] - drift[a]) / spacing) - 1;
         to[a] = (int64_t)ceil((end - low[a] - drift[a]) / spacing) + 1;
@@ -9254,7 +9264,7 @@ static int gs4i_make_history(gs4_sim *sim, const gs4_material *material)
     return result;
 }
 
-/* But not what lies between the members: checkpoints compare materials byte by byte. */
+/* All members, and nothing of what lies between them: checkpoints compare materials byte by byte. */
 static void gs4i_copy_members(gs4_material *to, const gs4_material *m)
 {
     to->density = m->density; to->liquid = m->liquid; to->viscosity = m->viscosity; to->local_fraction = m->local_fraction;
@@ -9430,11 +9440,22 @@ static int64_t gs4i_collect_points(gs4_sim *sim, const gs4_shape *shape, const g
     return n;
 }
 
+/* Speed of the fastest particle; one that is not finite does not count. */
+static gs4_real gs4i_fastest(const gs4i_particles *p)
+{
+    gs4_real fastest = 0;
+    int i;
+    for (i = 0; i < p->count; i++) {
+        const gs4_real *v = p->velocity + 4 * (size_t)i, speed = gs4i_length(gs4i_vec3(v[0], v[1], v[2]));
+        if (speed > fastest && speed < GS4I_HUGE) fastest = speed;
+    }
+    return fastest;
+}
+
 /* After an edit by hand: all that a user may have written, before it can do harm. */
 static int gs4i_check_edit(gs4_sim *sim)
 {
     const gs4i_particles *p = &sim->particles;
-    gs4_real fastest = 0;
     int i, c;
     if (!sim->edited) return GS4_OK;
     for (i = 0; i < p->count; i++) {
@@ -9444,10 +9465,9 @@ static int gs4i_check_edit(gs4_sim *sim)
         if (p->with_heat) good = good && gs4i_abs(p->heat[4 * (size_t)i]) < GS4I_HUGE;
         if (!good)
             return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "an edit has left particle ", (double)p->id[i], " outside of the grid or with a number that is not finite; edit it again");
-        fastest = gs4i_max(fastest, gs4i_length(gs4i_vec3(v[0], v[1], v[2])));
     }
     for (i = 0; i < p->count && p->with_heat; i++) gs4i_settle_phase(p, (size_t)i, &sim->laws[p->material[i]]);
-    gs4i_note_speed(sim, fastest);
+    gs4i_note_speed(sim, gs4i_fastest(p));
     sim->edited = 0;
     return GS4_OK;
 }
@@ -9613,15 +9633,9 @@ static gs4_real gs4i_limit_now(const gs4_sim *sim)
 GS4_API gs4_real gs4_stable_dt(const gs4_sim *sim)
 {
     gs4_sim *noted;                                         /* a default sound speed follows the speeds that an edit has brought */
-    gs4_real fastest = 0;
-    int i;
     if (!sim) return GS4I_C(0);
     memcpy(&noted, &sim, sizeof noted);
-    for (i = 0; i < sim->particles.count && sim->edited; i++) {
-        const gs4_real *v = sim->particles.velocity + 4 * (size_t)i, speed = gs4i_length(gs4i_vec3(v[0], v[1], v[2]));
-        if (speed < GS4I_HUGE) fastest = gs4i_max(fastest, speed);
-    }
-    if (fastest > sim->fastest) gs4i_note_speed(noted, fastest);
+    if (sim->edited) gs4i_note_speed(noted, gs4i_fastest(&sim->particles));
     return gs4i_limit_now(sim);
 }
 
@@ -9968,11 +9982,17 @@ GS4_API int gs4_point_stress(const gs4_material *material, const gs4_point *poin
 GS4_API int gs4_material_preset(const char *name, gs4_material *material)
 {
     gs4_sim fake;
+    gs4i_text t;
+    char line[320];
+    size_t i;
     memset(&fake, 0, sizeof fake);
     if (!name || !material) return gs4i_say(&fake, gs4i_bad_argument(&fake, "gs4_material_preset needs a name and a place for the material"));
     if (gs4i_preset(name, material) == GS4_OK) return GS4_OK;
-    return gs4i_say(&fake, gs4i_bad_argument(&fake, "there is no such preset; there are water, olive oil, glycerol, honey, cream, ice cream, "
-                                                    "boger fluid, polymer melt, chocolate, wax, butter and lava"));
+    t.at = line; t.left = sizeof line;
+    gs4i_put(&t, "there is no such preset; there are");
+    for (i = 0; i < sizeof gs4i_presets / sizeof gs4i_presets[0]; i++) { gs4i_put(&t, i ? ", " : " "); gs4i_put(&t, gs4i_presets[i].name); }
+    for (i = 0; i < sizeof gs4i_melts / sizeof gs4i_melts[0]; i++) { gs4i_put(&t, ", "); gs4i_put(&t, gs4i_melts[i].name); }
+    return gs4i_say(&fake, gs4i_bad_argument(&fake, line));
 }
 
 #if defined(__clang__)

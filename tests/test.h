@@ -33,8 +33,10 @@ static void test_close(double value, double expected, double tolerance, const ch
 #define CHECK_RESULT(sim, call, code) do { const int test_r = (call), test_good = (code) == 0 ? test_r >= 0 : test_r == (code); \
     test_report(test_good, __FILE__, __LINE__, #call " gives " #code); \
     if (!test_good) printf("    %d: %s\n", test_r, gs4_last_error(sim)); } while (0)
-#define RUN(test) do { test_name = #test; if (strstr(test_name, test_filter)) { const clock_t test_start = clock(); test(); \
-    if (test_filter[0]) printf("%s: %.1f s\n", test_name, (double)(clock() - test_start) / CLOCKS_PER_SEC); } } while (0)
+#define RUN(test) do { test_name = #test; if (strstr(test_name, test_filter)) { const clock_t test_start = clock(); \
+    if (test_filter[0]) { printf("%s: ", test_name); fflush(stdout); } \
+    test(); \
+    if (test_filter[0]) printf("%.1f s\n", (double)(clock() - test_start) / CLOCKS_PER_SEC); } } while (0)
 
 /* In float only where tests are quick: what double would say again. */
 #define RUN_ONCE(test) do { if (test_slow || sizeof(gs4_real) == 4) RUN(test); } while (0)

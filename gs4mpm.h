@@ -130,8 +130,10 @@
  *
  * CONTACT. Walls act by images, second order in space: nodes behind a wall mirror the field (stick: odd; slip: odd along the
  * normal, even along the wall; separate: as slip while material moves into the wall or presses on it, free otherwise).
- * Bodies hold the nodes inside of them: stick takes the body's velocity, slip and separate lose the inward relative normal
- * part (separate with Coulomb friction). What a body takes from a node at once goes to the velocities of particles and not into
+ * Sticky bodies act by images of the particles before them, second order in space too where particles fill the space up to the surface
+ * (a filling that leaves out half a row puts the wall up to 0.6 cells behind it, tests: couette); where they are thinner than 3 cells or as
+ * crooked as that, they hold nodes up to 3/4 of a cell before the surface, to first order. Of slip and separate nodes inside lose the inward
+ * relative normal part (separate with Coulomb friction). What a body takes from a node at once goes to the velocities of particles and not into
  * their rates. A particle that ends inside a body or behind a wall is put back on the surface. Where the grid sees little of a
  * particle (at a wall by the weight of images; in spray filled by less than 20 %) its unseen motion fades at the rate c0/h.
  *
@@ -154,7 +156,7 @@
  * checked, NaN included. A call that fails has changed nothing, out of memory included; a step that is refused has not been taken.
  *
  * MEMORY. GS4: 65 bytes a particle in float (position, velocity, J and their rates, mass, id, material, and 4 for sorting), 48 a cell
- * near material, 16 more near walls and bodies, 4 per 64 cells of the domain. Symplectic Euler: 89 and 32. A scene with a viscoelastic
+ * near material, 16 more near walls and bodies, 4 per 64 cells of the domain; 260 (double: 510) more for each particle within 8 cells of a sticky body. Symplectic Euler: 89 and 32. A scene with a viscoelastic
  * liquid: 48 more a particle (Euler 24). With a solid: 96 more (Euler 36). With heat: 17 more a
  * particle, 32 more with a flux_relaxation_time, 16 (or 32) a cell near material, and about 100 a cell of the box around all material, where the
  * solver works. Double, GS4: 121 and 96.
@@ -5181,7 +5183,7 @@ static void gs4i_begin_heat(const gs4i_particles *p, size_t i, const gs4i_law *l
  * Walls lie on cell faces, so the node pairs  ... -2 -1 | 0 1 ...  mirror each other:  image -1-k <-> k. Mass and momentum
  * that reach an image are folded back onto its mirror node, forces too, with the sign S of the reflection (stick: -1 in
  * all components; slip: -1 in the normal one; periodic: the node a period away, S = 1); afterwards images hold S times
- * the field of their mirror node. A body holds the nodes inside of it.
+ * the field of their mirror node. Slippery bodies hold the nodes inside of them; sticky ones act by images of particles, see gs4i_place_ghost.
  *
  * What contact takes from the velocity of a node at once is no acceleration: it is kept as a jump, which goes to the
  * velocity of the particles directly and never into their rates (METHOD: "contact stays out of the rates"). */
@@ -5202,6 +5204,22 @@ typedef struct gs4i_body {
     int is_mouth, asleep;               /* of an emitter: holds what is inside at the velocity `flow`; not in use now */
     gs4_vec3 flow;
 } gs4i_body;
+
+/* A particle before a sticky body, and its image behind the surface: see gs4i_place_ghost. */
+typedef struct gs4i_ghost {
+    gs4_real x[4], n[3], v[3], spin[3]; /* place and mass; normal of the surface; the body's velocity at its foot and angular velocity */
+    gs4_real share;                     /* of the odd part of what the particle sees: 1 within half a cell of the surface, 0 from one and a half */
+    gs4_real carried[4][4];             /* to the nodes: momentum at x (Euler: and columns of its affine part); columns of force, and weight */
+    gs4_real seen[2][4][4];             /* from them: velocity and acceleration, value and columns of the gradient */
+    int kind, whole, slot;              /* GS4I_GHOST_*; all its nodes exist; block of x */
+} gs4i_ghost;
+
+typedef struct gs4i_ghosts {
+    int count;                          /* one for each particle of the blocks near sticky bodies; 0: there are none */
+    gs4i_scratch all, of;               /* gs4i_ghost; per occupied block: its first one, or -1 (int32_t) */
+    gs4i_scratch order, first, slots;   /* int32_t: sorted by slot; per slot, where it begins; slots that have some, by colour */
+    int colour_first[9];
+} gs4i_ghosts;
 
 typedef struct gs4i_boundary {
     gs4_wall walls[6];
@@ -5507,18 +5525,23 @@ static int gs4i_list_images(gs4i_memory *m, gs4i_boundary *b, const gs4i_grid *g
     return GS4_OK;
 }
 
-/* How far in front of a sticky body nodes are held, in cells: then it acts as a wall where its surface is, within 0.61 cells
- * (symplectic Euler: within 0.92; tests: couette_surface). Without, a plane of nodes just in front left liquid next to no node to stick to. */
+/* How far in front of a sticky body nodes are held that images do not serve, in cells: a plane of nodes just in front would leave liquid
+ * next to no node to stick to. */
 #define GS4I_STICKY_REACH GS4I_C(0.75)
+#define GS4I_GHOST_REACH GS4I_C(3)      /* particles that have images are within so many cells of a surface; nodes that see one within GHOST_NODES */
+#define GS4I_GHOST_NODES GS4I_C(1.5)
+
+static gs4_vec3 gs4i_block_midst(const gs4i_grid *g, uint32_t block)
+{
+    int at[3];
+    gs4i_block_coordinates(g, block, at);
+    return gs4i_add(g->origin, gs4i_scale(gs4i_vec3(GS4I_C(4 * at[0] - 2), GS4I_C(4 * at[1] - 2), GS4I_C(4 * at[2] - 2)), g->h));
+}
 
 /* Can a body hold any node of a block? By its distance from the midst: half the diagonal of the block's nodes, and its reach. */
 static int gs4i_body_is_near(const gs4i_body *b, const gs4i_grid *g, int slot)
 {
-    int at[3];
-    gs4_vec3 midst;
-    gs4i_block_coordinates(g, g->block[slot], at);
-    midst = gs4i_add(g->origin, gs4i_scale(gs4i_vec3(GS4I_C(4 * at[0] - 2), GS4I_C(4 * at[1] - 2), GS4I_C(4 * at[2] - 2)), g->h));
-    return gs4i_body_distance(b, midst) < (GS4I_C(2.7) + GS4I_STICKY_REACH) * g->h;
+    return gs4i_body_distance(b, gs4i_block_midst(g, g->block[slot])) < (GS4I_C(2.7) + GS4I_GHOST_NODES) * g->h;
 }
 
 /* Give a place for jumps to the blocks that touch a wall or a body. */
@@ -5556,13 +5579,15 @@ GS4I_INLINE gs4_real *gs4i_jump_at(const gs4i_grid *g, uint32_t node)
     return g->jump + GS4I_NODE_REALS * (size_t)(g->jump_of[node / 64] - 1) + 4 * (size_t)(node % 64);
 }
 
-/* Contact of a node: bit a: an image that folds along axis a; GS4I_PRESSED: material pressed on the wall there. */
+/* Contact of a node: bit a: an image that folds along axis a; and those below. */
 GS4I_INLINE uint8_t *gs4i_contact_at(const gs4i_grid *g, uint32_t node)
 {
     return g->contact + (size_t)GS4I_BLOCK_NODES * (size_t)(g->jump_of[node / 64] - 1) + node % 64;
 }
 
-#define GS4I_PRESSED 8
+#define GS4I_PRESSED 8                  /* material pressed on the wall there */
+#define GS4I_IMAGED 16                  /* images of particles behind a sticky body reach the node */
+#define GS4I_UNIMAGED 32                /* a particle near a sticky body does, that has none */
 
 GS4I_INLINE void gs4i_reflection(gs4_wall wall, int axis, gs4_real sign[3])
 {
@@ -5760,6 +5785,7 @@ struct gs4_sim {
     gs4i_grid grid;
     gs4i_particles particles;
     gs4i_boundary boundary;
+    gs4i_ghosts ghosts;
     gs4i_conduction conduction;
     gs4i_law *laws, *frozen; int material_count, material_capacity, frozen_capacity;    /* of each material; of its solid phase */
     gs4i_emitter *emitters; int emitter_count, emitter_capacity;
@@ -6289,6 +6315,422 @@ GS4I_INLINE void gs4i_scatter_force(gs4_real *tile, const gs4i_stencils *s, int 
     gs4i_scatter_rows(tile + 4 * s->base[n], &p0, &p1, &p2, s, n);
 }
 
+/* --- images behind sticky bodies ----------------------------------------------------------------------
+ *
+ * Particles within three cells of the surface of a sticky body have an image behind it, x' = x - 2 d n, that gives the nodes what a field
+ * odd about the surface needs: momentum m (2 v_body - v), stress -sigma R and weight -m g, with R = I - 2 n n. Near the surface particles see
+ * the odd part of what the nodes have, u = v_body + (u(x) - u(x'))/2, and its gradient. So a body is a wall of second order wherever its surface
+ * lies, as far as particles fill the space before it. Where it is too thin or too crooked for images, nodes are held: gs4i_body_hold. */
+
+enum { GS4I_GHOST_NONE, GS4I_GHOST_IMAGE, GS4I_GHOST_HELD /* no image can be had */ };
+enum { GS4I_GHOST_MOMENTUM, GS4I_GHOST_AFFINE, GS4I_GHOST_FORCE };     /* what is scattered */
+
+static int gs4i_is_sticky(const gs4i_body *b) { return b->is.contact == GS4_WALL_STICK && !b->is_mouth && !b->asleep; }
+
+/* The sticky body nearest to p, if one is nearer than `within`; and how far it is. */
+static const gs4i_body *gs4i_nearest_sticky(const gs4i_boundary *b, gs4_vec3 p, gs4_real within, gs4_real *distance)
+{
+    const gs4i_body *found = NULL;
+    int i;
+    for (i = 0; i < b->body_count; i++) {
+        const gs4_real d = gs4i_is_sticky(&b->bodies[i]) ? gs4i_body_distance(&b->bodies[i], p) : within;
+        if (d < within) { *distance = within = d; found = &b->bodies[i]; }
+    }
+    return found;
+}
+
+/* Slot of the block that p is in, -1: it has no nodes. */
+static int gs4i_slot_of(const gs4i_grid *g, const gs4_real p[3])
+{
+    const gs4_real origin[3] = { g->origin.x, g->origin.y, g->origin.z };
+    int at[3], a;
+    for (a = 0; a < 3; a++) {
+        const gs4_real t = (p[a] - origin[a]) * g->inv_h + 4;
+        if (!(t >= 0 && t < GS4I_C(g->cells[a]) + 8)) return -1;
+        at[a] = (int)t >> 2;
+    }
+    return g->table[gs4i_block_number(g, at[0], at[1], at[2])] - 1;
+}
+
+/* The image of a particle at p. It can be had where the body is flat and thick enough: a point as deep behind the surface, at most one and a half
+ * cells, is as deep in the body, within a quarter of a cell. One that would stick out on the far side is left out. */
+static void gs4i_place_ghost(const gs4_sim *sim, gs4_vec3 p, gs4i_ghost *g)
+{
+    const gs4_real h = sim->grid.h, step = GS4I_C(0.1) * h;
+    gs4_real d = 0, deep;
+    const gs4i_body *body = gs4i_nearest_sticky(&sim->boundary, p, GS4I_GHOST_REACH * h, &d);
+    gs4_vec3 n, foot, image, v;
+    g->kind = GS4I_GHOST_NONE;
+    if (!body) return;
+    n = gs4i_vec3(gs4i_body_distance(body, gs4i_vec3(p.x + step, p.y, p.z)) - d, gs4i_body_distance(body, gs4i_vec3(p.x, p.y + step, p.z)) - d,
+                  gs4i_body_distance(body, gs4i_vec3(p.x, p.y, p.z + step)) - d);
+    if (!(gs4i_length(n) > 0)) return;
+    n = gs4i_scale(n, 1 / gs4i_length(n));
+    foot = gs4i_sub(p, gs4i_scale(n, d));
+    image = gs4i_sub(foot, gs4i_scale(n, d));
+    v = gs4i_body_velocity(body, foot);
+    g->x[0] = image.x; g->x[1] = image.y; g->x[2] = image.z;
+    g->n[0] = n.x; g->n[1] = n.y; g->n[2] = n.z;
+    g->v[0] = v.x; g->v[1] = v.y; g->v[2] = v.z;
+    g->spin[0] = body->is.angular_velocity.x; g->spin[1] = body->is.angular_velocity.y; g->spin[2] = body->is.angular_velocity.z;
+    g->share = gs4i_max(gs4i_min(GS4I_C(1.5) - d * sim->grid.inv_h, 1), 0);
+    deep = GS4I_GHOST_NODES * h;
+    if (d > -GS4I_C(0.5) * h && gs4i_abs(gs4i_body_distance(body, gs4i_sub(foot, gs4i_scale(n, deep))) + deep) < GS4I_C(0.25) * h) {
+        const gs4_real nearer[3] = { image.x + h * n.x, image.y + h * n.y, image.z + h * n.z };
+        g->slot = gs4i_slot_of(&sim->grid, g->x);
+        if (g->slot < 0) g->slot = gs4i_slot_of(&sim->grid, nearer);    /* a tile has room for a cell around its block */
+        if (g->slot >= 0 && (d < deep || gs4i_body_distance(body, image) < 0)) g->kind = GS4I_GHOST_IMAGE;
+        return;
+    }
+    if (d > GS4I_C(2.25) * h) return;                       /* it sees no node that would be held */
+    g->x[0] = p.x; g->x[1] = p.y; g->x[2] = p.z;
+    g->slot = gs4i_slot_of(&sim->grid, g->x);
+    if (g->slot >= 0) g->kind = GS4I_GHOST_HELD;
+}
+
+/* The ghosts of occupied block o, NULL where it is near no sticky body; that of its particle i is the (i - first)th. */
+GS4I_INLINE gs4i_ghost *gs4i_ghosts_of(const gs4_sim *sim, int o)
+{
+    const gs4i_ghosts *g = &sim->ghosts;
+    return g->count && ((const int32_t *)g->of.data)[o] >= 0 ? (gs4i_ghost *)g->all.data + ((const int32_t *)g->of.data)[o] : NULL;
+}
+
+static void gs4i_place_ghosts(int index, void *context)
+{
+    gs4_sim *sim = ((const gs4i_pass *)context)->sim;
+    const gs4i_particles *p = &sim->particles;
+    const gs4_real ahead = sim->rule.reach.ahead;
+    gs4i_ghost *g = gs4i_ghosts_of(sim, index);
+    size_t i = (size_t)sim->grid.first[index], end = (size_t)sim->grid.first[index + 1];
+    for (; g && i < end; i += GS4I_BATCH) {
+        const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
+        gs4i_batch q;
+        gs4i_lanes x[3];
+        int b, c;
+        gs4i_load_batch(p, i, n, sim->rule.reach, &q);
+        gs4i_predict_positions(&q, sim->rule.reach, x);
+        for (b = 0; b < n; b++, g++) {
+            gs4i_place_ghost(sim, gs4i_vec3(GS4I_NTH(x[0], b), GS4I_NTH(x[1], b), GS4I_NTH(x[2], b)), g);
+            g->x[3] = GS4I_NTH(q.x[3], b);
+            memset(g->carried, 0, sizeof g->carried);
+            for (c = 0; c < 3; c++) g->carried[0][c] = g->x[3] * (2 * g->v[c] - GS4I_NTH(q.v[c], b) - ahead * GS4I_NTH(q.a[c], b));
+            g->carried[0][3] = g->x[3];
+        }
+    }
+}
+
+/* Sort what has a kind by slot, stably, and the slots by colour. */
+static int gs4i_sort_ghosts(gs4_sim *sim)
+{
+    gs4i_ghosts *g = &sim->ghosts;
+    const gs4i_ghost *all = (const gs4i_ghost *)g->all.data;
+    const int active = sim->grid.active;
+    int32_t *order = (int32_t *)gs4i_scratch_reserve(&sim->memory, &g->order, (size_t)g->count * sizeof *order, 0);
+    int32_t *first = (int32_t *)gs4i_scratch_reserve(&sim->memory, &g->first, (size_t)(active + 1) * sizeof *first, 0);
+    int32_t *slots = (int32_t *)gs4i_scratch_reserve(&sim->memory, &g->slots, (size_t)active * sizeof *slots, 0);
+    int k, s, colour, n = 0;
+    if (!order || !first || !slots) return gs4i_fail_memory(sim);
+    memset(first, 0, (size_t)(active + 1) * sizeof *first);
+    for (k = 0; k < g->count; k++) if (all[k].kind) first[all[k].slot + 1]++;
+    for (colour = 0; colour < 8; colour++) {
+        g->colour_first[colour] = n;
+        for (s = 0; s < active; s++) {
+            int at[3];
+            if (!first[s + 1]) continue;
+            gs4i_block_coordinates(&sim->grid, sim->grid.block[s], at);
+            if (((at[0] & 1) | (at[1] & 1) << 1 | (at[2] & 1) << 2) == colour) slots[n++] = s;
+        }
+    }
+    g->colour_first[8] = n;
+    for (s = 0; s < active; s++) first[s + 1] += first[s];
+    for (k = 0; k < g->count; k++) if (all[k].kind) order[first[all[k].slot]++] = k;
+    for (s = active; s > 0; s--) first[s] = first[s - 1];
+    first[0] = 0;
+    return GS4_OK;
+}
+
+/* Find the images of all particles where they are at the stage. */
+static int gs4i_find_ghosts(gs4_sim *sim)
+{
+    const gs4i_grid *grid = &sim->grid;
+    gs4i_ghosts *g = &sim->ghosts;
+    gs4i_pass pass;
+    int32_t *of;
+    int i, o, sticky = 0;
+    g->count = 0;
+    for (i = 0; i < sim->boundary.body_count; i++) sticky |= gs4i_is_sticky(&sim->boundary.bodies[i]);
+    if (!sticky) return GS4_OK;
+    of = (int32_t *)gs4i_scratch_reserve(&sim->memory, &g->of, (size_t)grid->occupied * sizeof *of, 0);
+    if (!of) return gs4i_fail_memory(sim);
+    for (o = 0; o < grid->occupied; o++) {                  /* half the diagonal of a block, and a cell that particles may be outside of it */
+        gs4_real d;
+        of[o] = gs4i_nearest_sticky(&sim->boundary, gs4i_block_midst(grid, grid->occupied_block[o]), (GS4I_C(5.2) + GS4I_GHOST_REACH) * grid->h, &d) ? g->count : -1;
+        if (of[o] >= 0) g->count += grid->first[o + 1] - grid->first[o];
+    }
+    if (!g->count) return GS4_OK;
+    if (!gs4i_scratch_reserve(&sim->memory, &g->all, (size_t)g->count * sizeof(gs4i_ghost), 0)) { g->count = 0; return gs4i_fail_memory(sim); }
+    memset(&pass, 0, sizeof pass);
+    pass.sim = sim;
+    gs4i_parallel_for(&sim->tasks, grid->occupied, gs4i_place_ghosts, &pass);
+    return gs4i_sort_ghosts(sim);
+}
+
+/* Where the nodes of the 27 blocks around a slot are, negative where there are none; and its frame. */
+typedef struct gs4i_ghost_tile { ptrdiff_t at[27]; gs4i_frame frame; } gs4i_ghost_tile;
+
+static void gs4i_ghost_tile_of(const gs4i_grid *g, int slot, gs4i_ghost_tile *t)
+{
+    int at[3], i, a;
+    gs4i_block_coordinates(g, g->block[slot], at);
+    for (i = 0; i < 27; i++) {
+        const int x = at[0] + i % 3 - 1, y = at[1] + i / 3 % 3 - 1, z = at[2] + i / 9 - 1;
+        const int there = x >= 0 && y >= 0 && z >= 0 && x < g->blocks[0] && y < g->blocks[1] && z < g->blocks[2];
+        t->at[i] = there ? (ptrdiff_t)(g->table[gs4i_block_number(g, x, y, z)] - 1) * GS4I_NODE_REALS : -1;
+    }
+    for (a = 0; a < 3; a++) t->frame.first[a] = GS4I_C(4 * at[a] - 6);
+    t->frame.origin[0] = g->origin.x; t->frame.origin[1] = g->origin.y; t->frame.origin[2] = g->origin.z; t->frame.inv_h = g->inv_h;
+}
+
+/* Where node (x, y, z) of a tile is, negative where it does not exist. */
+GS4I_INLINE ptrdiff_t gs4i_ghost_node(const gs4i_ghost_tile *t, int x, int y, int z)
+{
+    const ptrdiff_t at = t->at[(((z + 2) >> 2) * 3 + ((y + 2) >> 2)) * 3 + ((x + 2) >> 2)];
+    return at < 0 ? -1 : at + 4 * ((((z + 2) & 3) << 4) | (((y + 2) & 3) << 2) | ((x + 2) & 3));
+}
+
+/* The next n ghosts of a slot and their weights. */
+static void gs4i_load_ghosts(gs4i_ghost *all, const int32_t *order, int n, const gs4i_ghost_tile *t, gs4i_ghost *g[GS4I_BATCH], gs4i_stencils *s)
+{
+    gs4_real four[4 * GS4I_BATCH];
+    gs4i_lanes x[4];
+    int b;
+    for (b = 0; b < n; b++) { g[b] = all + order[b]; memcpy(four + 4 * b, g[b]->x, 4 * sizeof *four); }
+    gs4i_to_lanes(four, n, x);
+    gs4i_stencils_at(s, &t->frame, x);
+}
+
+/* Mark the nodes that a particle reaches which has no image. */
+static void gs4i_mark_unimaged(const gs4i_grid *grid, const gs4i_ghost_tile *t, int base)
+{
+    int i;
+    for (i = 0; i < 27; i++) {
+        const ptrdiff_t at = gs4i_ghost_node(t, base % GS4I_TILE + i % 3, base / GS4I_TILE % GS4I_TILE + i / 3 % 3, base / (GS4I_TILE * GS4I_TILE) + i / 9);
+        if (at >= 0 && grid->jump_of[at / GS4I_NODE_REALS]) *gs4i_contact_at(grid, (uint32_t)(at / 4)) |= GS4I_UNIMAGED;
+    }
+}
+
+/* Do all nodes around a particle exist? Three in a row lie in two blocks at most. */
+static int gs4i_is_whole(const gs4i_ghost_tile *t, int base)
+{
+    const int x = base % GS4I_TILE, y = base / GS4I_TILE % GS4I_TILE, z = base / (GS4I_TILE * GS4I_TILE);
+    int i, whole = 1;
+    for (i = 0; i < 8; i++) whole &= gs4i_ghost_node(t, x + 2 * (i & 1), y + (i & 2), z + 2 * (i >> 2)) >= 0;
+    return whole;
+}
+
+/* Add the tile to the nodes that exist; those that get momentum are marked. */
+static void gs4i_ghost_tile_add(const gs4i_grid *grid, const gs4i_ghost_tile *t, const gs4_real *tile, gs4_real *field)
+{
+    int x, y, z, c;
+    for (z = 0; z < GS4I_TILE; z++) for (y = 0; y < GS4I_TILE; y++) for (x = 0; x < GS4I_TILE; x++, tile += 4) {
+        const ptrdiff_t at = gs4i_ghost_node(t, x, y, z);
+        for (c = 0; c < 4 && at >= 0; c++) field[at + c] += tile[c];
+        if (at >= 0 && field == grid->momentum && tile[3] > 0 && grid->jump_of[at / GS4I_NODE_REALS]) *gs4i_contact_at(grid, (uint32_t)(at / 4)) |= GS4I_IMAGED;
+    }
+}
+
+static void gs4i_scatter_ghosts_of(const gs4i_pass *pass, int index, int what)
+{
+    gs4_sim *sim = pass->sim;
+    const int slot = pass->blocks[index];
+    const int32_t *first = (const int32_t *)sim->ghosts.first.data, *order = (const int32_t *)sim->ghosts.order.data;
+    gs4_real tile[GS4I_TILE_REALS];
+    gs4i_ghost_tile t;
+    int k, b, c;
+    gs4i_ghost_tile_of(&sim->grid, slot, &t);
+    memset(tile, 0, sizeof tile);
+    for (k = first[slot]; k < first[slot + 1]; k += GS4I_BATCH) {
+        const int n = first[slot + 1] - k < GS4I_BATCH ? first[slot + 1] - k : GS4I_BATCH;
+        gs4i_ghost *g[GS4I_BATCH];
+        gs4i_stencils s;
+        gs4i_forces f;
+        gs4i_affine_forces m;
+        gs4i_load_ghosts((gs4i_ghost *)sim->ghosts.all.data, order + k, n, &t, g, &s);
+        for (b = 0; b < n; b++) {
+            gs4_real (*from)[4] = g[b]->carried;
+            const size_t four = 4 * sizeof *tile;
+            if (s.base[b] < 0) continue;
+            if (g[b]->kind == GS4I_GHOST_HELD) {
+                if (what != GS4I_GHOST_FORCE) gs4i_mark_unimaged(&sim->grid, &t, s.base[b]);
+                continue;
+            }
+            g[b]->whole = gs4i_is_whole(&t, s.base[b]);
+            if (what == GS4I_GHOST_MOMENTUM) gs4i_scatter_quad(tile, &s, b, from[0]);
+            else if (what == GS4I_GHOST_FORCE) {
+                memcpy(f.x + 4 * b, from[0], four); memcpy(f.y + 4 * b, from[1], four); memcpy(f.z + 4 * b, from[2], four);
+                memcpy(f.weight + 4 * b, from[3], four);
+                gs4i_scatter_force(tile, &s, b, &f);
+            } else {
+                memcpy(m.middle + 4 * b, from[0], four);
+                memcpy(m.x + 4 * b, from[1], four); memcpy(m.y + 4 * b, from[2], four); memcpy(m.z + 4 * b, from[3], four);
+                for (c = 0; c < 3; c++) m.middle[4 * b + c] -= from[1][c] * GS4I_NTH(s.xi[0], b) + from[2][c] * GS4I_NTH(s.xi[1], b) + from[3][c] * GS4I_NTH(s.xi[2], b);
+                gs4i_scatter_affine(tile, &s, b, &m);
+            }
+        }
+    }
+    gs4i_ghost_tile_add(&sim->grid, &t, tile, what == GS4I_GHOST_FORCE ? sim->grid.force : sim->grid.momentum);
+}
+
+static void gs4i_scatter_ghost_momentum(int index, void *context) { gs4i_scatter_ghosts_of((const gs4i_pass *)context, index, GS4I_GHOST_MOMENTUM); }
+static void gs4i_scatter_ghost_affine(int index, void *context) { gs4i_scatter_ghosts_of((const gs4i_pass *)context, index, GS4I_GHOST_AFFINE); }
+static void gs4i_scatter_ghost_force(int index, void *context) { gs4i_scatter_ghosts_of((const gs4i_pass *)context, index, GS4I_GHOST_FORCE); }
+
+static void gs4i_scatter_ghosts(gs4_sim *sim, gs4_task_fn kernel)
+{
+    const gs4i_ghosts *g = &sim->ghosts;
+    gs4i_pass pass;
+    int colour;
+    pass.sim = sim;
+    for (colour = 0; colour < 8 && g->count; colour++) {
+        pass.blocks = (const int32_t *)g->slots.data + g->colour_first[colour];
+        pass.count = g->colour_first[colour + 1] - g->colour_first[colour];
+        gs4i_parallel_for(&sim->tasks, pass.count, kernel, &pass);
+    }
+}
+
+/* What the nodes have at the images: velocity, and with GS4 acceleration. */
+static void gs4i_gather_ghosts_task(int index, void *context)
+{
+    const gs4i_pass *pass = (const gs4i_pass *)context;
+    gs4_sim *sim = pass->sim;
+    const int slot = pass->blocks[index];
+    const int32_t *first = (const int32_t *)sim->ghosts.first.data, *order = (const int32_t *)sim->ghosts.order.data;
+    gs4i_ghost_tile t;
+    int k, b, c, what;
+    gs4i_ghost_tile_of(&sim->grid, slot, &t);
+    for (what = 0; what < (sim->particles.with_rates ? 2 : 1); what++) {
+        const gs4_real *field = what ? sim->grid.force : sim->grid.momentum;
+        gs4_real tile[GS4I_TILE_REALS], *to = tile;
+        int x, y, z;
+        for (z = 0; z < GS4I_TILE; z++) for (y = 0; y < GS4I_TILE; y++) for (x = 0; x < GS4I_TILE; x++, to += 4) {
+            const ptrdiff_t at = gs4i_ghost_node(&t, x, y, z);
+            for (c = 0; c < 4; c++) to[c] = at < 0 ? 0 : field[at + c];
+        }
+        memset(to, 0, 16 * sizeof *to);
+        for (k = first[slot]; k < first[slot + 1]; k += GS4I_BATCH) {
+            const int n = first[slot + 1] - k < GS4I_BATCH ? first[slot + 1] - k : GS4I_BATCH;
+            gs4i_ghost *g[GS4I_BATCH];
+            gs4i_stencils s;
+            gs4i_gathered u;
+            gs4i_load_ghosts((gs4i_ghost *)sim->ghosts.all.data, order + k, n, &t, g, &s);
+            for (b = 0; b < n; b++) {
+                gs4i_row w, d;
+                if (s.base[b] < 0 || !g[b]->whole || !(g[b]->share > 0)) continue;
+                gs4i_x_weights(&s, b, &w, &d);
+                gs4i_gather_local(tile + 4 * s.base[b], &s, b, &w, &d, &u);
+                memcpy(g[b]->seen[what][0], u.value + 4 * b, 4 * sizeof *tile);
+                memcpy(g[b]->seen[what][1], u.dx + 4 * b, 4 * sizeof *tile);
+                memcpy(g[b]->seen[what][2], u.dy + 4 * b, 4 * sizeof *tile);
+                memcpy(g[b]->seen[what][3], u.dz + 4 * b, 4 * sizeof *tile);
+            }
+        }
+    }
+}
+
+static void gs4i_free_ghosts(gs4i_memory *m, gs4i_ghosts *g)
+{
+    gs4i_scratch *const parts[5] = { &g->all, &g->of, &g->order, &g->first, &g->slots };
+    int i;
+    for (i = 0; i < 5; i++) gs4i_free(m, parts[i]->data, parts[i]->bytes, 1);
+    memset(g, 0, sizeof *g);
+}
+
+static void gs4i_gather_ghosts(gs4_sim *sim)
+{
+    gs4i_pass pass;
+    if (!sim->ghosts.count) return;
+    pass.sim = sim;
+    pass.blocks = (const int32_t *)sim->ghosts.slots.data;
+    pass.count = sim->ghosts.colour_first[8];
+    gs4i_parallel_for(&sim->tasks, pass.count, gs4i_gather_ghosts_task, &pass);
+}
+
+/* Replace what n particles gathered by its part that is odd about the surface, of velocities (what 0) about the body's, by their shares:
+ * u = (u(x) - u(x'))/2 + v, grad u = (grad u(x) - grad u(x') R)/2 + spin x (I - n n). */
+static void gs4i_make_odd(const gs4i_ghost *g, int n, int what, gs4i_gathered *u)
+{
+    int b, c, a;
+    for (b = 0; b < n; b++, g++) {
+        gs4_real *column[3];
+        if (g->kind != GS4I_GHOST_IMAGE || !g->whole || !(g->share > 0)) continue;
+        column[0] = u->dx + 4 * b; column[1] = u->dy + 4 * b; column[2] = u->dz + 4 * b;
+        for (c = 0; c < 3; c++) {
+            const gs4_real *w = g->spin;
+            const gs4_real W[3][3] = { { 0, -w[2], w[1] }, { w[2], 0, -w[0] }, { -w[1], w[0], 0 } };
+            const gs4_real across = g->seen[what][1][c] * g->n[0] + g->seen[what][2][c] * g->n[1] + g->seen[what][3][c] * g->n[2];
+            const gs4_real turn = W[c][0] * g->n[0] + W[c][1] * g->n[1] + W[c][2] * g->n[2];
+            u->value[4 * b + c] -= g->share * (GS4I_C(0.5) * (u->value[4 * b + c] + g->seen[what][0][c]) - (what ? GS4I_C(0) : g->v[c]));
+            for (a = 0; a < 3; a++)
+                column[a][c] -= g->share * (GS4I_C(0.5) * (column[a][c] + g->seen[what][1 + a][c]) - across * g->n[a] - (what ? GS4I_C(0) : W[c][a] - turn * g->n[a]));
+        }
+    }
+}
+
+/* Is what the images of block o see of velocity no cause for alarm? Of a reflection of L the trace is at most sum |L_ij|. See gs4i_is_calm. */
+static int gs4i_ghosts_are_calm(const gs4_sim *sim, int o)
+{
+    const gs4i_ghost *g = gs4i_ghosts_of(sim, o), *end = g ? g + (sim->grid.first[o + 1] - sim->grid.first[o]) : g;
+    for (; g < end; g++) {
+        gs4_real moved = 0, all = 0;
+        int a, c;
+        if (g->kind != GS4I_GHOST_IMAGE || !g->whole || !(g->share > 0)) continue;
+        for (c = 0; c < 3; c++) {
+            moved += gs4i_abs(g->seen[0][0][c]) + 2 * gs4i_abs(g->v[c]);
+            for (a = 1; a < 4; a++) all += gs4i_abs(g->seen[0][a][c]);
+        }
+        if (!(moved * sim->rule.dt < sim->grid.h && all * sim->rule.dt < GS4I_C(0.2))) return 0;
+    }
+    return 1;
+}
+
+/* -A R, of the columns x, y, z of n particles, for their images. */
+static void gs4i_reflect_columns(gs4i_ghost *g, int n, const gs4_real *x, const gs4_real *y, const gs4_real *z, int to)
+{
+    int b, c;
+    for (b = 0; b < n; b++, g++)
+        for (c = 0; c < 3; c++) {
+            const gs4_real across = 2 * (x[4 * b + c] * g->n[0] + y[4 * b + c] * g->n[1] + z[4 * b + c] * g->n[2]);
+            g->carried[to][c] = across * g->n[0] - x[4 * b + c];
+            g->carried[to + 1][c] = across * g->n[1] - y[4 * b + c];
+            g->carried[to + 2][c] = across * g->n[2] - z[4 * b + c];
+        }
+}
+
+/* Forces of the images of n particles. */
+static void gs4i_reflect_forces(gs4i_ghost *g, int n, const gs4i_forces *f)
+{
+    int b, c;
+    gs4i_reflect_columns(g, n, f->x, f->y, f->z, 0);
+    for (b = 0; b < n; b++) for (c = 0; c < 4; c++) g[b].carried[3][c] = -f->weight[4 * b + c];
+    for (b = 0; b < n; b++) for (c = 0; c < 3; c++) g[b].carried[c][3] = 0;
+}
+
+/* Affine momentum of the images of n particles: 2 m v - P(x), and its change from node to node, that of 2 m v along the surface included. */
+static void gs4i_reflect_affine(gs4i_ghost *g, int n, const gs4i_stencils *s, const gs4i_affine_forces *f, gs4_real h)
+{
+    int b, c, a;
+    gs4i_reflect_columns(g, n, f->x, f->y, f->z, 1);
+    for (b = 0; b < n; b++, g++)
+        for (c = 0; c < 3; c++) {
+            const gs4_real *w = g->spin;
+            const gs4_real W[3][3] = { { 0, -w[2], w[1] }, { w[2], 0, -w[0] }, { -w[1], w[0], 0 } };
+            const gs4_real turn = W[c][0] * g->n[0] + W[c][1] * g->n[1] + W[c][2] * g->n[2];
+            const gs4_real at_x = f->middle[4 * b + c] + f->x[4 * b + c] * GS4I_NTH(s->xi[0], b) + f->y[4 * b + c] * GS4I_NTH(s->xi[1], b) + f->z[4 * b + c] * GS4I_NTH(s->xi[2], b);
+            g->carried[0][c] = 2 * g->x[3] * g->v[c] - at_x;
+            for (a = 0; a < 3; a++) g->carried[1 + a][c] += 2 * g->x[3] * h * (W[c][a] - turn * g->n[a]);
+        }
+}
+
 static void gs4i_clear_warmth(const gs4_sim *sim, gs4i_warmth *w)
 {
     memset(&w->laws, 0, sizeof w->laws);
@@ -6328,6 +6770,7 @@ static void gs4i_scatter_stage(const gs4i_pass *pass, int index, gs4i_warmth *wa
     gs4i_history_laws past;
     gs4i_seen seen;
     gs4_real nodes[GS4I_TILE_REALS], tile[GS4I_TILE_REALS];
+    gs4i_ghost *ghosts = gs4i_ghosts_of(sim, o);
     int row = 0;
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
     gs4i_tile_load(&sim->grid, o, report->rows, sim->grid.momentum, nodes);
@@ -6353,6 +6796,7 @@ static void gs4i_scatter_stage(const gs4i_pass *pass, int index, gs4i_warmth *wa
             gs4i_x_weights(&s, b, &w, &d);
             gs4i_gather_local(nodes + 4 * s.base[b], &s, b, &w, &d, &v);
         }
+        if (ghosts) gs4i_make_odd(ghosts, n, 0, &v);
         gs4i_gradient_lanes(v.dx, v.dy, v.dz, n, L);
         gs4i_take_laws(sim->laws, sim->frozen, &p, i, n, &laws);
         if (warmth) gs4i_begin_warmth(&p, i, n, sim->warm.reach.ahead, &laws, warmth);
@@ -6360,6 +6804,7 @@ static void gs4i_scatter_stage(const gs4i_pass *pass, int index, gs4i_warmth *wa
         gs4i_see_liquids(&seen, &laws, J, mu);
         gs4i_check_liquids(report, J, mu, p.id + i, n);
         for (b = 0; b < n; b++) gs4i_scatter_force(tile, &s, b, &f);
+        if (ghosts) { gs4i_reflect_forces(ghosts, n, &f); ghosts += n; }
         if (warmth) gs4i_scatter_warmth(sim, warmth, &s, n);
     }
     gs4i_report_liquids(report, &seen);
@@ -6554,7 +6999,7 @@ static int gs4i_is_calm(const gs4i_pass *pass, int index)
     const gs4i_report *report = &sim->reports[o];
     const gs4_real *mean = g->spread + 4 * (size_t)nb[13], limit = GS4I_C(0.2 / 4.7) * g->h / sim->rule.dt;
     int i, c;
-    if (!(report->min_J > GS4I_C(0.25) && report->max_J < 4) || report->hard) return 0;
+    if (!(report->min_J > GS4I_C(0.25) && report->max_J < 4) || report->hard || !gs4i_ghosts_are_calm(sim, o)) return 0;
     for (c = 0; c < 3; c++) if (!(gs4i_abs(mean[c]) * sim->rule.dt < g->h)) return 0;
     for (i = 0; i < 27; i++) {
         const gs4_real *of = g->spread + 4 * (size_t)nb[i];
@@ -6642,12 +7087,11 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_warm
     gs4i_batch_laws laws;
     gs4i_history_laws past;
     gs4i_seen seen;
-    gs4i_corrections k;
-    gs4i_kicks kicks;
+    gs4i_corrections k; gs4i_kicks kicks;
     gs4_real u_nodes[GS4I_TILE_REALS], a_nodes[GS4I_TILE_REALS], j_nodes[GS4I_TILE_REALS];
     const int jumps = gs4i_load_jumps(grid, o, report->rows, j_nodes), edge = jumps || gs4i_at_edge(grid, o);
-    gs4i_gathered u;
-    gs4i_stored out;
+    const gs4i_ghost *ghosts = gs4i_ghosts_of(sim, o);
+    gs4i_gathered u; gs4i_stored out;
     int row = 0;
     size_t i = (size_t)grid->first[o], end = (size_t)grid->first[o + 1];
     if (!commit && gs4i_is_calm(pass, index)) return;
@@ -6674,6 +7118,7 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_warm
             gs4i_gather_kick(&p, a_nodes + 4 * s.base[b], &s, b, &w, &d, &acc);
             if (jumps) gs4i_gather_kick(&p, j_nodes + 4 * s.base[b], &s, b, &w, &d, &jump);
         }
+        if (ghosts) { gs4i_make_odd(ghosts, n, 0, &u); gs4i_make_odd(ghosts, n, 1, &acc); ghosts += n; }
         gs4i_to_lanes(u.value, n, k.U);
         gs4i_gradient_lanes(u.dx, u.dy, u.dz, n, k.L);
         gs4i_to_lanes(acc.value, n, k.A);
@@ -6749,6 +7194,7 @@ static void gs4i_scatter_affinely(const gs4i_pass *pass, int index, gs4i_warmth 
     gs4i_history_laws past;
     gs4i_seen seen;
     gs4_real tile[GS4I_TILE_REALS];
+    gs4i_ghost *ghosts = gs4i_ghosts_of(sim, o);
     int row = 0;
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
     uint64_t rows = 0;
@@ -6779,6 +7225,7 @@ static void gs4i_scatter_affinely(const gs4i_pass *pass, int index, gs4i_warmth 
             rows |= gs4i_touched_rows(s.base[b]);
             gs4i_scatter_affine(tile, &s, b, &f);
         }
+        if (ghosts) { gs4i_reflect_affine(ghosts, n, &s, &f, h); ghosts += n; }
         if (warmth) gs4i_scatter_warmth(sim, warmth, &s, n);
     }
     gs4i_report_liquids(report, &seen);
@@ -6816,6 +7263,7 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, gs4i
     gs4i_seen seen;
     gs4_real nodes[GS4I_TILE_REALS];
     int edge = gs4i_at_edge(grid, o), c;
+    const gs4i_ghost *ghosts = gs4i_ghosts_of(sim, o);
     gs4i_gathered u;
     gs4i_stored out;
     int row = 0;
@@ -6840,6 +7288,7 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, gs4i
             gs4i_x_weights(&s, b, &w, &d);
             gs4i_gather_local(nodes + 4 * s.base[b], &s, b, &w, &d, &u);
         }
+        if (ghosts) { gs4i_make_odd(ghosts, n, 0, &u); ghosts += n; }
         gs4i_advect_batch(sim->rule.dt, &u, n, &q, C);
         if (p.elastic_reals || p.deformation_reals || warmth) gs4i_advance_history(sim, i, n, &laws, &past, warmth, C, NULL, q.v[3], report, commit);
         if (warmth && commit) gs4i_gather_heat(sim, i, n, &s, &laws, C, warmth);
@@ -7701,6 +8150,10 @@ static void gs4i_hold_nodes(const gs4_sim *sim, int slot, gs4_real *velocity, gs
             gs4_real *v = velocity + 4 * i;
             if (!(v[3] > 0)) continue;                      /* no particle sees it */
             none[0] = none[1] = none[2] = 0;
+            if (gs4i_is_sticky(body) && (*gs4i_contact_at(&sim->grid, (uint32_t)(64 * slot + i)) & (GS4I_IMAGED | GS4I_UNIMAGED)) == GS4I_IMAGED) {
+                if (jump && gs4i_body_distance(body, gs4i_node_position(&sim->grid, slot, i)) < 0) jump[4 * i + 3] = 1;
+                continue;
+            }
             for (c = 0; c < 3; c++) before[c] = v[c];
             if (!gs4i_body_hold(body, gs4i_node_position(&sim->grid, slot, i), sim->grid.h, sim->rule.dt,
                                 v, acceleration ? acceleration + 4 * i : none)) continue;
@@ -7867,6 +8320,7 @@ static int gs4i_rasterise(gs4_sim *sim, gs4i_node_pass *nodes)
     for (tries = 0; tries < 2; tries++) {
         if (sim->unsorted || tries) GS4I_TRY(gs4i_bin(sim));
         gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_clear_nodes, nodes);
+        GS4I_TRY(gs4i_find_ghosts(sim));
         gs4i_scatter(sim, !euler ? gs4i_scatter_momentum : sim->particles.with_heat ? gs4i_scatter_euler_and_heat : gs4i_scatter_euler);
         if (!gs4i_all_reports(sim).strayed) return GS4_OK;
     }
@@ -7878,9 +8332,11 @@ static void gs4i_set_velocities(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     const int groups = gs4i_groups(sim);
     gs4i_parallel_for(&sim->tasks, groups, gs4i_clear_jumps, nodes);
+    gs4i_scatter_ghosts(sim, sim->particles.with_rates ? gs4i_scatter_ghost_momentum : gs4i_scatter_ghost_affine);
     gs4i_fold_momentum(&sim->boundary, &sim->grid);
     gs4i_parallel_for(&sim->tasks, groups, gs4i_node_velocities, nodes);
     gs4i_fill_images(&sim->boundary, &sim->grid, sim->grid.momentum);
+    gs4i_gather_ghosts(sim);
 }
 
 /* Is what the particles have seen so far acceptable, and is dt still within the limit that follows from it? */
@@ -8146,10 +8602,12 @@ static int gs4i_take_step(gs4_sim *sim, gs4_real dt)
         gs4i_set_velocities(sim, &nodes);
         if (!euler) {
             gs4i_scatter(sim, heat ? gs4i_scatter_forces_and_heat : gs4i_scatter_forces);       /* S4, S5 */
+            gs4i_scatter_ghosts(sim, gs4i_scatter_ghost_force);
             gs4i_fold_force(&sim->boundary, &sim->grid);
             gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_node_accelerations, &nodes);  /* S6 */
             gs4i_fill_images(&sim->boundary, &sim->grid, sim->grid.momentum);
             gs4i_fill_images(&sim->boundary, &sim->grid, sim->grid.force);
+            gs4i_gather_ghosts(sim);
         }
         GS4I_TRY(gs4i_check_stage(sim));
         if (heat) GS4I_TRY(gs4i_conduct(sim, &nodes));
@@ -8567,6 +9025,7 @@ static void gs4i_release_state(gs4_sim *sim)
     gs4i_grid_free(m, &sim->grid);
     for (i = 0; i < 6; i++) gs4i_free(m, sim->boundary.images[i], (size_t)sim->boundary.image_capacity[i], sizeof(gs4i_image));
     gs4i_free(m, sim->reports, (size_t)sim->report_capacity, sizeof(gs4i_report));
+    gs4i_free_ghosts(m, &sim->ghosts);
     gs4i_free_heat(m, &sim->conduction);
 }
 
@@ -8586,6 +9045,7 @@ static int gs4i_restore(gs4_sim *sim, const gs4i_head *h, const gs4i_pieces *p)
     next.grid.h = empty.h; next.grid.inv_h = empty.inv_h; next.grid.origin = empty.origin; next.grid.table_count = empty.table_count;
     for (i = 0; i < 6; i++) { next.boundary.images[i] = NULL; next.boundary.image_count[i] = next.boundary.image_capacity[i] = 0; }
     next.reports = NULL; next.report_capacity = 0;
+    memset(&next.ghosts, 0, sizeof next.ghosts);
     memset(&next.conduction, 0, sizeof next.conduction);
     next.conduction.heats = sim->conduction.heats;
     result = gs4i_rebuild(&next, h, p);
@@ -10167,6 +10627,8 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_NTH_CONST
 #undef GS4I_PREFETCH
 #undef GS4I_PRESSED
+#undef GS4I_IMAGED
+#undef GS4I_UNIMAGED
 #undef GS4I_RESTRICT
 #undef GS4I_ROW_DIFFERENCE
 #undef GS4I_ROW_LOAD
@@ -10185,6 +10647,8 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_SPLIT_TOLERANCE
 #undef GS4I_SQRT
 #undef GS4I_STICKY_REACH
+#undef GS4I_GHOST_NODES
+#undef GS4I_GHOST_REACH
 #undef GS4I_STORE
 #undef GS4I_STRIP
 #undef GS4I_STRIPS

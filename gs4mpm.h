@@ -6725,7 +6725,7 @@ static void gs4i_reflect_affine(gs4i_ghost *g, int n, const gs4i_stencils *s, co
             const gs4_real *w = g->spin;
             const gs4_real W[3][3] = { { 0, -w[2], w[1] }, { w[2], 0, -w[0] }, { -w[1], w[0], 0 } };
             const gs4_real turn = W[c][0] * g->n[0] + W[c][1] * g->n[1] + W[c][2] * g->n[2];
-            const gs4_real at_x = f->middle[4 * b + c] + f->x[4 * b + c] * GS4I_NTH(s->xi[0], b) + f->y[4 * b + c] * GS4I_NTH(s->xi[1], b) + f->z[4 * b + c] * GS4I_NTH(s->xi[2], b);
+            const gs4_real at_x = f->middle[4 * b + c] + f->x[4 * b + c] * GS4I_NTH_CONST(s->xi[0], b) + f->y[4 * b + c] * GS4I_NTH_CONST(s->xi[1], b) + f->z[4 * b + c] * GS4I_NTH_CONST(s->xi[2], b);
             g->carried[0][c] = 2 * g->x[3] * g->v[c] - at_x;
             for (a = 0; a < 3; a++) g->carried[1 + a][c] += 2 * g->x[3] * h * (W[c][a] - turn * g->n[a]);
         }

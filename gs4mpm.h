@@ -3320,6 +3320,14 @@ static int gs4i_grid_collect(gs4i_memory *m, gs4i_grid *g, const uint32_t *occup
     return result == GS4_OK ? n : result;
 }
 
+/* Blocks of one colour have no node in common. */
+static int gs4i_block_colour(const gs4i_grid *g, uint32_t block)
+{
+    int at[3];
+    gs4i_block_coordinates(g, block, at);
+    return (at[0] & 1) | (at[1] & 1) << 1 | (at[2] & 1) << 2;
+}
+
 static void gs4i_grid_link(gs4i_grid *g)
 {
     int o, s, i, j, k, colour, n = 0;
@@ -3333,11 +3341,7 @@ static void gs4i_grid_link(gs4i_grid *g)
     }
     for (colour = 0; colour < 8; colour++) {
         g->colour_first[colour] = n;
-        for (o = 0; o < g->occupied; o++) {
-            int at[3];
-            gs4i_block_coordinates(g, g->occupied_block[o], at);
-            if (((at[0] & 1) | (at[1] & 1) << 1 | (at[2] & 1) << 2) == colour) g->by_colour[n++] = o;
-        }
+        for (o = 0; o < g->occupied; o++) if (gs4i_block_colour(g, g->occupied_block[o]) == colour) g->by_colour[n++] = o;
     }
     g->colour_first[8] = n;
 }
@@ -5886,11 +5890,11 @@ enum { GS4I_BAD_VOLUME = 1, GS4I_BAD_MOTION, GS4I_BAD_VISCOSITY, GS4I_BAD_STRESS
 
 typedef struct gs4i_pass { gs4_sim *sim; const int32_t *blocks; int count; } gs4i_pass;
 
-GS4I_INLINE gs4i_frame gs4i_tile_frame(const gs4i_grid *g, int o)
+GS4I_INLINE gs4i_frame gs4i_tile_frame(const gs4i_grid *g, uint32_t block)
 {
     gs4i_frame f;
     int at[3], a;
-    gs4i_block_coordinates(g, g->occupied_block[o], at);
+    gs4i_block_coordinates(g, block, at);
     for (a = 0; a < 3; a++) f.first[a] = GS4I_C(4 * at[a] - 6);
     f.origin[0] = g->origin.x; f.origin[1] = g->origin.y; f.origin[2] = g->origin.z; f.inv_h = g->inv_h;
     return f;
@@ -6180,7 +6184,7 @@ static void gs4i_scatter_momentum(int index, void *context)
     const gs4i_particles p = sim->particles;               /* a copy: stores cannot alias it */
     const gs4i_reach reach = sim->rule.reach;
     const int o = pass->blocks[index];
-    const gs4i_frame frame = gs4i_tile_frame(&sim->grid, o);
+    const gs4i_frame frame = gs4i_tile_frame(&sim->grid, sim->grid.occupied_block[o]);
     gs4_real tile[GS4I_TILE_REALS];
     int row = 0;
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
@@ -6220,7 +6224,7 @@ static void gs4i_see_turning_task(int index, void *context)
     gs4_sim *sim = pass->sim;
     const gs4i_particles p = sim->particles;
     const int o = pass->blocks[index];
-    const gs4i_frame frame = gs4i_tile_frame(&sim->grid, o);
+    const gs4i_frame frame = gs4i_tile_frame(&sim->grid, sim->grid.occupied_block[o]);
     gs4_real nodes[GS4I_TILE_REALS];
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
     gs4i_tile_load(&sim->grid, o, sim->reports[o].rows, sim->grid.momentum, nodes);
@@ -6315,6 +6319,19 @@ GS4I_INLINE void gs4i_scatter_force(gs4_real *tile, const gs4i_stencils *s, int 
     gs4i_scatter_rows(tile + 4 * s->base[n], &p0, &p1, &p2, s, n);
 }
 
+/* Run a scattering kernel over blocks, colour after colour. */
+static void gs4i_scatter_by_colour(gs4_sim *sim, const int32_t *blocks, const int first[9], gs4_task_fn kernel)
+{
+    gs4i_pass pass;
+    int colour;
+    pass.sim = sim;
+    for (colour = 0; colour < 8; colour++) {
+        pass.blocks = blocks + first[colour];
+        pass.count = first[colour + 1] - first[colour];
+        gs4i_parallel_for(&sim->tasks, pass.count, kernel, &pass);
+    }
+}
+
 /* --- images behind sticky bodies ----------------------------------------------------------------------
  *
  * Particles within three cells of the surface of a sticky body have an image behind it, x' = x - 2 d n, that gives the nodes what a field
@@ -6323,7 +6340,7 @@ GS4I_INLINE void gs4i_scatter_force(gs4_real *tile, const gs4i_stencils *s, int 
  * lies, as far as particles fill the space before it. Where it is too thin or too crooked for images, nodes are held: gs4i_body_hold. */
 
 enum { GS4I_GHOST_NONE, GS4I_GHOST_IMAGE, GS4I_GHOST_HELD /* no image can be had */ };
-enum { GS4I_GHOST_MOMENTUM, GS4I_GHOST_AFFINE, GS4I_GHOST_FORCE };     /* what is scattered */
+enum { GS4I_GHOST_MARK, GS4I_GHOST_MOMENTUM, GS4I_GHOST_AFFINE, GS4I_GHOST_FORCE };    /* what is scattered; first of all, what has no image */
 
 static int gs4i_is_sticky(const gs4i_body *b) { return b->is.contact == GS4_WALL_STICK && !b->is_mouth && !b->asleep; }
 
@@ -6373,7 +6390,7 @@ static void gs4i_place_ghost(const gs4_sim *sim, gs4_vec3 p, gs4i_ghost *g)
     g->n[0] = n.x; g->n[1] = n.y; g->n[2] = n.z;
     g->v[0] = v.x; g->v[1] = v.y; g->v[2] = v.z;
     g->spin[0] = body->is.angular_velocity.x; g->spin[1] = body->is.angular_velocity.y; g->spin[2] = body->is.angular_velocity.z;
-    g->share = gs4i_max(gs4i_min(GS4I_C(1.5) - d * sim->grid.inv_h, 1), 0);
+    g->share = gs4i_max(gs4i_min(GS4I_GHOST_NODES - d * sim->grid.inv_h, 1), 0);
     deep = GS4I_GHOST_NODES * h;
     if (d > -GS4I_C(0.5) * h && gs4i_abs(gs4i_body_distance(body, gs4i_sub(foot, gs4i_scale(n, deep))) + deep) < GS4I_C(0.25) * h) {
         const gs4_real nearer[3] = { image.x + h * n.x, image.y + h * n.y, image.z + h * n.z };
@@ -6382,7 +6399,7 @@ static void gs4i_place_ghost(const gs4_sim *sim, gs4_vec3 p, gs4i_ghost *g)
         if (g->slot >= 0 && (d < deep || gs4i_body_distance(body, image) < 0)) g->kind = GS4I_GHOST_IMAGE;
         return;
     }
-    if (d > GS4I_C(2.25) * h) return;                       /* it sees no node that would be held */
+    if (d > (GS4I_STICKY_REACH + GS4I_GHOST_NODES) * h) return;     /* it sees no node that would be held */
     g->x[0] = p.x; g->x[1] = p.y; g->x[2] = p.z;
     g->slot = gs4i_slot_of(&sim->grid, g->x);
     if (g->slot >= 0) g->kind = GS4I_GHOST_HELD;
@@ -6434,12 +6451,7 @@ static int gs4i_sort_ghosts(gs4_sim *sim)
     for (k = 0; k < g->count; k++) if (all[k].kind) first[all[k].slot + 1]++;
     for (colour = 0; colour < 8; colour++) {
         g->colour_first[colour] = n;
-        for (s = 0; s < active; s++) {
-            int at[3];
-            if (!first[s + 1]) continue;
-            gs4i_block_coordinates(&sim->grid, sim->grid.block[s], at);
-            if (((at[0] & 1) | (at[1] & 1) << 1 | (at[2] & 1) << 2) == colour) slots[n++] = s;
-        }
+        for (s = 0; s < active; s++) if (first[s + 1] && gs4i_block_colour(&sim->grid, sim->grid.block[s]) == colour) slots[n++] = s;
     }
     g->colour_first[8] = n;
     for (s = 0; s < active; s++) first[s + 1] += first[s];
@@ -6480,15 +6492,14 @@ typedef struct gs4i_ghost_tile { ptrdiff_t at[27]; gs4i_frame frame; } gs4i_ghos
 
 static void gs4i_ghost_tile_of(const gs4i_grid *g, int slot, gs4i_ghost_tile *t)
 {
-    int at[3], i, a;
+    int at[3], i;
     gs4i_block_coordinates(g, g->block[slot], at);
     for (i = 0; i < 27; i++) {
         const int x = at[0] + i % 3 - 1, y = at[1] + i / 3 % 3 - 1, z = at[2] + i / 9 - 1;
         const int there = x >= 0 && y >= 0 && z >= 0 && x < g->blocks[0] && y < g->blocks[1] && z < g->blocks[2];
         t->at[i] = there ? (ptrdiff_t)(g->table[gs4i_block_number(g, x, y, z)] - 1) * GS4I_NODE_REALS : -1;
     }
-    for (a = 0; a < 3; a++) t->frame.first[a] = GS4I_C(4 * at[a] - 6);
-    t->frame.origin[0] = g->origin.x; t->frame.origin[1] = g->origin.y; t->frame.origin[2] = g->origin.z; t->frame.inv_h = g->inv_h;
+    t->frame = gs4i_tile_frame(g, g->block[slot]);
 }
 
 /* Where node (x, y, z) of a tile is, negative where it does not exist. */
@@ -6528,14 +6539,16 @@ static int gs4i_is_whole(const gs4i_ghost_tile *t, int base)
     return whole;
 }
 
-/* Add the tile to the nodes that exist; those that get momentum are marked. */
+/* Add the tile to the nodes that exist and are not held; those that get momentum are marked. */
 static void gs4i_ghost_tile_add(const gs4i_grid *grid, const gs4i_ghost_tile *t, const gs4_real *tile, gs4_real *field)
 {
     int x, y, z, c;
     for (z = 0; z < GS4I_TILE; z++) for (y = 0; y < GS4I_TILE; y++) for (x = 0; x < GS4I_TILE; x++, tile += 4) {
         const ptrdiff_t at = gs4i_ghost_node(t, x, y, z);
-        for (c = 0; c < 4 && at >= 0; c++) field[at + c] += tile[c];
-        if (at >= 0 && field == grid->momentum && tile[3] > 0 && grid->jump_of[at / GS4I_NODE_REALS]) *gs4i_contact_at(grid, (uint32_t)(at / 4)) |= GS4I_IMAGED;
+        uint8_t *contact = at >= 0 && grid->jump_of[at / GS4I_NODE_REALS] ? gs4i_contact_at(grid, (uint32_t)(at / 4)) : NULL;
+        if (at < 0 || (contact && (*contact & GS4I_UNIMAGED))) continue;
+        for (c = 0; c < 4; c++) field[at + c] += tile[c];
+        if (contact && field == grid->momentum && tile[3] > 0) *contact |= GS4I_IMAGED;
     }
 }
 
@@ -6560,10 +6573,8 @@ static void gs4i_scatter_ghosts_of(const gs4i_pass *pass, int index, int what)
             gs4_real (*from)[4] = g[b]->carried;
             const size_t four = 4 * sizeof *tile;
             if (s.base[b] < 0) continue;
-            if (g[b]->kind == GS4I_GHOST_HELD) {
-                if (what != GS4I_GHOST_FORCE) gs4i_mark_unimaged(&sim->grid, &t, s.base[b]);
-                continue;
-            }
+            if (what == GS4I_GHOST_MARK && g[b]->kind == GS4I_GHOST_HELD) gs4i_mark_unimaged(&sim->grid, &t, s.base[b]);
+            if (what == GS4I_GHOST_MARK || g[b]->kind == GS4I_GHOST_HELD) continue;
             g[b]->whole = gs4i_is_whole(&t, s.base[b]);
             if (what == GS4I_GHOST_MOMENTUM) gs4i_scatter_quad(tile, &s, b, from[0]);
             else if (what == GS4I_GHOST_FORCE) {
@@ -6578,81 +6589,73 @@ static void gs4i_scatter_ghosts_of(const gs4i_pass *pass, int index, int what)
             }
         }
     }
-    gs4i_ghost_tile_add(&sim->grid, &t, tile, what == GS4I_GHOST_FORCE ? sim->grid.force : sim->grid.momentum);
+    if (what != GS4I_GHOST_MARK) gs4i_ghost_tile_add(&sim->grid, &t, tile, what == GS4I_GHOST_FORCE ? sim->grid.force : sim->grid.momentum);
 }
 
+static void gs4i_mark_ghosts(int index, void *context) { gs4i_scatter_ghosts_of((const gs4i_pass *)context, index, GS4I_GHOST_MARK); }
 static void gs4i_scatter_ghost_momentum(int index, void *context) { gs4i_scatter_ghosts_of((const gs4i_pass *)context, index, GS4I_GHOST_MOMENTUM); }
 static void gs4i_scatter_ghost_affine(int index, void *context) { gs4i_scatter_ghosts_of((const gs4i_pass *)context, index, GS4I_GHOST_AFFINE); }
 static void gs4i_scatter_ghost_force(int index, void *context) { gs4i_scatter_ghosts_of((const gs4i_pass *)context, index, GS4I_GHOST_FORCE); }
 
 static void gs4i_scatter_ghosts(gs4_sim *sim, gs4_task_fn kernel)
 {
-    const gs4i_ghosts *g = &sim->ghosts;
-    gs4i_pass pass;
-    int colour;
-    pass.sim = sim;
-    for (colour = 0; colour < 8 && g->count; colour++) {
-        pass.blocks = (const int32_t *)g->slots.data + g->colour_first[colour];
-        pass.count = g->colour_first[colour + 1] - g->colour_first[colour];
-        gs4i_parallel_for(&sim->tasks, pass.count, kernel, &pass);
-    }
+    if (sim->ghosts.count) gs4i_scatter_by_colour(sim, (const int32_t *)sim->ghosts.slots.data, sim->ghosts.colour_first, kernel);
 }
 
-/* What the nodes have at the images: velocity, and with GS4 acceleration. */
-static void gs4i_gather_ghosts_task(int index, void *context)
+/* What the nodes have of a field at the images, velocity (what 0) or acceleration (1). */
+static void gs4i_gather_ghosts_of(const gs4i_pass *pass, int index, int what)
 {
-    const gs4i_pass *pass = (const gs4i_pass *)context;
     gs4_sim *sim = pass->sim;
     const int slot = pass->blocks[index];
     const int32_t *first = (const int32_t *)sim->ghosts.first.data, *order = (const int32_t *)sim->ghosts.order.data;
+    const gs4_real *field = what ? sim->grid.force : sim->grid.momentum;
+    gs4_real tile[GS4I_TILE_REALS], *to = tile;
     gs4i_ghost_tile t;
-    int k, b, c, what;
+    int x, y, z, k, b, c;
     gs4i_ghost_tile_of(&sim->grid, slot, &t);
-    for (what = 0; what < (sim->particles.with_rates ? 2 : 1); what++) {
-        const gs4_real *field = what ? sim->grid.force : sim->grid.momentum;
-        gs4_real tile[GS4I_TILE_REALS], *to = tile;
-        int x, y, z;
-        for (z = 0; z < GS4I_TILE; z++) for (y = 0; y < GS4I_TILE; y++) for (x = 0; x < GS4I_TILE; x++, to += 4) {
-            const ptrdiff_t at = gs4i_ghost_node(&t, x, y, z);
-            for (c = 0; c < 4; c++) to[c] = at < 0 ? 0 : field[at + c];
-        }
-        memset(to, 0, 16 * sizeof *to);
-        for (k = first[slot]; k < first[slot + 1]; k += GS4I_BATCH) {
-            const int n = first[slot + 1] - k < GS4I_BATCH ? first[slot + 1] - k : GS4I_BATCH;
-            gs4i_ghost *g[GS4I_BATCH];
-            gs4i_stencils s;
-            gs4i_gathered u;
-            gs4i_load_ghosts((gs4i_ghost *)sim->ghosts.all.data, order + k, n, &t, g, &s);
-            for (b = 0; b < n; b++) {
-                gs4i_row w, d;
-                if (s.base[b] < 0 || !g[b]->whole || !(g[b]->share > 0)) continue;
-                gs4i_x_weights(&s, b, &w, &d);
-                gs4i_gather_local(tile + 4 * s.base[b], &s, b, &w, &d, &u);
-                memcpy(g[b]->seen[what][0], u.value + 4 * b, 4 * sizeof *tile);
-                memcpy(g[b]->seen[what][1], u.dx + 4 * b, 4 * sizeof *tile);
-                memcpy(g[b]->seen[what][2], u.dy + 4 * b, 4 * sizeof *tile);
-                memcpy(g[b]->seen[what][3], u.dz + 4 * b, 4 * sizeof *tile);
-            }
+    for (z = 0; z < GS4I_TILE; z++) for (y = 0; y < GS4I_TILE; y++) for (x = 0; x < GS4I_TILE; x++, to += 4) {
+        const ptrdiff_t at = gs4i_ghost_node(&t, x, y, z);
+        for (c = 0; c < 4; c++) to[c] = at < 0 ? 0 : field[at + c];
+    }
+    memset(to, 0, 16 * sizeof *to);
+    for (k = first[slot]; k < first[slot + 1]; k += GS4I_BATCH) {
+        const int n = first[slot + 1] - k < GS4I_BATCH ? first[slot + 1] - k : GS4I_BATCH;
+        gs4i_ghost *g[GS4I_BATCH];
+        gs4i_stencils s;
+        gs4i_gathered u;
+        gs4i_load_ghosts((gs4i_ghost *)sim->ghosts.all.data, order + k, n, &t, g, &s);
+        for (b = 0; b < n; b++) {
+            gs4i_row w, d;
+            if (s.base[b] < 0 || !g[b]->whole || !(g[b]->share > 0)) continue;
+            gs4i_x_weights(&s, b, &w, &d);
+            gs4i_gather_local(tile + 4 * s.base[b], &s, b, &w, &d, &u);
+            memcpy(g[b]->seen[what][0], u.value + 4 * b, 4 * sizeof *tile);
+            memcpy(g[b]->seen[what][1], u.dx + 4 * b, 4 * sizeof *tile);
+            memcpy(g[b]->seen[what][2], u.dy + 4 * b, 4 * sizeof *tile);
+            memcpy(g[b]->seen[what][3], u.dz + 4 * b, 4 * sizeof *tile);
         }
     }
 }
 
-static void gs4i_free_ghosts(gs4i_memory *m, gs4i_ghosts *g)
-{
-    gs4i_scratch *const parts[5] = { &g->all, &g->of, &g->order, &g->first, &g->slots };
-    int i;
-    for (i = 0; i < 5; i++) gs4i_free(m, parts[i]->data, parts[i]->bytes, 1);
-    memset(g, 0, sizeof *g);
-}
+static void gs4i_gather_ghost_velocity(int index, void *context) { gs4i_gather_ghosts_of((const gs4i_pass *)context, index, 0); }
+static void gs4i_gather_ghost_acceleration(int index, void *context) { gs4i_gather_ghosts_of((const gs4i_pass *)context, index, 1); }
 
-static void gs4i_gather_ghosts(gs4_sim *sim)
+static void gs4i_gather_ghosts(gs4_sim *sim, gs4_task_fn kernel)
 {
     gs4i_pass pass;
     if (!sim->ghosts.count) return;
     pass.sim = sim;
     pass.blocks = (const int32_t *)sim->ghosts.slots.data;
     pass.count = sim->ghosts.colour_first[8];
-    gs4i_parallel_for(&sim->tasks, pass.count, gs4i_gather_ghosts_task, &pass);
+    gs4i_parallel_for(&sim->tasks, pass.count, kernel, &pass);
+}
+
+/* Row c of spin x (I - n n): how the body's velocity changes along its surface. */
+GS4I_INLINE gs4_vec3 gs4i_ghost_turn(const gs4i_ghost *g, int c)
+{
+    const gs4_real *w = g->spin, row[3][3] = { { 0, -w[2], w[1] }, { w[2], 0, -w[0] }, { -w[1], w[0], 0 } };
+    const gs4_vec3 r = gs4i_vec3(row[c][0], row[c][1], row[c][2]), n = gs4i_vec3(g->n[0], g->n[1], g->n[2]);
+    return gs4i_sub(r, gs4i_scale(n, gs4i_dot(r, n)));
 }
 
 /* Replace what n particles gathered by its part that is odd about the surface, of velocities (what 0) about the body's, by their shares:
@@ -6665,13 +6668,12 @@ static void gs4i_make_odd(const gs4i_ghost *g, int n, int what, gs4i_gathered *u
         if (g->kind != GS4I_GHOST_IMAGE || !g->whole || !(g->share > 0)) continue;
         column[0] = u->dx + 4 * b; column[1] = u->dy + 4 * b; column[2] = u->dz + 4 * b;
         for (c = 0; c < 3; c++) {
-            const gs4_real *w = g->spin;
-            const gs4_real W[3][3] = { { 0, -w[2], w[1] }, { w[2], 0, -w[0] }, { -w[1], w[0], 0 } };
+            const gs4_vec3 turn = gs4i_ghost_turn(g, c);
+            const gs4_real along[3] = { turn.x, turn.y, turn.z };
             const gs4_real across = g->seen[what][1][c] * g->n[0] + g->seen[what][2][c] * g->n[1] + g->seen[what][3][c] * g->n[2];
-            const gs4_real turn = W[c][0] * g->n[0] + W[c][1] * g->n[1] + W[c][2] * g->n[2];
             u->value[4 * b + c] -= g->share * (GS4I_C(0.5) * (u->value[4 * b + c] + g->seen[what][0][c]) - (what ? GS4I_C(0) : g->v[c]));
             for (a = 0; a < 3; a++)
-                column[a][c] -= g->share * (GS4I_C(0.5) * (column[a][c] + g->seen[what][1 + a][c]) - across * g->n[a] - (what ? GS4I_C(0) : W[c][a] - turn * g->n[a]));
+                column[a][c] -= g->share * (GS4I_C(0.5) * (column[a][c] + g->seen[what][1 + a][c]) - across * g->n[a] - (what ? GS4I_C(0) : along[a]));
         }
     }
 }
@@ -6722,13 +6724,20 @@ static void gs4i_reflect_affine(gs4i_ghost *g, int n, const gs4i_stencils *s, co
     gs4i_reflect_columns(g, n, f->x, f->y, f->z, 1);
     for (b = 0; b < n; b++, g++)
         for (c = 0; c < 3; c++) {
-            const gs4_real *w = g->spin;
-            const gs4_real W[3][3] = { { 0, -w[2], w[1] }, { w[2], 0, -w[0] }, { -w[1], w[0], 0 } };
-            const gs4_real turn = W[c][0] * g->n[0] + W[c][1] * g->n[1] + W[c][2] * g->n[2];
+            const gs4_vec3 turn = gs4i_ghost_turn(g, c);
+            const gs4_real along[3] = { turn.x, turn.y, turn.z };
             const gs4_real at_x = f->middle[4 * b + c] + f->x[4 * b + c] * GS4I_NTH_CONST(s->xi[0], b) + f->y[4 * b + c] * GS4I_NTH_CONST(s->xi[1], b) + f->z[4 * b + c] * GS4I_NTH_CONST(s->xi[2], b);
             g->carried[0][c] = 2 * g->x[3] * g->v[c] - at_x;
-            for (a = 0; a < 3; a++) g->carried[1 + a][c] += 2 * g->x[3] * h * (W[c][a] - turn * g->n[a]);
+            for (a = 0; a < 3; a++) g->carried[1 + a][c] += 2 * g->x[3] * h * along[a];
         }
+}
+
+static void gs4i_free_ghosts(gs4i_memory *m, gs4i_ghosts *g)
+{
+    gs4i_scratch *const parts[5] = { &g->all, &g->of, &g->order, &g->first, &g->slots };
+    int i;
+    for (i = 0; i < 5; i++) gs4i_free(m, parts[i]->data, parts[i]->bytes, 1);
+    memset(g, 0, sizeof *g);
 }
 
 static void gs4i_clear_warmth(const gs4_sim *sim, gs4i_warmth *w)
@@ -6763,7 +6772,7 @@ static void gs4i_scatter_stage(const gs4i_pass *pass, int index, gs4i_warmth *wa
     const gs4i_particles p = sim->particles;
     const gs4i_rule rule = sim->rule;
     const int o = pass->blocks[index], next = pass->blocks[index + 1 < pass->count ? index + 1 : index];
-    const gs4i_frame frame = gs4i_tile_frame(&sim->grid, o);
+    const gs4i_frame frame = gs4i_tile_frame(&sim->grid, sim->grid.occupied_block[o]);
     const gs4_real gravity[3] = { sim->desc.gravity.x, sim->desc.gravity.y, sim->desc.gravity.z };
     gs4i_report *report = &sim->reports[o];
     gs4i_batch_laws laws;
@@ -7083,7 +7092,7 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_warm
     const gs4i_particles p = sim->particles;
     gs4i_grid *grid = &sim->grid;
     gs4i_report *report = &sim->reports[o];
-    const gs4i_frame frame = gs4i_tile_frame(grid, o);
+    const gs4i_frame frame = gs4i_tile_frame(grid, grid->occupied_block[o]);
     gs4i_batch_laws laws;
     gs4i_history_laws past;
     gs4i_seen seen;
@@ -7187,7 +7196,7 @@ static void gs4i_scatter_affinely(const gs4i_pass *pass, int index, gs4i_warmth 
     const int o = pass->blocks[index];
     const gs4i_reach reach = { 0, 0 };
     const gs4_real dt = sim->rule.dt, h = sim->grid.h;
-    const gs4i_frame frame = gs4i_tile_frame(&sim->grid, o);
+    const gs4i_frame frame = gs4i_tile_frame(&sim->grid, sim->grid.occupied_block[o]);
     const gs4_real fall[3] = { dt * sim->desc.gravity.x, dt * sim->desc.gravity.y, dt * sim->desc.gravity.z };
     gs4i_report *report = &sim->reports[o];
     gs4i_batch_laws laws;
@@ -7257,7 +7266,7 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, gs4i
     const gs4i_particles p = sim->particles;
     gs4i_grid *grid = &sim->grid;
     gs4i_report *report = &sim->reports[o];
-    const gs4i_frame frame = gs4i_tile_frame(grid, o);
+    const gs4i_frame frame = gs4i_tile_frame(grid, grid->occupied_block[o]);
     gs4i_batch_laws laws;
     gs4i_history_laws past;
     gs4i_seen seen;
@@ -7309,18 +7318,8 @@ static void gs4i_rehearse_euler_task(int index, void *context) { gs4i_gather_eul
 static void gs4i_gather_euler_with_heat_task(int index, void *context) { gs4i_warmth warmth; gs4i_gather_euler((const gs4i_pass *)context, index, 1, &warmth); }
 static void gs4i_rehearse_euler_with_heat_task(int index, void *context) { gs4i_warmth warmth; gs4i_gather_euler((const gs4i_pass *)context, index, 0, &warmth); }
 
-/* Run a scattering kernel over all occupied blocks, colour after colour. */
-static void gs4i_scatter(gs4_sim *sim, gs4_task_fn kernel)
-{
-    gs4i_pass pass;
-    int colour;
-    pass.sim = sim;
-    for (colour = 0; colour < 8; colour++) {
-        pass.blocks = sim->grid.by_colour + sim->grid.colour_first[colour];
-        pass.count = sim->grid.colour_first[colour + 1] - sim->grid.colour_first[colour];
-        gs4i_parallel_for(&sim->tasks, pass.count, kernel, &pass);
-    }
-}
+/* Run a scattering kernel over all occupied blocks. */
+static void gs4i_scatter(gs4_sim *sim, gs4_task_fn kernel) { gs4i_scatter_by_colour(sim, sim->grid.by_colour, sim->grid.colour_first, kernel); }
 
 static void gs4i_gather(gs4_sim *sim, gs4_task_fn kernel)
 {
@@ -8150,7 +8149,7 @@ static void gs4i_hold_nodes(const gs4_sim *sim, int slot, gs4_real *velocity, gs
             gs4_real *v = velocity + 4 * i;
             if (!(v[3] > 0)) continue;                      /* no particle sees it */
             none[0] = none[1] = none[2] = 0;
-            if (gs4i_is_sticky(body) && (*gs4i_contact_at(&sim->grid, (uint32_t)(64 * slot + i)) & (GS4I_IMAGED | GS4I_UNIMAGED)) == GS4I_IMAGED) {
+            if (gs4i_is_sticky(body) && *gs4i_contact_at(&sim->grid, (uint32_t)(64 * slot + i)) & GS4I_IMAGED) {
                 if (jump && gs4i_body_distance(body, gs4i_node_position(&sim->grid, slot, i)) < 0) jump[4 * i + 3] = 1;
                 continue;
             }
@@ -8332,11 +8331,12 @@ static void gs4i_set_velocities(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     const int groups = gs4i_groups(sim);
     gs4i_parallel_for(&sim->tasks, groups, gs4i_clear_jumps, nodes);
+    gs4i_scatter_ghosts(sim, gs4i_mark_ghosts);
     gs4i_scatter_ghosts(sim, sim->particles.with_rates ? gs4i_scatter_ghost_momentum : gs4i_scatter_ghost_affine);
     gs4i_fold_momentum(&sim->boundary, &sim->grid);
     gs4i_parallel_for(&sim->tasks, groups, gs4i_node_velocities, nodes);
     gs4i_fill_images(&sim->boundary, &sim->grid, sim->grid.momentum);
-    gs4i_gather_ghosts(sim);
+    gs4i_gather_ghosts(sim, gs4i_gather_ghost_velocity);
 }
 
 /* Is what the particles have seen so far acceptable, and is dt still within the limit that follows from it? */
@@ -8607,7 +8607,8 @@ static int gs4i_take_step(gs4_sim *sim, gs4_real dt)
             gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_node_accelerations, &nodes);  /* S6 */
             gs4i_fill_images(&sim->boundary, &sim->grid, sim->grid.momentum);
             gs4i_fill_images(&sim->boundary, &sim->grid, sim->grid.force);
-            gs4i_gather_ghosts(sim);
+            gs4i_gather_ghosts(sim, gs4i_gather_ghost_velocity);
+            gs4i_gather_ghosts(sim, gs4i_gather_ghost_acceleration);
         }
         GS4I_TRY(gs4i_check_stage(sim));
         if (heat) GS4I_TRY(gs4i_conduct(sim, &nodes));

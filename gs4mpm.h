@@ -93,16 +93,16 @@
  *     S1  sort particles by block of 4^3 cells, when one has strayed more than a cell from its block
  *     S2  x~, v~ by (4); quadratic B-spline weights w at x~
  *     S3  m_i = sum w m,   v_i = sum w m v~ / m_i;   solids: v~ + w~ x (x_i - x~), w how the particle turns (below)
- *     S4  L~ = sum v_i (x) grad w;   J~ by (4), implicit in J for known div v;   s~ by (4), (5);   F~ by (4), (6);   sigma there by (2), (3)
+ *     S4  V = sum w v_i;   L~ = sum v_i (x) grad w;   J~ by (4), implicit in J for known div v;   s~ by (4), (5);   F~ by (4), (6);   sigma there by (2), (3)
  *     S5  f_i = - sum V sigma grad w + sum w m g
  *         heat: (m c)_i, (m c T**)_i, T** = T + (alpha_f dt - s) r; then (m c)_i (T~_i - T**_i) / s = (7) at T~, an elliptic solve ([[conduction]])
  *     S6  acc_i = f_i / m_i;   u_i = v_i + s (acc_i - ag_i), s = alpha_f gamma dt / alpha_m;   ag_i += (acc_i - ag_i) / alpha_m
  *         is what the node remembers; walls and bodies
- *     S7  A = sum w acc_i, U = sum w u_i; v by (4) with dv/dt = A - (v - U) / flip_decay_time; J, s, F by (4) with grad u; T by (4) with
- *         sum w (T~_i - T**_i) / s; x
- *         by (4) with dx/dt = U; w by (4) with dw/dt = curl(A - grad u grad u)/2 - (w - curl u/2) / flip_decay_time
+ *     S7  A = sum w acc_i, U = sum w u_i; v by (4) with dv/dt = A - (v~ - V) / flip_decay_time; J, s, F by (4) with grad u; T by (4)
+ *         with sum w (T~_i - T**_i) / s; x by (4) with dx/dt = U; w by (4) with dw/dt = curl(A - grad u grad u)/2 - (w - curl u/2) / flip_decay_time
  *     S8  bodies move, nozzles give, leavers go
- * What (v - U) / flip_decay_time takes from motion that the grid does see is small: as much as a kinematic viscosity of h^2 / (4 flip_decay_time).
+ * What (v~ - V) / flip_decay_time takes from motion that the grid does see is small: as much as a kinematic viscosity of h^2 / (4 flip_decay_time).
+ * It takes no momentum: sum m V = sum m v~.
  * Before S7 nothing of the state has changed. When the nodes cannot prove that S7 is safe it is rehearsed; if a particle would
  * leave 1/16 < J < 16, move more than two cells or become non-finite, the step is refused and the last good state stays.
  *
@@ -116,7 +116,7 @@
  *     Poiseuille flow and for heat, whose modes decay within 0.4 % at 32 cells a wave, see tests/test_heat.c; sound speed within 1.5 % at
  *     32 cells a wave; a melting front within 0.3 cells; heat in an insulated box conserved to the tolerance of the solver,
  *     temperatures beyond those given by up to 1 % of a jump;
- *     free flight exact to rounding where rho_s = 0, else to O(dt^2); momentum to rounding in free flight; a column at rest keeps
+ *     free flight exact to rounding where rho_s = 0, else to O(dt^2); momentum to rounding away from walls and spray; a column at rest keeps
  *     its pressure within 0.3 % and its speed below 1e-4 sqrt(g h).
  *
  * STABILITY. gs4_stable_dt is the least of
@@ -131,7 +131,7 @@
  * CONTACT. Walls act by images, second order in space: nodes behind a wall mirror the field (stick: odd; slip: odd along the
  * normal, even along the wall; separate: as slip while material moves into the wall or presses on it, free otherwise).
  * Sticky bodies act by images of the particles before them, second order in space too where particles fill the space up to the surface
- * (a filling that leaves out half a row puts the wall up to 0.6 cells behind it, tests: couette); where they are thinner than 3 cells or as
+ * (a filling that leaves out half a row puts the wall up to 0.8 cells behind it, tests: couette); where they are thinner than 3 cells or as
  * crooked as that, they hold nodes up to 3/4 of a cell before the surface, to first order. Of slip and separate nodes inside lose the inward
  * relative normal part (separate with Coulomb friction). What a body takes from a node at once goes to the velocities of particles and not into
  * their rates. A particle that ends inside a body or behind a wall is put back on the surface. Where the grid sees little of a
@@ -155,11 +155,12 @@
  * ERRORS. Every call returns 0 or more for success and a negative gs4_result otherwise; gs4_last_error has a sentence. Every field is
  * checked, NaN included. A call that fails has changed nothing, out of memory included; a step that is refused has not been taken.
  *
- * MEMORY. GS4: 65 bytes a particle in float (position, velocity, J and their rates, mass, id, material, and 4 for sorting), 48 a cell
- * near material, 16 more near walls and bodies, 4 per 64 cells of the domain; 260 (double: 510) more for each particle within 8 cells of a sticky body. Symplectic Euler: 89 and 32. A scene with a viscoelastic
+ * MEMORY. GS4: 65 bytes a particle in float (position, velocity, J and their rates, mass, id, material, and 4 for sorting), 16 more
+ * unless flip_decay_time is INFINITY, 48 a cell near material, 16 more near walls and bodies, 4 per 64 cells of the domain; 260
+ * (double: 512) more for each particle within 8 cells of a sticky body. Symplectic Euler: 89 and 32. A scene with a viscoelastic
  * liquid: 48 more a particle (Euler 24). With a solid: 96 more (Euler 36). With heat: 17 more a
  * particle, 32 more with a flux_relaxation_time, 16 (or 32) a cell near material, and about 100 a cell of the box around all material, where the
- * solver works. Double, GS4: 121 and 96.
+ * solver works. Double, GS4: 121 (32 more) and 96.
  * Stepping allocates nothing once the scene has stopped growing; a kernel takes 39 KB of stack, with heat 61; in double 77 and
  * 120.
  *
@@ -3459,6 +3460,7 @@ typedef struct gs4i_rule {
     gs4_real s;                         /* alpha_f gamma dt / alpha_m: weight of the new rate at the stage */
     gs4_real before;                    /* y** = y + before r: alpha_f dt - s, 0 for symplectic Euler */
     gs4_real decay, damped;             /* k = 1 / flip_decay_time, 1/s; 1 / (1 + s k) */
+    gs4_real fade;                      /* k, where (4) would not be stable with it less: k (1 + x)/(1 + x + x^2), 1/s, x = k over what would be */
     gs4_real fading;                    /* where that is shorter than dt k is 0, and this much of what the grid cannot see goes at once: a rate
                                            of it would be blown up by a longer step, and with rho_inf 1 it would not fade */
     gs4_real mixing;                    /* 1/s: at most, of temperatures, see [[heat]] */
@@ -3508,11 +3510,12 @@ typedef struct gs4i_particles {
     uint8_t *liquid;                    /* 1 while liquid; with heat */
     gs4_real *flux, *flux_rate; int with_flux;  /* 4 each: non-local heat flux (W/m^2), 0, and its rate; 0: the scene has none */
     gs4i_half *lag;                     /* 4: v - shift a - dx/dt, 0, see S2; NULL for symplectic Euler */
+    gs4_real *hidden; int with_fading;  /* 4: V - v~, from S4 to S7 of a step: what the grid does not see of the velocity fades; NULL where it does not */
     uint32_t *id; uint8_t *material;
     uint32_t *order;                    /* scratch: block, then destination of each particle */
 } gs4i_particles;
 
-enum { GS4I_ARRAYS = 16 };
+enum { GS4I_ARRAYS = 17, GS4I_STATE_ARRAYS = 15 };      /* those of the state come first, then scratch */
 typedef struct gs4i_array { void **data; size_t size; int wanted; } gs4i_array;
 
 /* The arrays of a store with the size of one element, largest first: for growing, sorting, hashing, saving. */
@@ -3533,10 +3536,12 @@ static void gs4i_particle_arrays(gs4i_particles *p, gs4i_array out[GS4I_ARRAYS])
     out[13].data = (void **)&p->liquid;  out[13].size = 1;
     out[14].data = (void **)&p->deformation; out[14].size = (size_t)p->deformation_reals * sizeof(gs4_real);
     out[15].data = (void **)&p->order;   out[15].size = sizeof(uint32_t);
+    out[16].data = (void **)&p->hidden;  out[16].size = 4 * sizeof(gs4_real);
     for (i = 0; i < GS4I_ARRAYS; i++) out[i].wanted = p->with_rates ? i > 2 : i != 5 && i != 6;
     out[9].wanted = p->elastic_reals > 0; out[14].wanted = p->deformation_reals > 0;
     out[10].wanted = out[13].wanted = p->with_heat;
     out[11].wanted = out[12].wanted = p->with_flux;
+    out[16].wanted = p->with_fading;
 }
 
 static void gs4i_particles_free(gs4i_memory *m, gs4i_particles *p)
@@ -3777,7 +3782,7 @@ static int gs4i_particles_sort(gs4i_memory *m, const gs4i_tasks *tasks, gs4i_par
     g->first[count] = (int32_t)sum;
     gs4i_parallel_for(tasks, s.chunks, gs4i_sort_place_task, &s);
     gs4i_mark_cycles(p->order, p->count);
-    gs4i_parallel_for(tasks, GS4I_ARRAYS - 1, gs4i_permute_task, p);
+    gs4i_parallel_for(tasks, GS4I_STATE_ARRAYS, gs4i_permute_task, p);
     return GS4_OK;
 }
 
@@ -6399,7 +6404,7 @@ static void gs4i_place_ghost(const gs4_sim *sim, gs4_vec3 p, gs4i_ghost *g)
         if (g->slot >= 0 && (d < deep || gs4i_body_distance(body, image) < 0)) g->kind = GS4I_GHOST_IMAGE;
         return;
     }
-    if (d > (GS4I_STICKY_REACH + GS4I_GHOST_NODES) * h) return;     /* it sees no node that would be held */
+    if (d > (GS4I_STICKY_REACH + GS4I_GHOST_NODES) * h) return;     /* of nodes that would be held it sees next to nothing */
     g->x[0] = p.x; g->x[1] = p.y; g->x[2] = p.z;
     g->slot = gs4i_slot_of(&sim->grid, g->x);
     if (g->slot >= 0) g->kind = GS4I_GHOST_HELD;
@@ -6765,6 +6770,18 @@ static void gs4i_add_warmth(const gs4_sim *sim, int o, const gs4i_warmth *w)
     if (sim->conduction.source) gs4i_tile_add(&sim->grid, o, sim->reports[o].rows, w->source, sim->conduction.source);
 }
 
+/* V - v~ of n particles, of which V = sum w v_i was gathered. Their momenta sum up to none. */
+GS4I_INLINE void gs4i_store_hidden(const gs4i_particles *p, size_t i, int n, gs4i_reach reach, const gs4i_batch *q, const gs4_real *V)
+{
+    gs4_real out[4 * GS4I_BATCH];
+    gs4i_lanes hidden[4];
+    int b, c;
+    gs4i_to_lanes(V, n, hidden);
+    for (c = 0; c < 3; c++) GS4I_BATCH_LOOP(b) hidden[c][b] -= q->v[c][b] + reach.ahead * q->a[c][b];
+    gs4i_from_lanes(hidden[0], hidden[1], hidden[2], hidden[3], out);
+    memcpy(p->hidden + 4 * i, out, 4 * (size_t)n * sizeof *out);
+}
+
 /* S4 and S5: L~ = sum v_i (x) grad w, J~ and stress there, and f_i = - sum V sigma grad w + sum w m g. */
 static void gs4i_scatter_stage(const gs4i_pass *pass, int index, gs4i_warmth *warmth)
 {
@@ -6806,6 +6823,7 @@ static void gs4i_scatter_stage(const gs4i_pass *pass, int index, gs4i_warmth *wa
             gs4i_gather_local(nodes + 4 * s.base[b], &s, b, &w, &d, &v);
         }
         if (ghosts) gs4i_make_odd(ghosts, n, 0, &v);
+        if (p.with_fading) gs4i_store_hidden(&p, i, n, rule.reach, &q, v.value);
         gs4i_gradient_lanes(v.dx, v.dy, v.dz, n, L);
         gs4i_take_laws(sim->laws, sim->frozen, &p, i, n, &laws);
         if (warmth) gs4i_begin_warmth(&p, i, n, sim->warm.reach.ahead, &laws, warmth);
@@ -6869,10 +6887,10 @@ GS4I_INLINE void gs4i_unseen(const gs4i_wide *filled, gs4i_wide *unseen)
 }
 
 /* What nodes and contact say to a batch in S7. */
-typedef struct gs4i_corrections { gs4i_lanes U[4] /* and mass there */, A[4], jump[4] /* and the share of images */; gs4i_gradient L; } gs4i_corrections;
+typedef struct gs4i_corrections { gs4i_lanes U[4] /* and mass there */, A[4], jump[4] /* and the share of images */, hidden[4]; gs4i_gradient L; } gs4i_corrections;
 
-/* S7. Velocity by rule 1, the motion that the grid cannot see (v - U) decaying at its rate k, implicit in itself; J by 2021
- * (57), implicit in J for known div u; position by rule 1 with the grid's velocity U. In: move is dx/dt; out: what the new
+/* S7. Velocity by rule 1, the motion that the grid cannot see fading: v~ - V at the rate 1/flip_decay_time, in spray and at walls v - U
+ * faster, implicit in itself; J by 2021 (57), implicit in J for known div u; position by rule 1 with the grid's velocity U. In: move is dx/dt; out: what the new
  * dx/dt lags behind v - shift a. */
 GS4I_INLINE void gs4i_correct_batch(gs4i_rule r, const gs4i_corrections *k, gs4i_batch *q)
 {
@@ -6882,17 +6900,17 @@ GS4I_INLINE void gs4i_correct_batch(gs4i_rule r, const gs4i_corrections *k, gs4i
         const gs4i_wide filled = k->U[3][b] * r.inv_full;
         gs4i_wide unseen;
         gs4i_unseen(&filled, &unseen);
-        decay[b] = r.decay + (unseen + k->jump[3][b]) * r.fast_decay;
+        decay[b] = (unseen + k->jump[3][b]) * r.fast_decay;
         damped[b] = GS4I_C(1) / (GS4I_C(1) + r.s * decay[b]);
     }
     for (c = 0; c < 3; c++)
         GS4I_BATCH_LOOP(b) {
             const gs4i_wide v = q->v[c][b], a = q->a[c][b], move = q->move[c][b] + k->jump[c][b];
-            const gs4i_wide stage_a = (k->A[c][b] + decay[b] * (k->U[c][b] - (v + r.before * a))) * damped[b];
+            const gs4i_wide stage_a = (k->A[c][b] + r.fade * k->hidden[c][b] + decay[b] * (k->U[c][b] - (v + r.before * a))) * damped[b];
             const gs4i_wide da = (stage_a - a) * r.inv_alpha_m, change = (k->U[c][b] - move) * r.inv_alpha_m;
             q->v[c][b] = ((v + r.dt * a) + r.gamma * r.dt * da) + k->jump[c][b];
             q->a[c][b] = a + da;
-            if (r.fading > 0) q->v[c][b] -= r.fading * (v + r.before * a + r.s * stage_a - k->U[c][b]);
+            if (r.fading > 0) q->v[c][b] += r.fading * k->hidden[c][b];
             q->x[c][b] = (q->x[c][b] + r.dt * move) + r.gamma * r.dt * change;
             q->move[c][b] = (q->v[c][b] - (move + change)) - r.next_shift * q->a[c][b];
         }
@@ -7107,9 +7125,8 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_warm
     gs4i_tile_load(grid, o, report->rows, grid->momentum, u_nodes);
     gs4i_tile_load(grid, o, report->rows, grid->force, a_nodes);
     gs4i_see_nothing(&seen);
-    memset(&laws, 0, sizeof laws);
-    memset(&past, 0, sizeof past);
-    memset(k.jump, 0, sizeof k.jump);
+    memset(&laws, 0, sizeof laws); memset(&past, 0, sizeof past);
+    memset(&k, 0, sizeof k);
     if (warmth) gs4i_load_warmth(sim, o, warmth);
     for (; i < end; i += GS4I_BATCH, row += 2) {
         const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
@@ -7132,6 +7149,7 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_warm
         gs4i_gradient_lanes(u.dx, u.dy, u.dz, n, k.L);
         gs4i_to_lanes(acc.value, n, k.A);
         if (jumps) gs4i_to_lanes(jump.value, n, k.jump);
+        if (p.with_fading) gs4i_to_lanes(p.hidden + 4 * i, n, k.hidden);
         gs4i_correct_batch(rule, &k, &q);
         if (p.deformation_reals) gs4i_take_kicks(&acc, jumps ? &jump : NULL, n, &kicks);
         if (p.elastic_reals || p.deformation_reals || warmth) gs4i_advance_history(sim, i, n, &laws, &past, warmth, k.L, &kicks, q.v[3], report, commit);
@@ -8060,6 +8078,7 @@ static gs4_real gs4i_mixing(const gs4i_rule *k)
 static gs4i_rule gs4i_make_rule(const gs4_sim *sim, gs4_real dt)
 {
     const gs4_real r = sim->desc.rho_inf, s = sim->desc.rho_inf_spurious;
+    gs4_real most;
     gs4i_rule k;
     int i;
     k.dt = dt;
@@ -8076,6 +8095,8 @@ static gs4i_rule gs4i_make_rule(const gs4_sim *sim, gs4_real dt)
     k.damped = 1 / (1 + k.s * k.decay);
     k.fading = 0;
     if (k.decay * dt > 1) { k.fading = 1 - k.damped; k.decay = 0; k.damped = 1; }
+    most = GS4I_C(3.2) * (1 - r * s) / ((3 + r + s - r * s) * dt);
+    k.fade = k.decay * most * (most + k.decay) / gs4i_max(most * most + k.decay * (most + k.decay), GS4I_TINY);
     k.inv_area = sim->grid.inv_h * sim->grid.inv_h;
     k.mixing = sim->particles.with_rates ? gs4i_mixing(&k) : GS4I_C(0.5) / k.s;
     k.inv_alpha_m = 1 / k.alpha_m;
@@ -8855,7 +8876,7 @@ static int gs4i_save(gs4_sim *sim, const char *path)
     gs4i_file_put(&f, sim->laws, (size_t)sim->material_count * sizeof *sim->laws);
     gs4i_file_put(&f, sim->boundary.bodies, (size_t)sim->boundary.body_count * sizeof *sim->boundary.bodies);
     gs4i_file_put(&f, sim->emitters, (size_t)sim->emitter_count * sizeof *sim->emitters);
-    for (k = 0; k < GS4I_ARRAYS - 1; k++)
+    for (k = 0; k < GS4I_STATE_ARRAYS; k++)
         if (a[k].wanted) gs4i_file_put(&f, *a[k].data, (size_t)sim->particles.count * a[k].size);
     gs4i_file_put(&f, sim->grid.occupied_block, (size_t)sim->grid.occupied * sizeof *sim->grid.occupied_block);
     gs4i_file_put(&f, sim->grid.first, ((size_t)sim->grid.occupied + 1) * sizeof *sim->grid.first);
@@ -8894,7 +8915,7 @@ static int gs4i_check_head(gs4_sim *sim, const gs4i_head *h)
 }
 
 /* The pieces of a checkpoint in the order of the file, and where they are in memory. */
-enum { GS4I_PIECES = GS4I_ARRAYS + 7 };
+enum { GS4I_PIECES = GS4I_STATE_ARRAYS + 8 };
 typedef struct gs4i_pieces { size_t size[GS4I_PIECES]; const unsigned char *at[GS4I_PIECES]; } gs4i_pieces;
 enum { GS4I_PIECE_LAWS, GS4I_PIECE_BODIES, GS4I_PIECE_EMITTERS, GS4I_PIECE_OCCUPIED, GS4I_PIECE_FIRST, GS4I_PIECE_BLOCKS, GS4I_PIECE_MEMORY, GS4I_PIECE_PARTICLES };
 
@@ -8915,7 +8936,7 @@ static size_t gs4i_piece_sizes(gs4_sim *sim, const gs4i_head *h, gs4i_pieces *p)
     p->size[GS4I_PIECE_FIRST] = (size_t)h->occupied * 4 + 4;
     p->size[GS4I_PIECE_BLOCKS] = (size_t)h->active * 4;
     if (sim->particles.with_rates) p->size[GS4I_PIECE_MEMORY] = (size_t)h->active * GS4I_NODE_REALS * sizeof(gs4_real);
-    for (k = 0; k < GS4I_ARRAYS - 1; k++)
+    for (k = 0; k < GS4I_STATE_ARRAYS; k++)
         if (a[k].wanted) p->size[GS4I_PIECE_PARTICLES + k] = (size_t)h->particles * a[k].size;
     for (k = 0; k < GS4I_PIECES; k++) sum += p->size[k];
     return sum;
@@ -9010,7 +9031,7 @@ static int gs4i_rebuild(gs4_sim *next, const gs4i_head *h, const gs4i_pieces *p)
     gs4i_grid_link(g);
     if (gs4i_after_occupy(next) != GS4_OK) return GS4_ERROR_MEMORY;
     gs4i_particle_arrays(&next->particles, a);
-    for (k = 0; k < GS4I_ARRAYS - 1; k++)
+    for (k = 0; k < GS4I_STATE_ARRAYS; k++)
         if (a[k].wanted && h->particles) memcpy(*a[k].data, p->at[GS4I_PIECE_PARTICLES + k], p->size[GS4I_PIECE_PARTICLES + k]);
     for (k = 0; k < h->particles; k++) if (next->particles.material[k] >= next->material_count) return GS4_ERROR_FORMAT;
     next->particles.count = h->particles;
@@ -9037,7 +9058,8 @@ static int gs4i_restore(gs4_sim *sim, const gs4i_head *h, const gs4i_pieces *p)
     gs4i_grid empty = sim->grid;
     int i, result;
     memset(&next.particles, 0, sizeof next.particles);
-    next.particles.with_rates = sim->particles.with_rates; next.particles.elastic_reals = h->elastic_reals;
+    next.particles.with_rates = sim->particles.with_rates; next.particles.with_fading = sim->particles.with_fading;
+    next.particles.elastic_reals = h->elastic_reals;
     next.particles.deformation_reals = h->deformation_reals;
     next.particles.with_heat = sim->particles.with_heat; next.particles.with_flux = sim->particles.with_flux;
     memset(&next.grid, 0, sizeof next.grid);
@@ -9081,7 +9103,7 @@ static int gs4i_load_body(gs4_sim *sim, FILE *f, const gs4i_head *h, unsigned ch
     if (fread(data, 1, size, f) != size) return gs4i_fail(sim, ferror(f) ? GS4_ERROR_IO : GS4_ERROR_FORMAT, "the checkpoint is cut off");
     if (fread(&more, 1, 1, f) == 1) return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint has something behind its end");
     for (k = 0; k < 3; k++) sequence[n++] = order[k];
-    for (k = 0; k < GS4I_ARRAYS - 1; k++) sequence[n++] = GS4I_PIECE_PARTICLES + k;
+    for (k = 0; k < GS4I_STATE_ARRAYS; k++) sequence[n++] = GS4I_PIECE_PARTICLES + k;
     for (k = 0; k < 4; k++) sequence[n++] = after[k];
     hash = gs4i_hash_bytes(0, h, sizeof *h);
     for (k = 0; k < n; k++) {                               /* over the same pieces as when it was saved */
@@ -9525,6 +9547,7 @@ static int gs4i_init(gs4_sim *sim)
     sim->boundary.h = g->h;
     memcpy(sim->boundary.walls, d->walls, sizeof d->walls);
     sim->particles.with_rates = d->integrator == GS4_INTEGRATOR_GS4;
+    sim->particles.with_fading = sim->particles.with_rates && gs4i_finite(d->flip_decay_time);
     sim->afresh = sim->unsorted = sim->unseen = 1;
     sim->tasks.parallel_for = d->parallel_for; sim->tasks.user = d->parallel_user;
     g->table = (int32_t *)gs4i_alloc(&sim->memory, g->table_count, sizeof *g->table);

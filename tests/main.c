@@ -27,6 +27,7 @@ int main(int count, char **values)
     RUN(test_couette);
     RUN(test_couette_surface);
     RUN(test_sticky_askew);
+    RUN(test_sticky_pipe);
     RUN_ONCE(test_column_at_rest);
     RUN(test_sound_speed);
     RUN(test_drop_at_rest);

@@ -100,7 +100,7 @@ static void test_spin(void)
     CHECK(spin_kept(GS4_INTEGRATOR_SYMPLECTIC_EULER, 0) > 0.99);
 }
 
-#define MOMENTUM_ROUNDING (sizeof(gs4_real) == 8 ? 2e-15 : 2.5 * (double)FLT_EPSILON)
+#define MOMENTUM_ROUNDING (sizeof(gs4_real) == 8 ? 4e-15 : 2.5 * (double)FLT_EPSILON)
 
 /* A drop that breathes, shears and turns, off to the right at speed `drift`, far from walls: what 100 steps of half the limit change of
  * its momentum, over sum m |v|. *spin, *t: what is left of its angular momentum, and when. */
@@ -137,12 +137,12 @@ static double momentum_lost(gs4_integrator integrator, double decay, double drif
     return worst;
 }
 
-/* Exact where particles fade by no rate; else what the grid's memory of accelerations costs, which falls with dt and grows with drift. */
+/* To rounding, whatever fades and however fast: what the grid does not see of velocities has no momentum in all. */
 static void test_momentum(void)
 {
-    const double drifts[2] = { 0, 1 };
+    const double drifts[2] = { 0, 1 }, decays[3] = { 0.5, 0.02, 1e-4 };     /* the last within a step */
     double spin, t, lost;
-    int i;
+    int i, k;
     for (i = 0; i < 2; i++) {
         lost = momentum_lost(GS4_INTEGRATOR_SYMPLECTIC_EULER, 0, drifts[i], GS4_WALL_SLIP, &spin, &t);
         if (test_filter[0]) printf("drift %g, symplectic Euler: momentum within %.1e, spin kept %.4f in %.2f s\n", drifts[i], lost, spin, t);
@@ -150,9 +150,11 @@ static void test_momentum(void)
         lost = momentum_lost(GS4_INTEGRATOR_GS4, (double)INFINITY, drifts[i], GS4_WALL_SLIP, &spin, &t);
         if (test_filter[0]) printf("drift %g, no decay: momentum within %.1e, spin kept %.4f in %.2f s\n", drifts[i], lost, spin, t);
         CHECK(lost < MOMENTUM_ROUNDING); CHECK(spin > 0.99);
-        lost = momentum_lost(GS4_INTEGRATOR_GS4, 0.5, drifts[i], GS4_WALL_SLIP, &spin, &t);
-        if (test_filter[0]) printf("drift %g, decay 0.5 s: momentum within %.1e, spin kept %.4f in %.2f s\n", drifts[i], lost, spin, t);
-        CHECK(lost < (i == 0 ? 3e-5 : 3e-4)); CHECK(spin > 0.8);     /* and that is far more than exp(-t / 0.5) */
+        for (k = 0; k < 3; k++) {
+            lost = momentum_lost(GS4_INTEGRATOR_GS4, decays[k], drifts[i], GS4_WALL_SLIP, &spin, &t);
+            if (test_filter[0]) printf("drift %g, decay %g s: momentum within %.1e, spin kept %.4f in %.2f s\n", drifts[i], decays[k], lost, spin, t);
+            CHECK(lost < MOMENTUM_ROUNDING); CHECK(k == 2 || spin > exp(-t / decays[k])); CHECK(k > 0 || spin > 0.8);
+        }
     }
 }
 
@@ -435,7 +437,8 @@ static double couette_error(int n, gs4_integrator integrator, double gap, double
     return sqrt(sum / weight);
 }
 
-/* Second order in space, with the surface just in front of a plane of nodes, midway between two, and just behind one. */
+/* Second order in space, with the surface at a plane of nodes and midway between two; a tenth of a cell before one, where the filling leaves a gap
+ * that is no multiple of h, only the error is held. */
 static void test_couette(void)
 {
     static const double gaps[3] = { 0.01, 0.51, 0.4 }, times[2] = { 0.1, 0.4 };
@@ -457,16 +460,31 @@ static void test_couette(void)
  * space before it, and within 0.7 where the filling leaves out half a row. */
 static void test_couette_surface(void)
 {
-    static const double gaps[6] = { 0.01, 0.24, 0.49, 0.51, 0.7, 0.8 };
+    static const double gaps[7] = { 0.01, 0.24, 0.25, 0.49, 0.51, 0.7, 0.8 };
     double off;
     int i, k;
     for (i = 0; i < 2; i++)
-        for (k = 0; k < 6; k++) {
+        for (k = 0; k < 7; k++) {
             couette_error(8, physics_integrators[i], gaps[k], 1, &off);
             if (test_filter[0]) printf("Couette, integrator %d: nodes %.2f cells before the body: wall %+.2f cells behind its surface\n",
                                        (int)physics_integrators[i], 0.5 - gaps[k], off);
-            CHECK_CLOSE(off, 0, gaps[k] == 0.8 ? 0.7 : 0.25);
+            CHECK_CLOSE(off, 0, k == 2 || k == 6 ? 0.7 : 0.25);
         }
+}
+
+/* All nodes that a body which lies askew and is 1.5 cells thick can reach have its velocity, wherever they are in their blocks. */
+static void sticky_holds(gs4_sim *sim, gs4_vec3 origin, gs4_vec3 velocity)
+{
+    int s, i, held = 0, free = 0;
+    for (s = 0; s < sim->grid.active; s++)
+        for (i = 0; i < 64; i++) {
+            const gs4_real *u = sim->grid.momentum + 4 * ((size_t)s * 64 + (size_t)i);
+            const gs4_vec3 p = gs4i_node_position(&sim->grid, s, i);
+            const double away = ((double)(p.x - origin.x) + (double)(p.y - origin.y) + (double)(p.z - origin.z)) / sqrt(3.0) * 24;
+            if (!(u[3] > 0) || fabs(away + 0.75) > 1.49) continue;
+            if (u[0] == velocity.x && u[1] == velocity.y && u[2] == velocity.z) held++; else free++;
+        }
+    CHECK(held > 50); CHECK(free == 0);
 }
 
 /* Liquid that goes with a sticky body which lies askew, moves along itself or turns about its normal, goes on with it; and a body
@@ -505,6 +523,7 @@ static void test_sticky_askew(void)
             }
         }
         for (k = 0; k < 10; k++) CHECK_RESULT(sim, gs4_step(sim, gs4_stable_dt(sim) / 2), GS4_OK);
+        if (thin && !turning) sticky_holds(sim, origin, body.velocity);
         x = gs4_particles(sim, GS4_FIELD_POSITION); v = gs4_particles(sim, GS4_FIELD_VELOCITY);
         for (k = 0; k < x.count; k++) {
             const gs4_real *p = x.data + (size_t)k * (size_t)x.stride, *u = v.data + (size_t)k * (size_t)v.stride;
@@ -516,6 +535,48 @@ static void test_sticky_askew(void)
         }
         if (test_filter[0]) printf("integrator %d, turning %d, thin %d: %d near, off by %.2e of the speed\n", i, turning, thin, near, worst / speed);
         CHECK(near > 40); CHECK(worst < (turning ? 0.03 : 1e-5) * speed);
+        gs4_destroy(sim);
+    }
+}
+
+/* A pipe whose wall is 2 to 3.5 cells thick, so that around it images and held nodes take turns. */
+static gs4_real uneven_pipe(gs4_vec3 p, void *user)
+{
+    const double x = ((double)p.x - 0.5) * 24, y = ((double)p.y - 0.5) * 24, r = sqrt(x * x + y * y);
+    (void)user;
+    return (gs4_real)(fmax(6.3 - r, r - 6.3 - (2.75 + 0.75 * cos(4 * atan2(y, x)))) / 24);
+}
+
+/* Liquid that turns in it slows down; none of it is driven. */
+static void test_sticky_pipe(void)
+{
+    int i, k;
+    for (k = 0; k < (test_slow ? 2 : 1); k++) {
+        gs4_sim_desc d = scene_cube(24);
+        const gs4_material m = scene_liquid(1000, (gs4_real)0.5, 20);
+        const gs4_fill f = scene_fill(at(0, 0, 0));
+        gs4_collider body;
+        gs4_edit v;
+        gs4_view x;
+        gs4_sim *sim;
+        double energy, fastest;
+        d.cells[2] = 4; d.walls[4] = d.walls[5] = GS4_WALL_PERIODIC; d.integrator = physics_integrators[k];
+        sim = physics_create(&d, &m);
+        memset(&body, 0, sizeof body);
+        body.shape = gs4_sdf(uneven_pipe, NULL, at(0, 0, -1), at(1, 1, 2)); body.contact = GS4_WALL_STICK;
+        CHECK(gs4_add_collider(sim, &body) == 0);
+        CHECK(gs4_add_particles(sim, gs4_cylinder(at(0.5, 0.5, -1), at(0.5, 0.5, 2), (gs4_real)(6.29 / 24)), &f) > 0);
+        x = gs4_particles(sim, GS4_FIELD_POSITION); v = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
+        for (i = 0; i < x.count; i++) {
+            const gs4_real *p = x.data + (size_t)i * (size_t)x.stride;
+            v.data[(size_t)i * (size_t)v.stride] = 4 * ((gs4_real)0.5 - p[1]); v.data[(size_t)i * (size_t)v.stride + 1] = 4 * (p[0] - (gs4_real)0.5);
+        }
+        energy = gs4_get_stats(sim).kinetic_energy; fastest = (double)gs4_get_stats(sim).max_speed;
+        for (i = 0; i < 6; i++) {
+            CHECK(physics_run(sim, 0.05 * (i + 1)) == 0);
+            if (test_filter[0]) printf("integrator %d, t %g: energy %.3f of the first, fastest %.3f\n", (int)d.integrator, 0.05 * (i + 1), gs4_get_stats(sim).kinetic_energy / energy, (double)gs4_get_stats(sim).max_speed / fastest);
+            CHECK(gs4_get_stats(sim).kinetic_energy < (i ? 0.5 : 0.6) * energy); CHECK((double)gs4_get_stats(sim).max_speed < fastest);
+        }
         gs4_destroy(sim);
     }
 }

@@ -5711,13 +5711,14 @@ static int gs4i_body_hold(const gs4i_body *b, gs4_vec3 p, gs4_real h, gs4_real d
  * that leads further in is lost. */
 static void gs4i_put_back(const gs4i_boundary *b, const gs4i_grid *g, gs4_real x[3], gs4_real v[3])
 {
-    int i, a, pass;
-    for (pass = 0; pass < 2; pass++)                        /* two bodies may meet */
-        for (i = 0; i < b->body_count; i++) {
+    int i, a, pass, moved = 1;
+    for (pass = 0; pass < 2 && moved; pass++)               /* two bodies may meet */
+        for (moved = 0, i = 0; i < b->body_count; i++) {
             const gs4i_body *body = &b->bodies[i];
             gs4_vec3 p = gs4i_vec3(x[0], x[1], x[2]), n, rel;
-            gs4_real d = gs4i_body_distance(body, p), into;
-            if (!(d < 0) || body->is_mouth) continue;
+            gs4_real d = body->is_mouth ? GS4I_C(0) : gs4i_body_distance(body, p), into;
+            if (!(d < 0)) continue;
+            moved = 1;
             d = gs4i_max(d, -2 * g->h);                     /* no farther than that in a step */
             n = gs4i_body_normal(body, p, GS4I_C(0.1) * g->h);
             rel = gs4i_sub(gs4i_vec3(v[0], v[1], v[2]), gs4i_body_velocity(body, p));
@@ -6770,6 +6771,12 @@ static void gs4i_add_warmth(const gs4_sim *sim, int o, const gs4i_warmth *w)
     if (sim->conduction.source) gs4i_tile_add(&sim->grid, o, sim->reports[o].rows, w->source, sim->conduction.source);
 }
 
+GS4I_INLINE void gs4i_prefetch_hidden(const gs4i_particles *p, size_t i)
+{
+    int b;
+    for (b = 0; b < 4 * GS4I_BATCH && i < (size_t)p->count; b += 16) GS4I_PREFETCH(p->hidden + 4 * i + b);
+}
+
 /* V - v~ of n particles, of which V = sum w v_i was gathered. Their momenta sum up to none. */
 GS4I_INLINE void gs4i_store_hidden(const gs4i_particles *p, size_t i, int n, gs4i_reach reach, const gs4i_batch *q, const gs4_real *V)
 {
@@ -6779,6 +6786,7 @@ GS4I_INLINE void gs4i_store_hidden(const gs4i_particles *p, size_t i, int n, gs4
     gs4i_to_lanes(V, n, hidden);
     for (c = 0; c < 3; c++) GS4I_BATCH_LOOP(b) hidden[c][b] -= q->v[c][b] + reach.ahead * q->a[c][b];
     gs4i_from_lanes(hidden[0], hidden[1], hidden[2], hidden[3], out);
+    gs4i_prefetch_hidden(p, i + 4 * GS4I_BATCH);
     memcpy(p->hidden + 4 * i, out, 4 * (size_t)n * sizeof *out);
 }
 
@@ -7149,7 +7157,7 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_warm
         gs4i_gradient_lanes(u.dx, u.dy, u.dz, n, k.L);
         gs4i_to_lanes(acc.value, n, k.A);
         if (jumps) gs4i_to_lanes(jump.value, n, k.jump);
-        if (p.with_fading) gs4i_to_lanes(p.hidden + 4 * i, n, k.hidden);
+        if (p.with_fading) { gs4i_prefetch_hidden(&p, i + 4 * GS4I_BATCH); gs4i_to_lanes(p.hidden + 4 * i, n, k.hidden); }
         gs4i_correct_batch(rule, &k, &q);
         if (p.deformation_reals) gs4i_take_kicks(&acc, jumps ? &jump : NULL, n, &kicks);
         if (p.elastic_reals || p.deformation_reals || warmth) gs4i_advance_history(sim, i, n, &laws, &past, warmth, k.L, &kicks, q.v[3], report, commit);

@@ -893,6 +893,31 @@ static gs4_real gs4i_shape_distance(const gs4_shape *s, gs4_vec3 p)
     return GS4I_HUGE;
 }
 
+/* Is the shape nothing but a half space for all points within `reach` of p that are not deeper in it than `deep`? Then its outward unit
+ * normal. Planes, faces of boxes and ends of cylinders are, where no edge is near and the far side is twice as deep. */
+static int gs4i_shape_is_flat(const gs4_shape *s, gs4_vec3 p, gs4_real reach, gs4_real deep, gs4_vec3 *normal)
+{
+    if (s->kind == GS4_SHAPE_BOX) {
+        const gs4_vec3 r = gs4i_sub(p, gs4i_scale(gs4i_add(s->a, s->b), GS4I_C(0.5)));
+        const gs4_real at[3] = { r.x, r.y, r.z }, size[3] = { s->b.x - s->a.x, s->b.y - s->a.y, s->b.z - s->a.z };
+        gs4_real n[3] = { 0, 0, 0 };
+        int a, face = 0;
+        for (a = 1; a < 3; a++) if (gs4i_abs(at[a]) - size[a] / 2 > gs4i_abs(at[face]) - size[face] / 2) face = a;
+        for (a = 0; a < 3; a++) if (a != face && gs4i_abs(at[a]) + reach + deep > size[a] / 2) return 0;
+        n[face] = at[face] < 0 ? GS4I_C(-1) : GS4I_C(1);
+        *normal = gs4i_vec3(n[0], n[1], n[2]);
+        return size[face] > 2 * deep;
+    }
+    if (s->kind == GS4_SHAPE_CYLINDER) {
+        const gs4_vec3 axis = gs4i_sub(s->b, s->a), r = gs4i_sub(p, gs4i_scale(gs4i_add(s->a, s->b), GS4I_C(0.5)));
+        const gs4_real length = gs4i_length(axis), along = gs4i_dot(r, axis) / length;
+        *normal = gs4i_scale(axis, (along < 0 ? GS4I_C(-1) : GS4I_C(1)) / length);
+        return gs4i_length(gs4i_sub(r, gs4i_scale(axis, along / length))) + reach + deep < s->radius && length > 2 * deep;
+    }
+    *normal = s->b;
+    return s->kind == GS4_SHAPE_PLANE;
+}
+
 /* Box around a shape; a plane has none and takes the box given. */
 static void gs4i_shape_bounds(const gs4_shape *s, gs4_vec3 *low, gs4_vec3 *high)
 {
@@ -5302,14 +5327,26 @@ static gs4_real gs4i_shape_or_field(const gs4i_body *b, gs4_vec3 p)
     return b->field.distance ? gs4i_field_distance(&b->field, p) : gs4i_shape_distance(&b->is.shape, p);
 }
 
-/* Signed distance (m) from the body's surface to the world point p. */
-static gs4_real gs4i_body_distance(const gs4i_body *b, gs4_vec3 p)
+/* World point p in the coordinates of the shape. */
+static gs4_vec3 gs4i_to_body(const gs4i_body *b, gs4_vec3 p)
 {
     const gs4_real *r = b->axes;
     gs4_vec3 d = gs4i_sub(p, gs4i_vec3(GS4I_C(b->at[0]), GS4I_C(b->at[1]), GS4I_C(b->at[2])));
-    gs4_vec3 q = gs4i_add(gs4i_vec3(r[0] * d.x + r[3] * d.y + r[6] * d.z, r[1] * d.x + r[4] * d.y + r[7] * d.z,
-                                    r[2] * d.x + r[5] * d.y + r[8] * d.z), b->is.pivot);
-    return gs4i_shape_or_field(b, q);
+    return gs4i_add(gs4i_vec3(r[0] * d.x + r[3] * d.y + r[6] * d.z, r[1] * d.x + r[4] * d.y + r[7] * d.z,
+                              r[2] * d.x + r[5] * d.y + r[8] * d.z), b->is.pivot);
+}
+
+/* Signed distance (m) from the body's surface to the world point p. */
+static gs4_real gs4i_body_distance(const gs4i_body *b, gs4_vec3 p) { return gs4i_shape_or_field(b, gs4i_to_body(b, p)); }
+
+/* gs4i_shape_is_flat for a body, of world points. */
+static int gs4i_body_is_flat(const gs4i_body *b, gs4_vec3 p, gs4_real reach, gs4_real deep, gs4_vec3 *normal)
+{
+    const gs4_real *r = b->axes;
+    gs4_vec3 n;
+    if (!gs4i_shape_is_flat(&b->is.shape, gs4i_to_body(b, p), reach, deep, &n)) return 0;
+    *normal = gs4i_vec3(r[0] * n.x + r[1] * n.y + r[2] * n.z, r[3] * n.x + r[4] * n.y + r[5] * n.z, r[6] * n.x + r[7] * n.y + r[8] * n.z);
+    return 1;
 }
 
 /* Outward unit normal: gradient of the distance over `step`; zero where it has none. */
@@ -6375,20 +6412,51 @@ static int gs4i_slot_of(const gs4i_grid *g, const gs4_real p[3])
     return g->table[gs4i_block_number(g, at[0], at[1], at[2])] - 1;
 }
 
+/* A flat surface near a block: all of the sticky bodies that its particles are near. */
+typedef struct gs4i_face { const gs4i_body *body; gs4_vec3 at, n; gs4_real d; } gs4i_face;     /* distance d at the midst of the block; body NULL: none */
+
+#define GS4I_BLOCK_REACH GS4I_C(5.2)    /* cells: half the diagonal of a block, and a cell that particles may be outside of it */
+
+static gs4i_face gs4i_find_face(const gs4_sim *sim, int o)
+{
+    const gs4_real h = sim->grid.h, reach = GS4I_BLOCK_REACH * h, deep = GS4I_GHOST_NODES * h;
+    gs4i_face f;
+    int i, near = 0;
+    memset(&f, 0, sizeof f);                                /* gs4i_place_ghost reads d and n */
+    f.at = gs4i_block_midst(&sim->grid, sim->grid.occupied_block[o]);
+    for (i = 0; i < sim->boundary.body_count; i++) {
+        const gs4i_body *b = &sim->boundary.bodies[i];
+        const gs4_real d = gs4i_is_sticky(b) ? gs4i_body_distance(b, f.at) : GS4I_HUGE;
+        if (d < reach + GS4I_GHOST_REACH * h) { near++; f.d = d; f.body = b; }
+    }
+    if (near != 1 || !gs4i_body_is_flat(f.body, f.at, reach, deep, &f.n)) f.body = NULL;
+    return f;
+}
+
+/* The sticky body near p, NULL if there is none, how far p is from it and its outward normal there. */
+static const gs4i_body *gs4i_find_surface(const gs4_sim *sim, gs4_vec3 p, gs4_real *d, gs4_vec3 *n)
+{
+    const gs4_real step = GS4I_C(0.1) * sim->grid.h;
+    const gs4i_body *body = gs4i_nearest_sticky(&sim->boundary, p, GS4I_GHOST_REACH * sim->grid.h, d);
+    if (!body) return NULL;
+    *n = gs4i_vec3(gs4i_body_distance(body, gs4i_vec3(p.x + step, p.y, p.z)) - *d, gs4i_body_distance(body, gs4i_vec3(p.x, p.y + step, p.z)) - *d,
+                   gs4i_body_distance(body, gs4i_vec3(p.x, p.y, p.z + step)) - *d);
+    if (!(gs4i_length(*n) > 0)) return NULL;
+    *n = gs4i_scale(*n, 1 / gs4i_length(*n));
+    return body;
+}
+
 /* The image of a particle at p. It can be had where the body is flat and thick enough: a point as deep behind the surface, at most one and a half
  * cells, is as deep in the body, within a quarter of a cell. One that would stick out on the far side is left out. */
-static void gs4i_place_ghost(const gs4_sim *sim, gs4_vec3 p, gs4i_ghost *g)
+static void gs4i_place_ghost(const gs4_sim *sim, gs4_vec3 p, const gs4i_face *face, gs4i_ghost *g)
 {
-    const gs4_real h = sim->grid.h, step = GS4I_C(0.1) * h;
-    gs4_real d = 0, deep;
-    const gs4i_body *body = gs4i_nearest_sticky(&sim->boundary, p, GS4I_GHOST_REACH * h, &d);
-    gs4_vec3 n, foot, image, v;
+    const gs4_real h = sim->grid.h, deep = GS4I_GHOST_NODES * h;
+    gs4_real d = face->d + gs4i_dot(face->n, gs4i_sub(p, face->at));
+    gs4_vec3 n = face->n, foot, image, v;
+    const int flat = face->body && d > -deep;
+    const gs4i_body *body = !flat ? gs4i_find_surface(sim, p, &d, &n) : d < GS4I_GHOST_REACH * h ? face->body : NULL;
     g->kind = GS4I_GHOST_NONE;
     if (!body) return;
-    n = gs4i_vec3(gs4i_body_distance(body, gs4i_vec3(p.x + step, p.y, p.z)) - d, gs4i_body_distance(body, gs4i_vec3(p.x, p.y + step, p.z)) - d,
-                  gs4i_body_distance(body, gs4i_vec3(p.x, p.y, p.z + step)) - d);
-    if (!(gs4i_length(n) > 0)) return;
-    n = gs4i_scale(n, 1 / gs4i_length(n));
     foot = gs4i_sub(p, gs4i_scale(n, d));
     image = gs4i_sub(foot, gs4i_scale(n, d));
     v = gs4i_body_velocity(body, foot);
@@ -6397,12 +6465,11 @@ static void gs4i_place_ghost(const gs4_sim *sim, gs4_vec3 p, gs4i_ghost *g)
     g->v[0] = v.x; g->v[1] = v.y; g->v[2] = v.z;
     g->spin[0] = body->is.angular_velocity.x; g->spin[1] = body->is.angular_velocity.y; g->spin[2] = body->is.angular_velocity.z;
     g->share = gs4i_max(gs4i_min(GS4I_GHOST_NODES - d * sim->grid.inv_h, 1), 0);
-    deep = GS4I_GHOST_NODES * h;
-    if (d > -GS4I_C(0.5) * h && gs4i_abs(gs4i_body_distance(body, gs4i_sub(foot, gs4i_scale(n, deep))) + deep) < GS4I_C(0.25) * h) {
+    if (d > -GS4I_C(0.5) * h && (flat || gs4i_abs(gs4i_body_distance(body, gs4i_sub(foot, gs4i_scale(n, deep))) + deep) < GS4I_C(0.25) * h)) {
         const gs4_real nearer[3] = { image.x + h * n.x, image.y + h * n.y, image.z + h * n.z };
         g->slot = gs4i_slot_of(&sim->grid, g->x);
         if (g->slot < 0) g->slot = gs4i_slot_of(&sim->grid, nearer);    /* a tile has room for a cell around its block */
-        if (g->slot >= 0 && (d < deep || gs4i_body_distance(body, image) < 0)) g->kind = GS4I_GHOST_IMAGE;
+        if (g->slot >= 0 && (flat || d < deep || gs4i_body_distance(body, image) < 0)) g->kind = GS4I_GHOST_IMAGE;
         return;
     }
     if (d > (GS4I_STICKY_REACH + GS4I_GHOST_NODES) * h) return;     /* of nodes that would be held it sees next to nothing */
@@ -6424,6 +6491,7 @@ static void gs4i_place_ghosts(int index, void *context)
     const gs4i_particles *p = &sim->particles;
     const gs4_real ahead = sim->rule.reach.ahead;
     gs4i_ghost *g = gs4i_ghosts_of(sim, index);
+    const gs4i_face face = gs4i_find_face(sim, index);
     size_t i = (size_t)sim->grid.first[index], end = (size_t)sim->grid.first[index + 1];
     for (; g && i < end; i += GS4I_BATCH) {
         const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
@@ -6433,7 +6501,7 @@ static void gs4i_place_ghosts(int index, void *context)
         gs4i_load_batch(p, i, n, sim->rule.reach, &q);
         gs4i_predict_positions(&q, sim->rule.reach, x);
         for (b = 0; b < n; b++, g++) {
-            gs4i_place_ghost(sim, gs4i_vec3(GS4I_NTH(x[0], b), GS4I_NTH(x[1], b), GS4I_NTH(x[2], b)), g);
+            gs4i_place_ghost(sim, gs4i_vec3(GS4I_NTH(x[0], b), GS4I_NTH(x[1], b), GS4I_NTH(x[2], b)), &face, g);
             g->x[3] = GS4I_NTH(q.x[3], b);
             memset(g->carried, 0, sizeof g->carried);
             for (c = 0; c < 3; c++) g->carried[0][c] = g->x[3] * (2 * g->v[c] - GS4I_NTH(q.v[c], b) - ahead * GS4I_NTH(q.a[c], b));
@@ -6480,9 +6548,9 @@ static int gs4i_find_ghosts(gs4_sim *sim)
     if (!sticky) return GS4_OK;
     of = (int32_t *)gs4i_scratch_reserve(&sim->memory, &g->of, (size_t)grid->occupied * sizeof *of, 0);
     if (!of) return gs4i_fail_memory(sim);
-    for (o = 0; o < grid->occupied; o++) {                  /* half the diagonal of a block, and a cell that particles may be outside of it */
+    for (o = 0; o < grid->occupied; o++) {
         gs4_real d;
-        of[o] = gs4i_nearest_sticky(&sim->boundary, gs4i_block_midst(grid, grid->occupied_block[o]), (GS4I_C(5.2) + GS4I_GHOST_REACH) * grid->h, &d) ? g->count : -1;
+        of[o] = gs4i_nearest_sticky(&sim->boundary, gs4i_block_midst(grid, grid->occupied_block[o]), (GS4I_BLOCK_REACH + GS4I_GHOST_REACH) * grid->h, &d) ? g->count : -1;
         if (of[o] >= 0) g->count += grid->first[o + 1] - grid->first[o];
     }
     if (!g->count) return GS4_OK;
@@ -6608,6 +6676,13 @@ static void gs4i_scatter_ghosts(gs4_sim *sim, gs4_task_fn kernel)
     if (sim->ghosts.count) gs4i_scatter_by_colour(sim, (const int32_t *)sim->ghosts.slots.data, sim->ghosts.colour_first, kernel);
 }
 
+/* What nodes give to particle n beside velocity; solids want its gradient too. */
+GS4I_INLINE void gs4i_gather_kick(const gs4i_particles *p, const gs4_real *at, const gs4i_stencils *s, int n, const gs4i_row *w, const gs4i_row *d, gs4i_gathered *g)
+{
+    if (p->deformation_reals) gs4i_gather_local(at, s, n, w, d, g);
+    else gs4i_gather_value(at, s, n, w, g->value);
+}
+
 /* What the nodes have of a field at the images, velocity (what 0) or acceleration (1). */
 static void gs4i_gather_ghosts_of(const gs4i_pass *pass, int index, int what)
 {
@@ -6634,8 +6709,10 @@ static void gs4i_gather_ghosts_of(const gs4i_pass *pass, int index, int what)
             gs4i_row w, d;
             if (s.base[b] < 0 || !g[b]->whole || !(g[b]->share > 0)) continue;
             gs4i_x_weights(&s, b, &w, &d);
-            gs4i_gather_local(tile + 4 * s.base[b], &s, b, &w, &d, &u);
+            if (what) gs4i_gather_kick(&sim->particles, tile + 4 * s.base[b], &s, b, &w, &d, &u);
+            else gs4i_gather_local(tile + 4 * s.base[b], &s, b, &w, &d, &u);
             memcpy(g[b]->seen[what][0], u.value + 4 * b, 4 * sizeof *tile);
+            if (what && !sim->particles.deformation_reals) continue;
             memcpy(g[b]->seen[what][1], u.dx + 4 * b, 4 * sizeof *tile);
             memcpy(g[b]->seen[what][2], u.dy + 4 * b, 4 * sizeof *tile);
             memcpy(g[b]->seen[what][3], u.dz + 4 * b, 4 * sizeof *tile);
@@ -6656,31 +6733,41 @@ static void gs4i_gather_ghosts(gs4_sim *sim, gs4_task_fn kernel)
     gs4i_parallel_for(&sim->tasks, pass.count, kernel, &pass);
 }
 
-/* Row c of spin x (I - n n): how the body's velocity changes along its surface. */
-GS4I_INLINE gs4_vec3 gs4i_ghost_turn(const gs4i_ghost *g, int c)
+/* Columns of spin x (I - n n), how the body's velocity changes along its surface. */
+GS4I_INLINE void gs4i_ghost_turn(const gs4i_ghost *g, gs4_real turn[3][3])
 {
-    const gs4_real *w = g->spin, row[3][3] = { { 0, -w[2], w[1] }, { w[2], 0, -w[0] }, { -w[1], w[0], 0 } };
-    const gs4_vec3 r = gs4i_vec3(row[c][0], row[c][1], row[c][2]), n = gs4i_vec3(g->n[0], g->n[1], g->n[2]);
-    return gs4i_sub(r, gs4i_scale(n, gs4i_dot(r, n)));
+    const gs4_real *w = g->spin, *n = g->n;
+    const gs4_real columns[3][3] = { { 0, w[2], -w[1] }, { -w[2], 0, w[0] }, { w[1], -w[0], 0 } };
+    const gs4_real across[3] = { w[1] * n[2] - w[2] * n[1], w[2] * n[0] - w[0] * n[2], w[0] * n[1] - w[1] * n[0] };
+    int a, c;
+    for (a = 0; a < 3; a++) for (c = 0; c < 3; c++) turn[a][c] = columns[a][c] - across[c] * n[a];
 }
 
-/* Replace what n particles gathered by its part that is odd about the surface, of velocities (what 0) about the body's, by their shares:
- * u = (u(x) - u(x'))/2 + v, grad u = (grad u(x) - grad u(x') R)/2 + spin x (I - n n). */
+/* Has a particle an odd part to take? */
+GS4I_INLINE int gs4i_is_odd(const gs4i_ghost *g) { return g->kind == GS4I_GHOST_IMAGE && g->whole && g->share > 0; }
+
+/* Replace the values that n particles gathered by their part that is odd about the surface, of velocities (what 0) about the body's, by their
+ * shares: u = (u(x) - u(x'))/2 + v */
 static void gs4i_make_odd(const gs4i_ghost *g, int n, int what, gs4i_gathered *u)
+{
+    int b, c;
+    for (b = 0; b < n; b++, g++)
+        for (c = 0; c < 3 && gs4i_is_odd(g); c++)
+            u->value[4 * b + c] -= g->share * (GS4I_C(0.5) * (u->value[4 * b + c] + g->seen[what][0][c]) - (what ? GS4I_C(0) : g->v[c]));
+}
+
+/* The same of gradients: grad u = (grad u(x) - grad u(x') R)/2 + spin x (I - n n). */
+static void gs4i_make_gradient_odd(const gs4i_ghost *g, int n, int what, gs4i_gathered *u)
 {
     int b, c, a;
     for (b = 0; b < n; b++, g++) {
-        gs4_real *column[3];
-        if (g->kind != GS4I_GHOST_IMAGE || !g->whole || !(g->share > 0)) continue;
+        gs4_real *column[3], turn[3][3] = { { 0, 0, 0 }, { 0, 0, 0 }, { 0, 0, 0 } }, across[3];
+        if (!gs4i_is_odd(g)) continue;
         column[0] = u->dx + 4 * b; column[1] = u->dy + 4 * b; column[2] = u->dz + 4 * b;
-        for (c = 0; c < 3; c++) {
-            const gs4_vec3 turn = gs4i_ghost_turn(g, c);
-            const gs4_real along[3] = { turn.x, turn.y, turn.z };
-            const gs4_real across = g->seen[what][1][c] * g->n[0] + g->seen[what][2][c] * g->n[1] + g->seen[what][3][c] * g->n[2];
-            u->value[4 * b + c] -= g->share * (GS4I_C(0.5) * (u->value[4 * b + c] + g->seen[what][0][c]) - (what ? GS4I_C(0) : g->v[c]));
-            for (a = 0; a < 3; a++)
-                column[a][c] -= g->share * (GS4I_C(0.5) * (column[a][c] + g->seen[what][1 + a][c]) - across * g->n[a] - (what ? GS4I_C(0) : along[a]));
-        }
+        if (!what) gs4i_ghost_turn(g, turn);
+        for (c = 0; c < 3; c++) across[c] = g->seen[what][1][c] * g->n[0] + g->seen[what][2][c] * g->n[1] + g->seen[what][3][c] * g->n[2];
+        for (a = 0; a < 3; a++)
+            for (c = 0; c < 3; c++) column[a][c] -= g->share * (GS4I_C(0.5) * (column[a][c] + g->seen[what][1 + a][c]) - across[c] * g->n[a] - turn[a][c]);
     }
 }
 
@@ -6691,7 +6778,7 @@ static int gs4i_ghosts_are_calm(const gs4_sim *sim, int o)
     for (; g < end; g++) {
         gs4_real moved = 0, all = 0;
         int a, c;
-        if (g->kind != GS4I_GHOST_IMAGE || !g->whole || !(g->share > 0)) continue;
+        if (!gs4i_is_odd(g)) continue;
         for (c = 0; c < 3; c++) {
             moved += gs4i_abs(g->seen[0][0][c]) + 2 * gs4i_abs(g->v[c]);
             for (a = 1; a < 4; a++) all += gs4i_abs(g->seen[0][a][c]);
@@ -6728,14 +6815,15 @@ static void gs4i_reflect_affine(gs4i_ghost *g, int n, const gs4i_stencils *s, co
 {
     int b, c, a;
     gs4i_reflect_columns(g, n, f->x, f->y, f->z, 1);
-    for (b = 0; b < n; b++, g++)
+    for (b = 0; b < n; b++, g++) {
+        gs4_real turn[3][3];
+        gs4i_ghost_turn(g, turn);
         for (c = 0; c < 3; c++) {
-            const gs4_vec3 turn = gs4i_ghost_turn(g, c);
-            const gs4_real along[3] = { turn.x, turn.y, turn.z };
             const gs4_real at_x = f->middle[4 * b + c] + f->x[4 * b + c] * GS4I_NTH_CONST(s->xi[0], b) + f->y[4 * b + c] * GS4I_NTH_CONST(s->xi[1], b) + f->z[4 * b + c] * GS4I_NTH_CONST(s->xi[2], b);
             g->carried[0][c] = 2 * g->x[3] * g->v[c] - at_x;
-            for (a = 0; a < 3; a++) g->carried[1 + a][c] += 2 * g->x[3] * h * along[a];
+            for (a = 0; a < 3; a++) g->carried[1 + a][c] += 2 * g->x[3] * h * turn[a][c];
         }
+    }
 }
 
 static void gs4i_free_ghosts(gs4i_memory *m, gs4i_ghosts *g)
@@ -6830,7 +6918,7 @@ static void gs4i_scatter_stage(const gs4i_pass *pass, int index, gs4i_warmth *wa
             gs4i_x_weights(&s, b, &w, &d);
             gs4i_gather_local(nodes + 4 * s.base[b], &s, b, &w, &d, &v);
         }
-        if (ghosts) gs4i_make_odd(ghosts, n, 0, &v);
+        if (ghosts) { gs4i_make_odd(ghosts, n, 0, &v); gs4i_make_gradient_odd(ghosts, n, 0, &v); }
         if (p.with_fading) gs4i_store_hidden(&p, i, n, rule.reach, &q, v.value);
         gs4i_gradient_lanes(v.dx, v.dy, v.dz, n, L);
         gs4i_take_laws(sim->laws, sim->frozen, &p, i, n, &laws);
@@ -7084,11 +7172,13 @@ static void gs4i_gather_heat(const gs4_sim *sim, size_t i, int n, const gs4i_ste
         if (GS4I_NTH(w->h.fraction, b) >= 1 || GS4I_NTH(w->h.fraction, b) <= 0) gs4i_set_phase(p, i + (size_t)b, GS4I_NTH(w->h.fraction, b) > 0);
 }
 
-/* What nodes give to particle n beside velocity; solids want its gradient too. */
-GS4I_INLINE void gs4i_gather_kick(const gs4i_particles *p, const gs4_real *at, const gs4i_stencils *s, int n, const gs4i_row *w, const gs4i_row *d, gs4i_gathered *g)
+/* The odd part of both, and of the gradients that were gathered. */
+static void gs4i_see_ghosts(const gs4i_particles *p, const gs4i_ghost *ghosts, int n, gs4i_gathered *u, gs4i_gathered *acc)
 {
-    if (p->deformation_reals) gs4i_gather_local(at, s, n, w, d, g);
-    else gs4i_gather_value(at, s, n, w, g->value);
+    gs4i_make_odd(ghosts, n, 0, u);
+    gs4i_make_gradient_odd(ghosts, n, 0, u);
+    gs4i_make_odd(ghosts, n, 1, acc);
+    if (p->deformation_reals) gs4i_make_gradient_odd(ghosts, n, 1, acc);
 }
 
 static void gs4i_take_kicks(const gs4i_gathered *acc, const gs4i_gathered *jump, int n, gs4i_kicks *kicks)
@@ -7152,7 +7242,7 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_warm
             gs4i_gather_kick(&p, a_nodes + 4 * s.base[b], &s, b, &w, &d, &acc);
             if (jumps) gs4i_gather_kick(&p, j_nodes + 4 * s.base[b], &s, b, &w, &d, &jump);
         }
-        if (ghosts) { gs4i_make_odd(ghosts, n, 0, &u); gs4i_make_odd(ghosts, n, 1, &acc); ghosts += n; }
+        if (ghosts) { gs4i_see_ghosts(&p, ghosts, n, &u, &acc); ghosts += n; }
         gs4i_to_lanes(u.value, n, k.U);
         gs4i_gradient_lanes(u.dx, u.dy, u.dz, n, k.L);
         gs4i_to_lanes(acc.value, n, k.A);
@@ -7323,7 +7413,7 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, gs4i
             gs4i_x_weights(&s, b, &w, &d);
             gs4i_gather_local(nodes + 4 * s.base[b], &s, b, &w, &d, &u);
         }
-        if (ghosts) { gs4i_make_odd(ghosts, n, 0, &u); ghosts += n; }
+        if (ghosts) { gs4i_make_odd(ghosts, n, 0, &u); gs4i_make_gradient_odd(ghosts, n, 0, &u); ghosts += n; }
         gs4i_advect_batch(sim->rule.dt, &u, n, &q, C);
         if (p.elastic_reals || p.deformation_reals || warmth) gs4i_advance_history(sim, i, n, &laws, &past, warmth, C, NULL, q.v[3], report, commit);
         if (warmth && commit) gs4i_gather_heat(sim, i, n, &s, &laws, C, warmth);
@@ -10681,6 +10771,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_STICKY_REACH
 #undef GS4I_GHOST_NODES
 #undef GS4I_GHOST_REACH
+#undef GS4I_BLOCK_REACH
 #undef GS4I_STORE
 #undef GS4I_STRIP
 #undef GS4I_STRIPS

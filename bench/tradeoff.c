@@ -65,14 +65,14 @@ static void draw(const char *path, const point *p, int n)
     int i;
     if (!f) { puts("the chart could not be written"); return; }
     fputs("<svg xmlns='http://www.w3.org/2000/svg' width='720' height='460' font-family='sans-serif' font-size='13'>\n<rect width='720' height='460' fill='white'/>\n", f);
-    for (i = -2; i <= 2; i++) fprintf(f, "<path d='M%d 40V400' stroke='#ddd'/><text x='%d' y='420' text-anchor='middle'>%g s</text>\n", 330 + 130 * i, 330 + 130 * i, pow(10, i));
-    for (i = -4; i <= 0; i++) fprintf(f, "<path d='M70 %dH690' stroke='#ddd'/><text x='62' y='%d' text-anchor='end'>%g</text>\n", 40 - 90 * i, 44 - 90 * i, pow(10, i));
+    for (i = -3; i <= 1; i++) fprintf(f, "<path d='M%d 40V400' stroke='#ddd'/><text x='%d' y='420' text-anchor='middle'>%g s</text>\n", 535 + 155 * i, 535 + 155 * i, pow(10, i));
+    for (i = -2; i <= 0; i++) fprintf(f, "<path d='M70 %dH690' stroke='#ddd'/><text x='62' y='%d' text-anchor='end'>%g</text>\n", 40 - 180 * i, 44 - 180 * i, pow(10, i));
     for (i = 0; i < n; i++)
         fprintf(f, "<circle cx='%.1f' cy='%.1f' r='%.1f' fill='%s' fill-opacity='%.2f' stroke='%s'><title>%d cells, %d per cell, cfl %g: error %.2g, %.2g s</title></circle>\n",
-            330 + 130 * log10(p[i].seconds), 40 - 90 * log10(p[i].error), 2 + p[i].cells / 8.0, p[i].integrator ? "#c60" : "#06c",
+            535 + 155 * log10(p[i].seconds), 40 - 180 * log10(p[i].error), 2 + p[i].cells / 8.0, p[i].integrator ? "#c60" : "#06c",
             p[i].side == 2 ? 0.55 : 0.1, p[i].integrator ? "#c60" : "#06c", p[i].cells, p[i].side * p[i].side * p[i].side, p[i].cfl, p[i].error, p[i].seconds);
     fputs("<text x='80' y='24' fill='#06c'>GS4</text><text x='130' y='24' fill='#c60'>symplectic Euler</text>"
-          "<text x='270' y='24'>size: cells a side (12 to 32); filled: 8 a cell, hollow: 27; error against seconds, one thread</text>\n</svg>\n", f);
+          "<text x='380' y='446' text-anchor='middle'>size: cells a side (12 to 32); filled: 8 a cell, hollow: 27; error against seconds, one thread</text>\n</svg>\n", f);
     fclose(f);
 }
 

@@ -93,7 +93,8 @@
  *     S1  sort particles by block of 4^3 cells, when one has strayed more than a cell from its block
  *     S2  x~, v~ by (4); quadratic B-spline weights w at x~
  *     S3  m_i = sum w m,   v_i = sum w m v~ / m_i;   solids: v~ + w~ x (x_i - x~), w how the particle turns (below)
- *     S4  V = sum w v_i;   L~ = sum v_i (x) grad w;   J~ by (4), implicit in J for known div v;   s~ by (4), (5);   F~ by (4), (6);   sigma there by (2), (3)
+ *     S4  V = sum w v_i;   L~ = sum v_i (x) grad w;   J~ by (4), implicit in J for known div v;   s~ by (4), (5);   F~ by (4), (6);
+ *         sigma there by (2), (3)
  *     S5  f_i = - sum V sigma grad w + sum w m g
  *         heat: (m c)_i, (m c T**)_i, T** = T + (alpha_f dt - s) r; then (m c)_i (T~_i - T**_i) / s = (7) at T~, an elliptic solve ([[conduction]])
  *     S6  acc_i = f_i / m_i;   u_i = v_i + s (acc_i - ag_i), s = alpha_f gamma dt / alpha_m;   ag_i += (acc_i - ag_i) / alpha_m
@@ -4928,7 +4929,7 @@ static void gs4i_solid_stress(const gs4i_solid_laws *l, gs4i_matrix F, const gs4
 typedef struct gs4i_kicks { gs4i_gradient acc, jump; } gs4i_kicks;
 
 /* S7: w by rule 1. dw/dt is half the curl of acc - L L, which is what the velocity gradient of a particle does; what the grid cannot see of w
- * fades as that of v does; and contact turns at once. */
+ * fades at the rate that of v does, implicit in itself; and contact turns at once. */
 static void gs4i_correct_turning(const gs4i_solid_laws *l, gs4i_deformation *e, const gs4i_rule *rule, gs4i_gradient L, gs4i_kicks *kicks)
 {
     const gs4_real decay = rule->decay, inv_alpha_m = 1 / rule->alpha_m;
@@ -6383,7 +6384,7 @@ static void gs4i_scatter_by_colour(gs4_sim *sim, const int32_t *blocks, const in
  * lies, as far as particles fill the space before it. Where it is too thin or too crooked for images, nodes are held: gs4i_body_hold. */
 
 enum { GS4I_GHOST_NONE, GS4I_GHOST_IMAGE, GS4I_GHOST_HELD /* no image can be had */ };
-enum { GS4I_GHOST_MARK, GS4I_GHOST_MOMENTUM, GS4I_GHOST_AFFINE, GS4I_GHOST_FORCE };    /* what is scattered; first of all, what has no image */
+enum { GS4I_GHOST_MARK, GS4I_GHOST_MOMENTUM, GS4I_GHOST_AFFINE, GS4I_GHOST_FORCE };    /* what is scattered; first of all marks */
 
 static int gs4i_is_sticky(const gs4i_body *b) { return b->is.contact == GS4_WALL_STICK && !b->is_mouth && !b->asleep; }
 
@@ -6455,7 +6456,7 @@ static void gs4i_place_ghost(const gs4_sim *sim, gs4_vec3 p, const gs4i_face *fa
     gs4_vec3 n = face->n, foot, image, v;
     const int flat = face->body && d > -deep;
     const gs4i_body *body = !flat ? gs4i_find_surface(sim, p, &d, &n) : d < GS4I_GHOST_REACH * h ? face->body : NULL;
-    g->kind = GS4I_GHOST_NONE;
+    g->kind = GS4I_GHOST_NONE; g->whole = 0;
     if (!body) return;
     foot = gs4i_sub(p, gs4i_scale(n, d));
     image = gs4i_sub(foot, gs4i_scale(n, d));
@@ -6491,9 +6492,11 @@ static void gs4i_place_ghosts(int index, void *context)
     const gs4i_particles *p = &sim->particles;
     const gs4_real ahead = sim->rule.reach.ahead;
     gs4i_ghost *g = gs4i_ghosts_of(sim, index);
-    const gs4i_face face = gs4i_find_face(sim, index);
+    gs4i_face face;
     size_t i = (size_t)sim->grid.first[index], end = (size_t)sim->grid.first[index + 1];
-    for (; g && i < end; i += GS4I_BATCH) {
+    if (!g) return;
+    face = gs4i_find_face(sim, index);
+    for (; i < end; i += GS4I_BATCH) {
         const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
         gs4i_batch q;
         gs4i_lanes x[3];
@@ -6648,8 +6651,8 @@ static void gs4i_scatter_ghosts_of(const gs4i_pass *pass, int index, int what)
             const size_t four = 4 * sizeof *tile;
             if (s.base[b] < 0) continue;
             if (what == GS4I_GHOST_MARK && g[b]->kind == GS4I_GHOST_HELD) gs4i_mark_unimaged(&sim->grid, &t, s.base[b]);
+            if (what == GS4I_GHOST_MARK) g[b]->whole = gs4i_is_whole(&t, s.base[b]);
             if (what == GS4I_GHOST_MARK || g[b]->kind == GS4I_GHOST_HELD) continue;
-            g[b]->whole = gs4i_is_whole(&t, s.base[b]);
             if (what == GS4I_GHOST_MOMENTUM) gs4i_scatter_quad(tile, &s, b, from[0]);
             else if (what == GS4I_GHOST_FORCE) {
                 memcpy(f.x + 4 * b, from[0], four); memcpy(f.y + 4 * b, from[1], four); memcpy(f.z + 4 * b, from[2], four);
@@ -6748,7 +6751,7 @@ GS4I_INLINE int gs4i_is_odd(const gs4i_ghost *g) { return g->kind == GS4I_GHOST_
 
 /* Replace the values that n particles gathered by their part that is odd about the surface, of velocities (what 0) about the body's, by their
  * shares: u = (u(x) - u(x'))/2 + v */
-static void gs4i_make_odd(const gs4i_ghost *g, int n, int what, gs4i_gathered *u)
+static void gs4i_make_value_odd(const gs4i_ghost *g, int n, int what, gs4i_gathered *u)
 {
     int b, c;
     for (b = 0; b < n; b++, g++)
@@ -6770,6 +6773,9 @@ static void gs4i_make_gradient_odd(const gs4i_ghost *g, int n, int what, gs4i_ga
             for (c = 0; c < 3; c++) column[a][c] -= g->share * (GS4I_C(0.5) * (column[a][c] + g->seen[what][1 + a][c]) - across[c] * g->n[a] - turn[a][c]);
     }
 }
+
+/* Both, of velocities. */
+static void gs4i_make_odd(const gs4i_ghost *g, int n, gs4i_gathered *u) { gs4i_make_value_odd(g, n, 0, u); gs4i_make_gradient_odd(g, n, 0, u); }
 
 /* Is what the images of block o see of velocity no cause for alarm? Of a reflection of L the trace is at most sum |L_ij|. See gs4i_is_calm. */
 static int gs4i_ghosts_are_calm(const gs4_sim *sim, int o)
@@ -6918,7 +6924,7 @@ static void gs4i_scatter_stage(const gs4i_pass *pass, int index, gs4i_warmth *wa
             gs4i_x_weights(&s, b, &w, &d);
             gs4i_gather_local(nodes + 4 * s.base[b], &s, b, &w, &d, &v);
         }
-        if (ghosts) { gs4i_make_odd(ghosts, n, 0, &v); gs4i_make_gradient_odd(ghosts, n, 0, &v); }
+        if (ghosts) gs4i_make_odd(ghosts, n, &v);
         if (p.with_fading) gs4i_store_hidden(&p, i, n, rule.reach, &q, v.value);
         gs4i_gradient_lanes(v.dx, v.dy, v.dz, n, L);
         gs4i_take_laws(sim->laws, sim->frozen, &p, i, n, &laws);
@@ -6986,8 +6992,8 @@ GS4I_INLINE void gs4i_unseen(const gs4i_wide *filled, gs4i_wide *unseen)
 typedef struct gs4i_corrections { gs4i_lanes U[4] /* and mass there */, A[4], jump[4] /* and the share of images */, hidden[4]; gs4i_gradient L; } gs4i_corrections;
 
 /* S7. Velocity by rule 1, the motion that the grid cannot see fading: v~ - V at the rate 1/flip_decay_time, in spray and at walls v - U
- * faster, implicit in itself; J by 2021 (57), implicit in J for known div u; position by rule 1 with the grid's velocity U. In: move is dx/dt; out: what the new
- * dx/dt lags behind v - shift a. */
+ * faster, implicit in itself; J by 2021 (57), implicit in J for known div u; position by rule 1 with the grid's velocity U. In: move is
+ * dx/dt; out: what the new dx/dt lags behind v - shift a. */
 GS4I_INLINE void gs4i_correct_batch(gs4i_rule r, const gs4i_corrections *k, gs4i_batch *q)
 {
     gs4i_lanes decay, damped;
@@ -7175,9 +7181,8 @@ static void gs4i_gather_heat(const gs4_sim *sim, size_t i, int n, const gs4i_ste
 /* The odd part of both, and of the gradients that were gathered. */
 static void gs4i_see_ghosts(const gs4i_particles *p, const gs4i_ghost *ghosts, int n, gs4i_gathered *u, gs4i_gathered *acc)
 {
-    gs4i_make_odd(ghosts, n, 0, u);
-    gs4i_make_gradient_odd(ghosts, n, 0, u);
-    gs4i_make_odd(ghosts, n, 1, acc);
+    gs4i_make_odd(ghosts, n, u);
+    gs4i_make_value_odd(ghosts, n, 1, acc);
     if (p->deformation_reals) gs4i_make_gradient_odd(ghosts, n, 1, acc);
 }
 
@@ -7413,7 +7418,7 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, gs4i
             gs4i_x_weights(&s, b, &w, &d);
             gs4i_gather_local(nodes + 4 * s.base[b], &s, b, &w, &d, &u);
         }
-        if (ghosts) { gs4i_make_odd(ghosts, n, 0, &u); gs4i_make_gradient_odd(ghosts, n, 0, &u); ghosts += n; }
+        if (ghosts) { gs4i_make_odd(ghosts, n, &u); ghosts += n; }
         gs4i_advect_batch(sim->rule.dt, &u, n, &q, C);
         if (p.elastic_reals || p.deformation_reals || warmth) gs4i_advance_history(sim, i, n, &laws, &past, warmth, C, NULL, q.v[3], report, commit);
         if (warmth && commit) gs4i_gather_heat(sim, i, n, &s, &laws, C, warmth);
@@ -8176,7 +8181,7 @@ static gs4_real gs4i_mixing(const gs4i_rule *k)
 static gs4i_rule gs4i_make_rule(const gs4_sim *sim, gs4_real dt)
 {
     const gs4_real r = sim->desc.rho_inf, s = sim->desc.rho_inf_spurious;
-    gs4_real most;
+    gs4_real most, y;
     gs4i_rule k;
     int i;
     k.dt = dt;
@@ -8194,7 +8199,8 @@ static gs4i_rule gs4i_make_rule(const gs4_sim *sim, gs4_real dt)
     k.fading = 0;
     if (k.decay * dt > 1) { k.fading = 1 - k.damped; k.decay = 0; k.damped = 1; }
     most = GS4I_C(3.2) * (1 - r * s) / ((3 + r + s - r * s) * dt);
-    k.fade = k.decay * most * (most + k.decay) / gs4i_max(most * most + k.decay * (most + k.decay), GS4I_TINY);
+    y = most / gs4i_max(most + k.decay, GS4I_TINY);         /* 1 / (1 + x) */
+    k.fade = k.decay * y / (1 - y + y * y);
     k.inv_area = sim->grid.inv_h * sim->grid.inv_h;
     k.mixing = sim->particles.with_rates ? gs4i_mixing(&k) : GS4I_C(0.5) / k.s;
     k.inv_alpha_m = 1 / k.alpha_m;

@@ -66,6 +66,7 @@ int main(int count, char **values)
     RUN(test_stability);
     RUN(test_extremes);
     RUN(test_short_decay);
+    RUN(test_tiny_step);
     RUN(test_thickening);
     RUN(test_nozzle_from_outside);
     RUN(test_order_as_printed);

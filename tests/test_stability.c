@@ -139,6 +139,27 @@ static const char *stability_try(const stability_scene *s, int number, int *refu
 }
 
 /* 64 of the combinations, spread over them by the golden section; with --slow all. */
+/* A step, and what fades in twice its time, whose squared and cubed rates no float holds. */
+static void test_tiny_step(void)
+{
+    gs4_sim_desc d = scene_cube(16);
+    const gs4_material m = scene_liquid(1000, 1, 10);
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    gs4_edit v;
+    gs4_sim *sim;
+    int i;
+    double speed;
+    d.flip_decay_time = (gs4_real)2e-15; f.jitter = (gs4_real)0.5;
+    sim = physics_create(&d, &m);
+    CHECK(gs4_add_particles(sim, gs4_sphere(at(0.5, 0.5, 0.5), (gs4_real)0.2), &f) > 0);
+    v = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
+    for (i = 0; i < v.count; i++) v.data[(size_t)i * (size_t)v.stride] = (gs4_real)(i & 1 ? 0.1 : -0.1);
+    speed = (double)gs4_get_stats(sim).max_speed;
+    for (i = 0; i < 20; i++) CHECK_RESULT(sim, gs4_step(sim, (gs4_real)1e-15), GS4_OK);
+    CHECK((double)gs4_get_stats(sim).max_speed < 0.7 * speed);
+    gs4_destroy(sim);
+}
+
 /* Motion that fades within a step leaves no rate behind that a longer step would blow up: a drop that hits the floor gains nothing, and a
  * block at rest stays calm when steps of a thousandth come between. */
 static void test_short_decay(void)

@@ -2550,28 +2550,55 @@ static void gs4i_store_plane(int k, void *context)
     }
 }
 
+enum { GS4I_RUNS = 64 };                /* of pockets, a task */
+typedef struct gs4i_means { gs4i_solver *s; double **v; int found; } gs4i_means;
+
+static double gs4i_sum_range(const double *v, int n)
+{
+    double sum[GS4I_STRIP] = { 0 };
+    int m, l;
+    for (m = 0; m + GS4I_STRIP <= n; m += GS4I_STRIP) for (l = 0; l < GS4I_STRIP; l++) sum[l] += v[m + l];
+    for (l = 0; m + l < n; l++) sum[l] += v[m + l];
+    return gs4i_sum_lanes(sum);
+}
+
+/* Sums of runs; or, once the means are found, takes them off. */
+static void gs4i_means_of_runs(int index, void *context)
+{
+    const gs4i_means *w = (const gs4i_means *)context;
+    const gs4i_masked *g = &w->s->level[0];
+    int a, c, m;
+    for (a = GS4I_RUNS * index; a < GS4I_RUNS * (index + 1) && a < w->s->run_count; a++) {
+        gs4i_cells *run = &w->s->runs[a];
+        const int j = run->row % g->n[1], k = run->row / g->n[1];
+        const double mean = w->s->pocket[2 * run->pocket];
+        if (!w->found) run->sum = 0;
+        for (c = 0; c < 2; c++) {
+            const int t = (c + j + k) & 1, first = (run->begin + !t) / 2, n = (run->end + !t) / 2 - first;      /* cells i = 2 m + t */
+            double *v = w->v[c] + gs4i_row_of(g, j, k) + first;
+            if (!w->found) run->sum += gs4i_sum_range(v, n);
+            else for (m = 0; m < n; m++) v[m] -= mean;
+        }
+    }
+}
+
 /* Takes the mean of v off in every closed pocket; gives the largest one. */
 static double gs4i_take_means(gs4i_solver *s, double **v)
 {
+    const int tasks = (s->run_count + GS4I_RUNS - 1) / GS4I_RUNS;
+    gs4i_means w;
     double largest = 0;
-    int a, i, p;
+    int a, p;
+    w.s = s; w.v = v; w.found = 0;
+    gs4i_parallel_for(s->tasks, tasks, gs4i_means_of_runs, &w);
     for (p = 0; p < s->pockets; p++) s->pocket[2 * p] = 0;
-    for (a = 0; a < s->run_count; a++) {
-        const gs4i_cells *q = &s->runs[a];
-        const int j = q->row % s->level[0].n[1], k = q->row / s->level[0].n[1];
-        const size_t at = gs4i_row_of(&s->level[0], j, k);
-        for (i = q->begin; i < q->end; i++) s->pocket[2 * q->pocket] += v[(i + j + k) & 1][at + (size_t)(i / 2)];
-    }
+    for (a = 0; a < s->run_count; a++) s->pocket[2 * s->runs[a].pocket] += s->runs[a].sum;
     for (p = 0; p < s->pockets; p++) {
         s->pocket[2 * p] /= s->pocket[2 * p + 1];
         if (fabs(s->pocket[2 * p]) > largest) largest = fabs(s->pocket[2 * p]);
     }
-    for (a = 0; a < s->run_count; a++) {
-        const gs4i_cells *q = &s->runs[a];
-        const int j = q->row % s->level[0].n[1], k = q->row / s->level[0].n[1];
-        const size_t at = gs4i_row_of(&s->level[0], j, k);
-        for (i = q->begin; i < q->end; i++) v[(i + j + k) & 1][at + (size_t)(i / 2)] -= s->pocket[2 * q->pocket];
-    }
+    w.found = 1;
+    gs4i_parallel_for(s->tasks, tasks, gs4i_means_of_runs, &w);
     return largest;
 }
 

@@ -37,6 +37,7 @@ int main(int count, char **values)
     RUN_ONCE(test_elastic_couette);
     RUN(test_stress_is_paid_for_where_it_is);
     RUN_ONCE(test_drop_draws_back);
+    RUN_ONCE(test_die_swell);
     RUN(test_heat_modes);
     RUN(test_heat_order_in_time);
     RUN(test_heat_stiff);

@@ -1181,6 +1181,14 @@ static double gs4i_dot_row(const double *GS4I_RESTRICT r, const float *GS4I_REST
     return gs4i_sum_lanes(sum);
 }
 
+static double gs4i_square_row(const double *GS4I_RESTRICT r, int n)
+{
+    double sum[GS4I_STRIP] = { 0 };
+    int m, l;
+    GS4I_STRIPS(m, l, n) sum[l - m] += r[l] * r[l];
+    return gs4i_sum_lanes(sum);
+}
+
 static void gs4i_direct_row(float *GS4I_RESTRICT p, const float *GS4I_RESTRICT z, float beta, int n)
 {
     int m, l;
@@ -1369,6 +1377,16 @@ static void gs4i_stage_defect(gs4i_solver *s, int level, int k)
                                                      GS4I_MASS(s, g, c, at), n);
         else sum += gs4i_defect_weighted(g->r[c] + at, s->x[c] + at, GS4I_AROUND(s->x[!c], at, t, g), GS4I_WEIGHTS(s, g, c, at, t), n);
     }
+    s->sums[k] = sum;
+}
+
+static void gs4i_stage_size(gs4i_solver *s, int level, int k)
+{
+    const gs4i_masked *g = &s->level[level];
+    double sum = 0;
+    size_t at;
+    int j, n, c;
+    GS4I_EACH_ROW(g, k, j, at, n) for (c = 0; c < 2; c++) sum += gs4i_square_row(g->r[c] + at, n);
     s->sums[k] = sum;
 }
 
@@ -2492,7 +2510,26 @@ static void gs4i_solver_free(gs4i_solver *s)
 
 /* --- solving ------------------------------------------------------------------------------------------------------------- */
 
-typedef struct gs4i_given { gs4i_solver *s; const gs4_real *rhs; gs4_real *x; int guess; } gs4i_given;
+typedef struct gs4i_given { gs4i_solver *s; const gs4_real *rhs; gs4_real *x; int guess, air /* whether x is given there */; } gs4i_given;
+
+#ifdef GS4_DOUBLE
+typedef uint64_t gs4i_bits;
+#else
+typedef uint32_t gs4i_bits;
+#endif
+
+/* Largest |v| in cells of one kind, as bits: these are in the order of the numbers, infinity and what is no number above all. */
+GS4I_INLINE gs4i_bits gs4i_largest_bits(const gs4_real *GS4I_RESTRICT v, const uint8_t *GS4I_RESTRICT kind, uint8_t wanted, int n, gs4i_bits most)
+{
+    int i;
+    for (i = 0; i < n; i++) {
+        gs4i_bits bits;
+        memcpy(&bits, v + i, sizeof bits);
+        bits = kind[i] == wanted ? bits & ~(gs4i_bits)0 >> 1 : 0;
+        most = bits > most ? bits : most;
+    }
+    return most;
+}
 
 /* Largest right-hand side in liquid, x in air and x in liquid; infinity where one is not finite. */
 static void gs4i_see_given(int k, void *context)
@@ -2500,23 +2537,23 @@ static void gs4i_see_given(int k, void *context)
     const gs4i_given *v = (const gs4i_given *)context;
     const gs4i_solver *s = v->s;
     const int *n = s->level[0].n;
-    double b = 0, air = 0, x = 0;
-    int i, j;
+    gs4i_bits most[3] = { 0, 0, 0 };
+    gs4_real value;
+    int a, j;
     for (j = 0; j < n[1]; j++) {
         const size_t row = ((size_t)k * (size_t)n[1] + (size_t)j) * (size_t)n[0];
         const uint8_t *kind = gs4i_kinds_of(s, j, k);
-        for (i = 0; i < n[0]; i++) {
-            const double rhs = kind[i] & GS4I_IS_LIQUID ? fabs((double)v->rhs[row + (size_t)i]) : 0;
-            const double value = kind[i] & GS4I_IS_OPEN ? fabs((double)v->x[row + (size_t)i]) : 0;
-            if (!(rhs <= b)) b = rhs <= DBL_MAX ? rhs : HUGE_VAL;
-            if (kind[i] & GS4I_IS_LIQUID) { if (!(value <= x)) x = value <= DBL_MAX ? value : HUGE_VAL; }
-            else if (!(value <= air)) air = value <= DBL_MAX ? value : HUGE_VAL;
-        }
+        most[0] = gs4i_largest_bits(v->rhs + row, kind, GS4I_IS_OPEN | GS4I_IS_LIQUID, n[0], most[0]);
+        most[1] = gs4i_largest_bits(v->x + row, kind, GS4I_IS_OPEN, n[0], most[1]);
+        most[2] = gs4i_largest_bits(v->x + row, kind, GS4I_IS_OPEN | GS4I_IS_LIQUID, n[0], most[2]);
     }
-    s->given[3 * k] = b; s->given[3 * k + 1] = air; s->given[3 * k + 2] = x;
+    for (a = 0; a < 3; a++) {
+        memcpy(&value, &most[a], sizeof value);
+        s->given[3 * k + a] = gs4i_finite(value) ? (double)value : HUGE_VAL;
+    }
 }
 
-/* Right-hand side into r, x into x: given values and, where `guess`, the guess; the rest 0. */
+/* Right-hand side into r where there is liquid, x into x: given values and, where `guess`, the guess; the rest 0. */
 static void gs4i_load_plane(int k, void *context)
 {
     const gs4i_given *v = (const gs4i_given *)context;
@@ -2528,9 +2565,12 @@ static void gs4i_load_plane(int k, void *context)
         const int c = (odd + j + k) & 1;
         const size_t row = ((size_t)k * (size_t)g->n[1] + (size_t)j) * (size_t)g->n[0], at = gs4i_row_of(g, j, k);
         const uint8_t *kind = gs4i_kinds_of(s, j, k), wanted = v->guess ? GS4I_IS_OPEN | GS4I_IS_LIQUID : GS4I_IS_OPEN;
+        const int32_t *span = g->span + 2 * ((size_t)k * (size_t)g->n[1] + (size_t)j);
+        const int end = 2 * span[1] < g->n[0] ? 2 * span[1] : g->n[0];
         double *r = g->r[c] + at, *x = s->x[c] + at;
-        for (i = odd; i < g->n[0]; i += 2) r[i / 2] = kind[i] & GS4I_IS_LIQUID ? (double)v->rhs[row + (size_t)i] * b : 0;
+        for (i = 2 * span[0] + odd; i < end; i += 2) r[i / 2] = kind[i] & GS4I_IS_LIQUID ? (double)v->rhs[row + (size_t)i] * b : 0;
         if (v->guess < 0) continue;
+        if (!v->guess && !v->air) { memset(x, 0, (size_t)g->width * sizeof *x); continue; }
         for (i = odd; i < g->n[0]; i += 2) x[i / 2] = kind[i] && (kind[i] & wanted) == kind[i] ? (double)v->x[row + (size_t)i] * unit : 0;
     }
 }
@@ -2605,14 +2645,14 @@ static double gs4i_take_means(gs4i_solver *s, double **v)
 /* r = b - A x with x as given (guess 0, 1) or as it is (-1); gives |r|. */
 static double gs4i_true_residual(gs4i_solver *s, gs4i_given *v, int guess, double *removed)
 {
-    static const gs4i_stage_fn defect[] = { gs4i_stage_defect };
+    static const gs4i_stage_fn defect[] = { gs4i_stage_defect }, size[] = { gs4i_stage_size };
     double mean;
     v->guess = guess;
     gs4i_parallel_for(s->tasks, s->level[0].n[2], gs4i_load_plane, v);
     if (guess > 0) gs4i_take_means(s, s->x);
     mean = gs4i_take_means(s, s->level[0].r);
     if (removed) *removed = mean / s->rhs_unit;
-    gs4i_sweep_run(s, 0, defect, 1);
+    gs4i_sweep_run(s, 0, guess || v->air ? defect : size, 1);       /* A 0 = 0 */
     return sqrt(gs4i_total(s));
 }
 
@@ -2662,7 +2702,7 @@ static int gs4i_begin(gs4i_solver *s, gs4i_given *v, double *norm, int *guess, d
     b = most[0] * s->mass_unit > most[1] ? most[0] * s->mass_unit : most[1];
     frexp(b, &exponent);
     s->x_unit = ldexp(1, -exponent); s->rhs_unit = s->mass_unit * s->x_unit;
-    *guess = most[2] > 0;
+    *guess = most[2] > 0; v->air = most[1] > 0;
     *norm = gs4i_true_residual(s, v, 0, removed);
     if (*norm <= 1e-13 * most[0] * s->rhs_unit * sqrt((double)s->unknowns)) *norm = 0;
     return GS4_OK;
@@ -2691,7 +2731,7 @@ static int gs4i_solver_solve(gs4i_solver *s, const gs4_real *rhs, gs4_real *x, d
     double size, norm, before = HUGE_VAL;
     int guess, diagonal = 0, iterations = 0;
     s->fault = NULL;
-    v.s = s; v.rhs = rhs; v.x = x; v.guess = 0;
+    v.s = s; v.rhs = rhs; v.x = x; v.guess = v.air = 0;
     if (gs4i_begin(s, &v, &size, &guess, &stats->removed_mean) != GS4_OK) return GS4_ERROR_ARGUMENT;
     stats->pockets = s->pockets;
     norm = size;

@@ -175,11 +175,12 @@
  * LIMITS. 2^30 particles, 2^36 cells, 256 materials. Time steps follow sound: viscosities above some 100 Pa s at millimetre cells
  * mean steps of microseconds. There is one velocity at a node: solids that touch stick together until they are two cells apart. Filling
  * is refused where material is already; emitters pause when max_particles is reached. A mouth gives what its velocity says whatever is before
- * it: where that goes slower, as in a sticky pipe as wide as the mouth, particles pack within a radius or two of it, up to 1.7 times too
+ * it: where that goes slower, as in a sticky pipe as wide as the mouth, particles pack within a radius or two of it, 1.4 to 1.8 times too
  * dense, and J does not tell.
  *
- * SOURCES. The GS4 family: Zhou & Tamma 2004; extended Pom-Pom: Verbeeten, Peters & Baaijens 2001, in the form of Oishi et al. 2012; the MPM scheme after "GS4 viscoelastic MPM" (2021), with rates on particles; MLS-MPM:
- * Hu et al. 2018; solids and their yield: "Augmented MPM" (Stomakhin et al. 2014); images, contact and limits: measured for this file. */
+ * SOURCES. The GS4 family: Zhou & Tamma 2004; extended Pom-Pom: Verbeeten, Peters & Baaijens 2001, in the form of Oishi et al. 2012; the
+ * MPM scheme after "GS4 viscoelastic MPM" (2021), with rates on particles; MLS-MPM: Hu et al. 2018; solids
+ * and their yield: "Augmented MPM" (Stomakhin et al. 2014); images, contact and limits: measured for this file. */
 #ifndef GS4MPM_H
 #define GS4MPM_H
 

@@ -153,7 +153,7 @@ static void test_momentum(void)
         for (k = 0; k < 3; k++) {
             lost = momentum_lost(GS4_INTEGRATOR_GS4, decays[k], drifts[i], GS4_WALL_SLIP, &spin, &t);
             if (test_filter[0]) printf("drift %g, decay %g s: momentum within %.1e, spin kept %.4f in %.2f s\n", drifts[i], decays[k], lost, spin, t);
-            CHECK(lost < 2 * MOMENTUM_ROUNDING); CHECK(k == 2 || spin > exp(-t / decays[k])); CHECK(k > 0 || spin > 0.8);
+            CHECK(lost < (sizeof(gs4_real) == 8 ? 2 : 1) * MOMENTUM_ROUNDING); CHECK(k == 2 || spin > exp(-t / decays[k])); CHECK(k > 0 || spin > 0.8);
         }
     }
 }
@@ -572,7 +572,7 @@ static void test_sticky_pipe(void)
             v.data[(size_t)i * (size_t)v.stride] = 4 * ((gs4_real)0.5 - p[1]); v.data[(size_t)i * (size_t)v.stride + 1] = 4 * (p[0] - (gs4_real)0.5);
         }
         energy = gs4_get_stats(sim).kinetic_energy; fastest = (double)gs4_get_stats(sim).max_speed;
-        for (i = 0; i < 4; i++) {
+        for (i = 0; i < (test_slow ? 6 : 4); i++) {
             CHECK(physics_run(sim, 0.05 * (i + 1)) == 0);
             if (test_filter[0]) printf("integrator %d, t %g: energy %.3f of the first, fastest %.3f\n", (int)d.integrator, 0.05 * (i + 1), gs4_get_stats(sim).kinetic_energy / energy, (double)gs4_get_stats(sim).max_speed / fastest);
             CHECK(gs4_get_stats(sim).kinetic_energy < (i ? 0.5 : 0.6) * energy); CHECK((double)gs4_get_stats(sim).max_speed < fastest);

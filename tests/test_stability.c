@@ -138,7 +138,6 @@ static const char *stability_try(const stability_scene *s, int number, int *refu
     return fault;
 }
 
-/* 64 of the combinations, spread over them by the golden section; with --slow all. */
 /* A step, and what fades in twice its time, whose squared and cubed rates no float holds. */
 static void test_tiny_step(void)
 {
@@ -230,6 +229,7 @@ static void test_nozzle_from_outside(void)
     CHECK(count[0] > 0 && count[0] == count[1]);
 }
 
+/* 64 of the combinations, spread over them by the golden section; with --slow all. */
 static void test_extremes(void)
 {
     const int all = 5 * 4 * 4 * 4 * 2 * 2 * 3, count = test_slow ? all : 64;

@@ -248,6 +248,7 @@ static double jet_radius(int n, double local, double lambda, double *velocity)
 static void test_die_swell(void)
 {
     static const double cases[3] = { 0, 0.5, 0.55556 };     /* lambda; the last two: of other local fractions */
+    double last = 1;
     int c;
     for (c = 0; c < (test_slow ? 3 : 0); c++) {
         const double local = c == 1 ? 0.5 : 0.1;
@@ -255,5 +256,7 @@ static void test_die_swell(void)
         const double tanner = 0.13 + pow(1 + S * S / 2, 1.0 / 6);
         if (test_filter[0]) printf("recoverable shear %.2f: jet over nozzle %.3f, Tanner %.3f\n", S, swell, tanner);
         CHECK_CLOSE(swell / tanner, 1, 0.1);
+        CHECK(swell > last + 0.05);
+        last = swell;
     }
 }

@@ -1,7 +1,7 @@
 /* A block of liquid falls on a turning ball beside a nozzle, between walls of every kind; prints a hash of the state.
  * Every build for one machine must print the same, whatever this says, but for the first three:
  *   scene=bunny    eight bunnies thrown on each other in a box, and a stamp on them, instead
- *   elastic=1      both liquids of the block viscoelastic; needs the same libm, too
+ *   elastic=1      both liquids of the block viscoelastic, and gradients sharpened where there are such; needs the same libm, too
  *   solid=1        the block an elastic solid, and what the nozzle gives a plastic one; the same
  *   heat=1         the block frozen, its flux lagging behind, between warm walls and a hot ball; what the nozzle gives is molten and viscoelastic
  *   steps=N        length of the run (500)
@@ -139,7 +139,7 @@ static gs4_sim *create(gs4_integrator integrator, const options *o, unsigned *ca
     memset(&d, 0, sizeof d);
     d.gravity.z = (gs4_real)-9.81;
     d.integrator = integrator;
-    if (integrator == GS4_INTEGRATOR_GS4) { d.rho_inf = (gs4_real)0.8; d.rho_inf_spurious = (gs4_real)0.2; }
+    if (integrator == GS4_INTEGRATOR_GS4) { d.rho_inf = (gs4_real)0.8; d.rho_inf_spurious = (gs4_real)0.2; d.sharp_gradients = o->elastic; }
     d.threads = o->threads;
     if (o->shuffle) { d.parallel_for = run_shuffled; d.parallel_user = calls; }
     return o->bunnies ? create_bunnies(&d) : create_block(&d, o);

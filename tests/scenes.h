@@ -9,6 +9,8 @@ static gs4_vec3 at(double x, double y, double z)
     return v;
 }
 
+static int scene_sharp;                 /* the next cubes have sharpened gradients */
+
 /* A cube of n^3 cells, side 1, all walls slip, no gravity. */
 static gs4_sim_desc scene_cube(int n)
 {
@@ -17,6 +19,7 @@ static gs4_sim_desc scene_cube(int n)
     memset(&d, 0, sizeof d);
     d.cells[0] = d.cells[1] = d.cells[2] = n;
     d.cell_size = (gs4_real)(1.0 / n);
+    d.sharp_gradients = scene_sharp;
     for (w = 0; w < 6; w++) d.walls[w] = GS4_WALL_SLIP;
     return d;
 }

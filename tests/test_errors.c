@@ -179,7 +179,8 @@ static void test_errors_desc(void)
         ERR_FIELD(gs4_sim_desc, ambient_temperature, "ambient_temperature", ERR_REAL), ERR_FIELD(gs4_sim_desc, air_is_isothermal, "air_is_isothermal", ERR_INT),
         ERR_FIELD(gs4_sim_desc, cfl, "cfl", ERR_REAL), ERR_FIELD(gs4_sim_desc, max_dt, "max_dt", ERR_REAL),
         ERR_FIELD(gs4_sim_desc, solver_tolerance, "solver_tolerance", ERR_REAL), ERR_FIELD(gs4_sim_desc, solver_max_iterations, "solver_max_iterations", ERR_INT),
-        ERR_FIELD(gs4_sim_desc, max_particles, "max_particles", ERR_INT), ERR_FIELD(gs4_sim_desc, threads, "threads", ERR_INT) };
+        ERR_FIELD(gs4_sim_desc, max_particles, "max_particles", ERR_INT), ERR_FIELD(gs4_sim_desc, threads, "threads", ERR_INT),
+        ERR_FIELD(gs4_sim_desc, sharp_gradients, "sharp_gradients", ERR_INT) };
     static const err_field integrator[] = { ERR_FIELD(gs4_sim_desc, integrator, "integrator", ERR_INT) };
     gs4_sim_desc d = err_desc();
     err_try_all(ERR_DESC, &d, sizeof d, fields, ERR_COUNT(fields));
@@ -451,6 +452,7 @@ static void test_errors_null(void)
 static void test_errors_half_hooks(void)
 {
     gs4_sim_desc d = err_desc();
+    gs4_material m = err_material();
     gs4_sim *sim = NULL;
     d.allocator.user = &d;
     CHECK(gs4_create(&d, &sim) == GS4_OK);
@@ -461,6 +463,13 @@ static void test_errors_half_hooks(void)
     CHECK(gs4_create(&d, &sim) == GS4_ERROR_ARGUMENT && strstr(gs4_last_error(NULL), "integrator"));
     d.scheme = GS4_SEMI_IMPLICIT;
     CHECK(gs4_create(&d, &sim) == GS4_ERROR_ARGUMENT && strstr(gs4_last_error(NULL), "scheme"));
+    d = err_desc(); d.rho_inf = 0; d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER; d.sharp_gradients = 1;
+    CHECK(gs4_create(&d, &sim) == GS4_ERROR_ARGUMENT && strstr(gs4_last_error(NULL), "sharp_gradients"));
+    d.integrator = GS4_INTEGRATOR_GS4;
+    CHECK(gs4_create(&d, &sim) == GS4_OK);
+    m.solid = GS4_NEO_HOOKEAN; m.shear_modulus = 1000;
+    ERR_REFUSED(sim, gs4_add_material(sim, &m), GS4_ERROR_ARGUMENT, "sharp_gradients");
+    gs4_destroy(sim);
 }
 
 static void test_errors_strings(void)

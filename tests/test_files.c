@@ -155,7 +155,7 @@ static gs4_sim_desc files_desc(int euler)
     d.gravity = at(0, 0, -10);
     d.walls[1] = GS4_WALL_SEPARATE; d.walls[2] = d.walls[3] = GS4_WALL_PERIODIC; d.walls[5] = GS4_WALL_OPEN;
     if (euler) d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER;
-    else { d.rho_inf = (gs4_real)0.6; d.rho_inf_spurious = (gs4_real)0.2; }
+    else { d.rho_inf = (gs4_real)0.6; d.rho_inf_spurious = (gs4_real)0.2; d.sharp_gradients = !files_warm; }
     if (files_warm) { d.wall_is_isothermal[0] = d.air_is_isothermal = 1; d.wall_temperature[0] = 50; d.ambient_temperature = -3; }
     return d;
 }
@@ -866,7 +866,7 @@ static void test_files_other_desc(void)
     unsigned char *data;
     CHECK_RESULT(from, files_steps(from, 5), 0);
     CHECK_RESULT(from, gs4_save(from, files_path("d.sav")), 0);
-    for (which = 0; which < 15; which++) {
+    for (which = 0; which < 16; which++) {
         gs4_sim_desc o = files_desc(0);
         gs4_sim *sim;
         switch (which) {
@@ -884,6 +884,7 @@ static void test_files_other_desc(void)
         case 11: o.wall_is_isothermal[4] = 1; break;
         case 12: o.ambient_temperature = 1; break;
         case 13: o.air_is_isothermal = 1; break;
+        case 14: o.sharp_gradients = 0; break;
         default: o = files_desc(1); break;                  /* the other integrator */
         }
         sim = files_scene(&o);

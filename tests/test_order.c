@@ -1,4 +1,4 @@
-/* Second order in time: a drop that breathes and shears, against itself with a 16 times smaller step. */
+/* Second order in time: a drop that breathes and shears, against itself with a step 16 times smaller (quick runs: 8, which changes an order of 2 by 0.02). */
 
 #include "printed_2021.h"
 #define ORDER_MAX 4096
@@ -56,7 +56,7 @@ static void order_case(double rho, double spurious, double decay)
     double x, v, J;
     CHECK(order_simulate(rho, spurious, decay, time, steps, &coarse) == 0);
     CHECK(order_simulate(rho, spurious, decay, time, 2 * steps, &fine) == 0);
-    CHECK(order_simulate(rho, spurious, decay, time, 32 * steps, &exact) == 0);
+    CHECK(order_simulate(rho, spurious, decay, time, (test_slow ? 32 : 16) * steps, &exact) == 0);
     x = log2(order_difference(coarse.x, exact.x, 3 * exact.count) / order_difference(fine.x, exact.x, 3 * exact.count));
     v = log2(order_difference(coarse.v, exact.v, 3 * exact.count) / order_difference(fine.v, exact.v, 3 * exact.count));
     J = log2(order_difference(coarse.J, exact.J, exact.count) / order_difference(fine.J, exact.J, exact.count));
@@ -72,6 +72,7 @@ static void test_order_in_time(void)
     if (!test_slow) return;
     order_case(0, 0, 0.2); order_case(0.5, 0, 0.2); order_case(1, 0, 0.2);
     order_case(0.5, 0, (double)INFINITY); order_case(1, 0, (double)INFINITY); order_case(0.5, 0.5, (double)INFINITY);
+    scene_sharp = 1; order_case(0.5, 0.5, 0.2); order_case(0, 0, (double)INFINITY); scene_sharp = 0;
 }
 
 /* Why rates live on particles: the algorithm as printed in 2021 does not converge in time, pure FLIP or blended, against the same

@@ -155,6 +155,11 @@ static void test_momentum(void)
             if (test_filter[0]) printf("drift %g, decay %g s: momentum within %.1e, spin kept %.4f in %.2f s\n", drifts[i], decays[k], lost, spin, t);
             CHECK(lost < (sizeof(gs4_real) == 8 ? 2 : 1) * MOMENTUM_ROUNDING); CHECK(k == 2 || spin > exp(-t / decays[k])); CHECK(k > 0 || spin > 0.8);
         }
+        scene_sharp = 1;
+        lost = momentum_lost(GS4_INTEGRATOR_GS4, 0.5, drifts[i], GS4_WALL_SLIP, &spin, &t);
+        scene_sharp = 0;
+        if (test_filter[0]) printf("drift %g, sharpened: momentum within %.1e, spin kept %.4f in %.2f s\n", drifts[i], lost, spin, t);
+        CHECK(lost < (sizeof(gs4_real) == 8 ? 2 : 1) * MOMENTUM_ROUNDING); CHECK(spin > 0.9);
     }
 }
 
@@ -163,6 +168,11 @@ static void test_momentum_seam(void)
 {
     double spin, t, lost = momentum_lost(GS4_INTEGRATOR_GS4, (double)INFINITY, 1, GS4_WALL_PERIODIC, &spin, &t);
     if (test_filter[0]) printf("through the seam: momentum within %.1e\n", lost);
+    CHECK(lost < MOMENTUM_ROUNDING);
+    scene_sharp = 1;
+    lost = momentum_lost(GS4_INTEGRATOR_GS4, (double)INFINITY, 1, GS4_WALL_PERIODIC, &spin, &t);
+    scene_sharp = 0;
+    if (test_filter[0]) printf("through the seam, sharpened: momentum within %.1e\n", lost);
     CHECK(lost < MOMENTUM_ROUNDING);
 }
 

@@ -118,10 +118,10 @@
  *     Poiseuille flow and for heat, whose modes decay within 0.4 % at 32 cells a wave, see tests/test_heat.c; sound speed within 1.5 % at
  *     32 cells a wave; a melting front within 0.3 cells; heat in an insulated box conserved to the tolerance of the solver,
  *     temperatures beyond those given by up to 1 % of a jump;
- *     with sharp_gradients elastic waves and sound within 0.1 % at 32 cells a wave, order in space 2.5; the pressure within two cells of a free
- *     surface is off by up to 0.13 rho g h (else 0.03);
+ *     with sharp_gradients elastic waves and sound within 0.1 % at 32 cells a wave, order in space 2.5; the pressure of a column at rest is off by
+ *     up to 0.3 rho g h in the cell at its surface and 0.13 rho g h above its floor (else 0.1 and 0.08);
  *     free flight exact to rounding where rho_s = 0, else to O(dt^2); momentum to rounding away from walls and spray; a column at rest keeps
- *     its pressure within 0.3 % and its speed below 1e-4 sqrt(g h).
+ *     its pressure within 0.5 % and its speed below 1e-4 sqrt(g h).
  *
  * STABILITY. gs4_stable_dt is the least of
  *     sound and viscosity   (w dt)^2 + (d dt) (3 + rho_inf + rho_s - rho_inf rho_s)/2 <= 2 (1 - rho_inf rho_s)
@@ -387,8 +387,8 @@ typedef struct gs4_sim_desc {
     gs4_log_fn log; void *log_user; /* silent when absent */
     gs4_now_fn now; void *now_user;
     int      sharp_gradients;       /* 1: the transfers' own error of second order is taken out of gradients and forces. Waves of elasticity and sound
-                                       keep their speed (32 cells a wave: within 0.1 % instead of 1.1 %), for 1.2 times the time of a step and 1.5 to 2.3
-                                       times the steps. Liquids alone, no symplectic Euler */
+                                       keep their speed (32 cells a wave: within 0.1 % instead of 1.1 %), the error of a drop that breathes halves, for
+                                       1.2 times the time of a step and 1.5 (sound) to 2.3 (viscosity) times the steps. Liquids alone, no Euler */
 } gs4_sim_desc;
 
 GS4_API int  gs4_create(const gs4_sim_desc *desc, gs4_sim **sim);

@@ -228,7 +228,7 @@ static void test_poiseuille(void)
     }
 }
 
-/* A column at rest: pressure profile within 1 %, and it stays at rest. */
+/* A column at rest, 7 cells high: pressure profile within 1 % (2 % where gradients are sharpened), and it stays at rest. */
 static void column_at_rest(gs4_integrator integrator, gs4_wall floor)
 {
     gs4_sim_desc d = scene_cube(12);
@@ -252,7 +252,7 @@ static void column_at_rest(gs4_integrator integrator, gs4_wall floor)
     }
     if (test_filter[0]) printf("column, integrator %d, floor %d: speed %.1e sqrt(g h), pressure within %.2f %%\n", (int)integrator, (int)floor, speed, 100 * error);
     CHECK(speed < 1e-3);
-    CHECK(error < 0.01);
+    CHECK(error < (scene_sharp ? 0.02 : 0.01));
     gs4_destroy(sim);
 }
 
@@ -264,6 +264,9 @@ static void test_column_at_rest(void)
         column_at_rest(physics_integrators[i], GS4_WALL_STICK);
         column_at_rest(physics_integrators[i], GS4_WALL_SEPARATE);
     }
+    scene_sharp = 1;
+    for (i = 0; i < (test_slow ? 3 : 0); i++) column_at_rest(GS4_INTEGRATOR_GS4, (gs4_wall)i);
+    scene_sharp = 0;
 }
 
 /* Standing sound wave along x in a periodic box: frequency within 2 % of c0 k. */

@@ -2828,11 +2828,14 @@ typedef struct gs4i_quad { gs4_real lane[4]; } gs4i_quad;
 #define GS4I_LOAD(v, p) memcpy(&(v), (p), sizeof(v))
 #define GS4I_STORE(p, v) memcpy((p), &(v), sizeof(v))
 
-/* A row is one vector of sixteen where the machine has such, three quads elsewhere: it is not left to the compiler to
- * break up long vectors, which costs gcc a factor of four. */
+/* A row is one vector of sixteen where the machine has such, one of eight and a quad where it has those, three quads elsewhere: it is not
+ * left to the compiler to break up long vectors, which costs gcc a factor of four. */
+#if defined(GS4I_VECTORS) && defined(__AVX__) && !defined(GS4_DOUBLE)
+typedef gs4_real gs4i_pair __attribute__((vector_size(8 * sizeof(gs4_real))));
+#define GS4I_PAIRS 1
+#endif
 #if defined(GS4I_VECTORS) && defined(__AVX512F__) && !defined(GS4_DOUBLE)
 #define GS4I_LONG_ROWS 1
-typedef gs4_real gs4i_pair __attribute__((vector_size(8 * sizeof(gs4_real))));
 typedef gs4_real gs4i_row  __attribute__((vector_size(16 * sizeof(gs4_real))));
 #define GS4I_ROW_LOAD GS4I_LOAD
 #define GS4I_ROW_STORE GS4I_STORE
@@ -2842,6 +2845,18 @@ typedef gs4_real gs4i_row  __attribute__((vector_size(16 * sizeof(gs4_real))));
 #define GS4I_ROW_SPLAT_MAD GS4I_SPLAT_MAD
 #define GS4I_ROW_SUM GS4I_SUM
 #define GS4I_ROW_DIFFERENCE GS4I_DIFFERENCE
+#elif defined(GS4I_PAIRS)
+typedef struct gs4i_row { gs4i_pair ab; gs4i_quad c; } gs4i_row;
+#define GS4I_ROW_LOAD(v, p) do { GS4I_LOAD((v).ab, p); GS4I_LOAD((v).c, (p) + 8); } while (0)
+#define GS4I_ROW_STORE(p, v) do { GS4I_STORE(p, (v).ab); GS4I_STORE((p) + 8, (v).c); } while (0)
+#define GS4I_ROW_MUL(r, x, y) do { GS4I_MUL((r).ab, (x).ab, (y).ab); GS4I_MUL((r).c, (x).c, (y).c); } while (0)
+#define GS4I_ROW_MAD(r, x, y) do { GS4I_MAD((r).ab, (x).ab, (y).ab); GS4I_MAD((r).c, (x).c, (y).c); } while (0)
+#define GS4I_SPREAD(s) const gs4_real gs4i_n = (s); const gs4i_pair gs4i_s = { gs4i_n, gs4i_n, gs4i_n, gs4i_n, gs4i_n, gs4i_n, gs4i_n, gs4i_n }    /* once for both parts */
+#define GS4I_HALF(p) __builtin_shufflevector(p, p, 0, 1, 2, 3)
+#define GS4I_ROW_SPLAT_MUL(r, s, x) do { GS4I_SPREAD(s); GS4I_MUL((r).ab, gs4i_s, (x).ab); GS4I_MUL((r).c, GS4I_HALF(gs4i_s), (x).c); } while (0)
+#define GS4I_ROW_SPLAT_MAD(r, s, x) do { GS4I_SPREAD(s); GS4I_MAD((r).ab, gs4i_s, (x).ab); GS4I_MAD((r).c, GS4I_HALF(gs4i_s), (x).c); } while (0)
+#define GS4I_ROW_SUM(r, x, y) do { GS4I_SUM((r).ab, (x).ab, (y).ab); GS4I_SUM((r).c, (x).c, (y).c); } while (0)
+#define GS4I_ROW_DIFFERENCE(r, x, y) do { GS4I_DIFFERENCE((r).ab, (x).ab, (y).ab); GS4I_DIFFERENCE((r).c, (x).c, (y).c); } while (0)
 #else
 typedef struct gs4i_row { gs4i_quad a, b, c; } gs4i_row;                /* one quad a node */
 #define GS4I_ROW_LOAD(v, p) do { GS4I_LOAD((v).a, p); GS4I_LOAD((v).b, (p) + 4); GS4I_LOAD((v).c, (p) + 8); } while (0)
@@ -2859,6 +2874,8 @@ GS4I_INLINE void gs4i_row_of_nodes(gs4i_row *r, gs4_real a, gs4_real b, gs4_real
 {
 #ifdef GS4I_LONG_ROWS
     const gs4i_row all = { a, a, a, a, b, b, b, b, c, c, c, c, 0, 0, 0, 0 };
+#elif defined(GS4I_PAIRS)
+    const gs4i_row all = { { a, a, a, a, b, b, b, b }, { c, c, c, c } };
 #else
     const gs4i_row all = { { GS4I_LANES(a, a, a, a) }, { GS4I_LANES(b, b, b, b) }, { GS4I_LANES(c, c, c, c) } };
 #endif
@@ -2871,6 +2888,8 @@ GS4I_INLINE void gs4i_row_of_quad(gs4i_row *r, const gs4i_quad *q)
 #ifdef GS4I_LONG_ROWS
     const gs4i_pair p = __builtin_shufflevector(*q, *q, 0, 1, 2, 3, 0, 1, 2, 3);    /* doubled twice: in one go gcc goes through memory */
     *r = __builtin_shufflevector(p, p, 0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7);
+#elif defined(GS4I_PAIRS)
+    r->ab = __builtin_shufflevector(*q, *q, 0, 1, 2, 3, 0, 1, 2, 3); r->c = *q;
 #else
     r->a = *q; r->b = *q; r->c = *q;
 #endif
@@ -2899,6 +2918,8 @@ GS4I_INLINE void gs4i_row_dot(gs4i_quad *q, const gs4i_row *x, const gs4i_row *y
         const gs4i_pair p = __builtin_shufflevector(t, t, 0, 1, 2, 3, 4, 5, 6, 7) + __builtin_shufflevector(t, t, 8, 9, 10, 11, 12, 13, 14, 15);
         *q = __builtin_shufflevector(p, p, 0, 1, 2, 3) + __builtin_shufflevector(p, p, 4, 5, 6, 7);
     }
+#elif defined(GS4I_PAIRS)
+    *q = (__builtin_shufflevector(t.ab, t.ab, 0, 1, 2, 3) + t.c) + __builtin_shufflevector(t.ab, t.ab, 4, 5, 6, 7);
 #else
     GS4I_SUM(*q, t.a, t.c); GS4I_SUM(*q, *q, t.b);
 #endif
@@ -2988,16 +3009,27 @@ GS4I_INLINE void gs4i_sixteen_to_lanes(const gs4_real *from, int apart, gs4i_lan
     to[1][0] = __builtin_shufflevector(xy, XY, 8, 9, 10, 11, 12, 13, 14, 15, 24, 25, 26, 27, 28, 29, 30, 31);
     to[2][0] = __builtin_shufflevector(zw, ZW, 0, 1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 20, 21, 22, 23);
     to[3][0] = __builtin_shufflevector(zw, ZW, 8, 9, 10, 11, 12, 13, 14, 15, 24, 25, 26, 27, 28, 29, 30, 31);
-#elif GS4I_WIDTH > 1
-    gs4i_quad c[4][4];
-    int b, q, i;
-    for (b = 0; b < GS4I_BATCH / GS4I_WIDTH; b++, from += apart * GS4I_WIDTH) {
-        for (q = 0; q < GS4I_WIDTH / 4; q++) gs4i_transpose(from + 4 * apart * q, apart, c[q]);
-#if GS4I_WIDTH == 8
-        for (i = 0; i < 4; i++) to[i][b] = __builtin_shufflevector(c[0][i], c[1][i], 0, 1, 2, 3, 4, 5, 6, 7);
-#else
-        for (i = 0; i < 4; i++) to[i][b] = c[0][i];
-#endif
+#elif GS4I_WIDTH == 8
+    int b, i;
+    for (b = 0; b < 2; b++) {
+        gs4i_wide p[4], xy, zw, XY, ZW;                     /* particles 0 and 4, 1 and 5, ... */
+        for (i = 0; i < 4; i++, from += apart) {
+            gs4i_quad low, high;
+            GS4I_LOAD(low, from); GS4I_LOAD(high, from + 4 * apart);
+            p[i] = __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7);
+        }
+        from += 4 * apart;
+        xy = __builtin_shufflevector(p[0], p[1], 0, 8, 1, 9, 4, 12, 5, 13); zw = __builtin_shufflevector(p[0], p[1], 2, 10, 3, 11, 6, 14, 7, 15);
+        XY = __builtin_shufflevector(p[2], p[3], 0, 8, 1, 9, 4, 12, 5, 13); ZW = __builtin_shufflevector(p[2], p[3], 2, 10, 3, 11, 6, 14, 7, 15);
+        to[0][b] = __builtin_shufflevector(xy, XY, 0, 1, 8, 9, 4, 5, 12, 13); to[1][b] = __builtin_shufflevector(xy, XY, 2, 3, 10, 11, 6, 7, 14, 15);
+        to[2][b] = __builtin_shufflevector(zw, ZW, 0, 1, 8, 9, 4, 5, 12, 13); to[3][b] = __builtin_shufflevector(zw, ZW, 2, 3, 10, 11, 6, 7, 14, 15);
+    }
+#elif GS4I_WIDTH == 4
+    gs4i_quad c[4];
+    int b, i;
+    for (b = 0; b < GS4I_BATCH / 4; b++, from += 4 * apart) {
+        gs4i_transpose(from, apart, c);
+        for (i = 0; i < 4; i++) to[i][b] = c[i];
     }
 #else
     int b, i;
@@ -3035,7 +3067,18 @@ GS4I_INLINE void gs4i_from_lanes(const gs4i_wide *x, const gs4i_wide *y, const g
     const gs4i_wide p8 = __builtin_shufflevector(p8c, pae, 0, 1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 20, 21, 22, 23);
     const gs4i_wide pc = __builtin_shufflevector(p8c, pae, 8, 9, 10, 11, 12, 13, 14, 15, 24, 25, 26, 27, 28, 29, 30, 31);
     GS4I_STORE(to, p0); GS4I_STORE(to + 16, p4); GS4I_STORE(to + 32, p8); GS4I_STORE(to + 48, pc);
-#elif GS4I_WIDTH > 1
+#elif GS4I_WIDTH == 8
+    int b;
+    for (b = 0; b < 2; b++, to += 32) {
+        const gs4i_wide xy = __builtin_shufflevector(x[b], y[b], 0, 8, 1, 9, 4, 12, 5, 13), XY = __builtin_shufflevector(x[b], y[b], 2, 10, 3, 11, 6, 14, 7, 15);
+        const gs4i_wide zw = __builtin_shufflevector(z[b], w[b], 0, 8, 1, 9, 4, 12, 5, 13), ZW = __builtin_shufflevector(z[b], w[b], 2, 10, 3, 11, 6, 14, 7, 15);
+        const gs4i_wide p04 = __builtin_shufflevector(xy, zw, 0, 1, 8, 9, 4, 5, 12, 13), p15 = __builtin_shufflevector(xy, zw, 2, 3, 10, 11, 6, 7, 14, 15);
+        const gs4i_wide p26 = __builtin_shufflevector(XY, ZW, 0, 1, 8, 9, 4, 5, 12, 13), p37 = __builtin_shufflevector(XY, ZW, 2, 3, 10, 11, 6, 7, 14, 15);
+        const gs4i_wide p01 = __builtin_shufflevector(p04, p15, 0, 1, 2, 3, 8, 9, 10, 11), p23 = __builtin_shufflevector(p26, p37, 0, 1, 2, 3, 8, 9, 10, 11);
+        const gs4i_wide p45 = __builtin_shufflevector(p04, p15, 4, 5, 6, 7, 12, 13, 14, 15), p67 = __builtin_shufflevector(p26, p37, 4, 5, 6, 7, 12, 13, 14, 15);
+        GS4I_STORE(to, p01); GS4I_STORE(to + 8, p23); GS4I_STORE(to + 16, p45); GS4I_STORE(to + 24, p67);
+    }
+#elif GS4I_WIDTH == 4
     int b;
     for (b = 0; b < GS4I_BATCH; b += 4) {
         gs4_real four[16];
@@ -10968,6 +11011,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_FACES_OF
 #undef GS4I_GRAPHS
 #undef GS4I_GREATER
+#undef GS4I_HALF
 #undef GS4I_HUGE
 #undef GS4I_INLINE
 #undef GS4I_INSULATES
@@ -10999,6 +11043,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_NO_HEAT
 #undef GS4I_NTH
 #undef GS4I_NTH_CONST
+#undef GS4I_PAIRS
 #undef GS4I_PREFETCH
 #undef GS4I_PRESSED
 #undef GS4I_IMAGED
@@ -11019,6 +11064,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_SPLAT_MUL
 #undef GS4I_SPLIT_LIMIT
 #undef GS4I_SPLIT_TOLERANCE
+#undef GS4I_SPREAD
 #undef GS4I_SQRT
 #undef GS4I_STICKY_REACH
 #undef GS4I_GHOST_NODES

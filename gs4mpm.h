@@ -2828,8 +2828,8 @@ typedef struct gs4i_quad { gs4_real lane[4]; } gs4i_quad;
 #define GS4I_LOAD(v, p) memcpy(&(v), (p), sizeof(v))
 #define GS4I_STORE(p, v) memcpy((p), &(v), sizeof(v))
 
-/* A row is one vector of sixteen where the machine has such, one of eight and a quad where it has those, three quads elsewhere: it is not
- * left to the compiler to break up long vectors, which costs gcc a factor of four. */
+/* A row is one vector of sixteen where the machine has such, two of eight where it has those, three quads elsewhere: it is not left to
+ * the compiler to break up long vectors, which costs gcc a factor of four. */
 #if defined(GS4I_VECTORS) && defined(__AVX__) && !defined(GS4_DOUBLE)
 typedef gs4_real gs4i_pair __attribute__((vector_size(8 * sizeof(gs4_real))));
 #define GS4I_PAIRS 1
@@ -2846,17 +2846,16 @@ typedef gs4_real gs4i_row  __attribute__((vector_size(16 * sizeof(gs4_real))));
 #define GS4I_ROW_SUM GS4I_SUM
 #define GS4I_ROW_DIFFERENCE GS4I_DIFFERENCE
 #elif defined(GS4I_PAIRS)
-typedef struct gs4i_row { gs4i_pair ab; gs4i_quad c; } gs4i_row;
-#define GS4I_ROW_LOAD(v, p) do { GS4I_LOAD((v).ab, p); GS4I_LOAD((v).c, (p) + 8); } while (0)
-#define GS4I_ROW_STORE(p, v) do { GS4I_STORE(p, (v).ab); GS4I_STORE((p) + 8, (v).c); } while (0)
-#define GS4I_ROW_MUL(r, x, y) do { GS4I_MUL((r).ab, (x).ab, (y).ab); GS4I_MUL((r).c, (x).c, (y).c); } while (0)
-#define GS4I_ROW_MAD(r, x, y) do { GS4I_MAD((r).ab, (x).ab, (y).ab); GS4I_MAD((r).c, (x).c, (y).c); } while (0)
-#define GS4I_SPREAD(s) const gs4_real gs4i_n = (s); const gs4i_pair gs4i_s = { gs4i_n, gs4i_n, gs4i_n, gs4i_n, gs4i_n, gs4i_n, gs4i_n, gs4i_n }    /* once for both parts */
-#define GS4I_HALF(p) __builtin_shufflevector(p, p, 0, 1, 2, 3)
-#define GS4I_ROW_SPLAT_MUL(r, s, x) do { GS4I_SPREAD(s); GS4I_MUL((r).ab, gs4i_s, (x).ab); GS4I_MUL((r).c, GS4I_HALF(gs4i_s), (x).c); } while (0)
-#define GS4I_ROW_SPLAT_MAD(r, s, x) do { GS4I_SPREAD(s); GS4I_MAD((r).ab, gs4i_s, (x).ab); GS4I_MAD((r).c, GS4I_HALF(gs4i_s), (x).c); } while (0)
-#define GS4I_ROW_SUM(r, x, y) do { GS4I_SUM((r).ab, (x).ab, (y).ab); GS4I_SUM((r).c, (x).c, (y).c); } while (0)
-#define GS4I_ROW_DIFFERENCE(r, x, y) do { GS4I_DIFFERENCE((r).ab, (x).ab, (y).ab); GS4I_DIFFERENCE((r).c, (x).c, (y).c); } while (0)
+typedef struct gs4i_row { gs4i_pair ab, cd; } gs4i_row;
+#define GS4I_SPREAD(s) const gs4_real gs4i_n = (s); const gs4i_pair gs4i_s = { gs4i_n, gs4i_n, gs4i_n, gs4i_n, gs4i_n, gs4i_n, gs4i_n, gs4i_n }    /* once for both */
+#define GS4I_ROW_LOAD(v, p) do { GS4I_LOAD((v).ab, p); GS4I_LOAD((v).cd, (p) + 8); } while (0)
+#define GS4I_ROW_STORE(p, v) do { GS4I_STORE(p, (v).ab); GS4I_STORE((p) + 8, (v).cd); } while (0)
+#define GS4I_ROW_MUL(r, x, y) do { GS4I_MUL((r).ab, (x).ab, (y).ab); GS4I_MUL((r).cd, (x).cd, (y).cd); } while (0)
+#define GS4I_ROW_MAD(r, x, y) do { GS4I_MAD((r).ab, (x).ab, (y).ab); GS4I_MAD((r).cd, (x).cd, (y).cd); } while (0)
+#define GS4I_ROW_SPLAT_MUL(r, s, x) do { GS4I_SPREAD(s); GS4I_MUL((r).ab, gs4i_s, (x).ab); GS4I_MUL((r).cd, gs4i_s, (x).cd); } while (0)
+#define GS4I_ROW_SPLAT_MAD(r, s, x) do { GS4I_SPREAD(s); GS4I_MAD((r).ab, gs4i_s, (x).ab); GS4I_MAD((r).cd, gs4i_s, (x).cd); } while (0)
+#define GS4I_ROW_SUM(r, x, y) do { GS4I_SUM((r).ab, (x).ab, (y).ab); GS4I_SUM((r).cd, (x).cd, (y).cd); } while (0)
+#define GS4I_ROW_DIFFERENCE(r, x, y) do { GS4I_DIFFERENCE((r).ab, (x).ab, (y).ab); GS4I_DIFFERENCE((r).cd, (x).cd, (y).cd); } while (0)
 #else
 typedef struct gs4i_row { gs4i_quad a, b, c; } gs4i_row;                /* one quad a node */
 #define GS4I_ROW_LOAD(v, p) do { GS4I_LOAD((v).a, p); GS4I_LOAD((v).b, (p) + 4); GS4I_LOAD((v).c, (p) + 8); } while (0)
@@ -2875,7 +2874,7 @@ GS4I_INLINE void gs4i_row_of_nodes(gs4i_row *r, gs4_real a, gs4_real b, gs4_real
 #ifdef GS4I_LONG_ROWS
     const gs4i_row all = { a, a, a, a, b, b, b, b, c, c, c, c, 0, 0, 0, 0 };
 #elif defined(GS4I_PAIRS)
-    const gs4i_row all = { { a, a, a, a, b, b, b, b }, { c, c, c, c } };
+    const gs4i_row all = { { a, a, a, a, b, b, b, b }, { c, c, c, c, 0, 0, 0, 0 } };
 #else
     const gs4i_row all = { { GS4I_LANES(a, a, a, a) }, { GS4I_LANES(b, b, b, b) }, { GS4I_LANES(c, c, c, c) } };
 #endif
@@ -2889,7 +2888,7 @@ GS4I_INLINE void gs4i_row_of_quad(gs4i_row *r, const gs4i_quad *q)
     const gs4i_pair p = __builtin_shufflevector(*q, *q, 0, 1, 2, 3, 0, 1, 2, 3);    /* doubled twice: in one go gcc goes through memory */
     *r = __builtin_shufflevector(p, p, 0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7);
 #elif defined(GS4I_PAIRS)
-    r->ab = __builtin_shufflevector(*q, *q, 0, 1, 2, 3, 0, 1, 2, 3); r->c = *q;
+    r->ab = r->cd = __builtin_shufflevector(*q, *q, 0, 1, 2, 3, 0, 1, 2, 3);
 #else
     r->a = *q; r->b = *q; r->c = *q;
 #endif
@@ -2919,7 +2918,8 @@ GS4I_INLINE void gs4i_row_dot(gs4i_quad *q, const gs4i_row *x, const gs4i_row *y
         *q = __builtin_shufflevector(p, p, 0, 1, 2, 3) + __builtin_shufflevector(p, p, 4, 5, 6, 7);
     }
 #elif defined(GS4I_PAIRS)
-    *q = (__builtin_shufflevector(t.ab, t.ab, 0, 1, 2, 3) + t.c) + __builtin_shufflevector(t.ab, t.ab, 4, 5, 6, 7);
+    t.cd += t.ab;
+    *q = __builtin_shufflevector(t.cd, t.cd, 0, 1, 2, 3) + __builtin_shufflevector(t.ab, t.ab, 4, 5, 6, 7);
 #else
     GS4I_SUM(*q, t.a, t.c); GS4I_SUM(*q, *q, t.b);
 #endif
@@ -11011,7 +11011,6 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_FACES_OF
 #undef GS4I_GRAPHS
 #undef GS4I_GREATER
-#undef GS4I_HALF
 #undef GS4I_HUGE
 #undef GS4I_INLINE
 #undef GS4I_INSULATES

@@ -3600,7 +3600,7 @@ static void gs4i_tile_add(const gs4i_grid *g, int o, uint64_t rows, const gs4_re
  * Each of the four transfers of a step sees 1 - (k h)^2/8 of a wave exp(ikx). S v = v - sum_a share_a D_a v, D_a the second difference along axis a,
  * gives that back: gradients are those of S v, and forces of stress go through the transpose of S, so that stress gives to motion what it takes from
  * it. D_a of a linear field is 0: momentum, turning and uniform strain stay what they are. share_a is the least `full` of the three nodes of D_a:
- * 1/4 where they are filled to 80 %, 0 where one is to less than 40 %, smooth between. */
+ * 1/4 where they are filled to 80 % (by mass, of the densest material), 0 where one is to less than 40 %, smooth between. */
 
 /* What a node that holds so much of what it can hold allows. */
 GS4I_INLINE gs4_real gs4i_fullness(gs4_real filled)
@@ -3680,6 +3680,7 @@ typedef struct gs4i_rule {
     gs4_real inv_area;                  /* 1 / h^2 */
     gs4_real fast_decay;                /* what is added to k where the grid sees little: c0 / h */
     gs4_real inv_full;                  /* 1 / mass of a node in the midst of the lightest material */
+    gs4_real inv_fullest;               /* of the densest */
     gs4_real inv_alpha_m, next_shift;
     int afresh;                         /* no rates yet: first step, or after an edit */
 } gs4i_rule;
@@ -5922,7 +5923,7 @@ static void gs4i_fold_weights(const gs4i_boundary *b, const gs4i_grid *g, gs4_ve
                 const gs4i_image *pair = &b->images[wall][i];
                 gs4_real *from = g->force + 4 * (size_t)pair->image, *to = g->force + 4 * (size_t)pair->mirror;
                 if (!gs4i_is_folded(b, g, pair, wall)) continue;
-                for (a = 0; a < 3; a++) *(pass ? to + a : from + a) = pass ? to[a] + sign[a] * from[a] : from[3] * g3[a];
+                for (a = 0; a < 3; a++) if (pass) to[a] += sign[a] * from[a]; else from[a] = from[3] * g3[a];
             }
         }
 }
@@ -8428,10 +8429,11 @@ static gs4i_rule gs4i_make_rule(const gs4_sim *sim, gs4_real dt)
     k.inv_area = sim->grid.inv_h * sim->grid.inv_h;
     k.mixing = sim->particles.with_rates ? gs4i_mixing(&k) : GS4I_C(0.5) / k.s;
     k.inv_alpha_m = 1 / k.alpha_m;
-    k.fast_decay = 0; k.inv_full = 0;
+    k.fast_decay = 0; k.inv_full = 0; k.inv_fullest = GS4I_HUGE;
     for (i = 0; i < sim->material_count; i++) {
         k.fast_decay = gs4i_max(k.fast_decay, sim->laws[i].sound_speed / sim->grid.h);
         k.inv_full = gs4i_max(k.inv_full, sim->laws[i].inv_density / (sim->grid.h * sim->grid.h * sim->grid.h));
+        k.inv_fullest = gs4i_min(k.inv_fullest, sim->laws[i].inv_density / (sim->grid.h * sim->grid.h * sim->grid.h));
     }
     return k;
 }
@@ -8636,7 +8638,7 @@ static void gs4i_find_fullness(int index, void *context)
     const gs4i_grid *g = &sim->grid;
     const size_t end = (size_t)GS4I_BLOCK_NODES * (size_t)gs4i_group_end(g, index);
     size_t i = (size_t)GS4I_BLOCK_NODES * (size_t)(index * GS4I_GROUP);
-    for (; i < end; i++) g->full[i] = gs4i_fullness(g->momentum[4 * i + 3] * sim->rule.inv_full);
+    for (; i < end; i++) g->full[i] = gs4i_fullness(g->momentum[4 * i + 3] * sim->rule.inv_fullest);
 }
 
 static void gs4i_sharpen_velocities(int index, void *context)

@@ -65,6 +65,7 @@ int main(int count, char **values)
     run_stress();
     run_poisson();
     RUN(test_stability);
+    RUN_ONCE(test_stability_of_two_densities);
     RUN(test_extremes);
     RUN(test_short_decay);
     RUN(test_tiny_step);

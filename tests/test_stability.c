@@ -75,6 +75,31 @@ static void test_stability(void)
     }
 }
 
+/* What is sharpened is what is full, by the densest of the materials: else nodes that hold little would be, too, and swing ever more. */
+static void test_stability_of_two_densities(void)
+{
+    gs4_sim_desc d = scene_cube(20);
+    gs4_material heavy = scene_liquid(2000, 0, 10), light = scene_liquid(50, 0, 10);
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    gs4_sim *sim;
+    double start, most = 0;
+    int i;
+    d.sharp_gradients = 1; d.flip_decay_time = INFINITY; d.rho_inf = 1;
+    sim = physics_create(&d, &heavy);
+    CHECK(gs4_add_material(sim, &light) == 1);
+    f.jitter = 1; f.random_seed = 5;
+    CHECK(gs4_add_particles(sim, gs4_sphere(at(0.38, 0.5, 0.5), (gs4_real)0.15), &f) > 0);
+    stability_stir(sim, 0.01, 1);
+    start = gs4_get_stats(sim).kinetic_energy;
+    for (i = 0; i < 900 && most < 100; i++) {
+        CHECK_RESULT(sim, gs4_step(sim, (gs4_real)(0.95 * (double)gs4_stable_dt(sim))), GS4_OK);
+        most = fmax(most, gs4_get_stats(sim).kinetic_energy / start);
+    }
+    if (test_filter[0]) printf("two densities, sharpened: energy at most %.3f of what it was\n", most);
+    CHECK(most < 1.05);
+    gs4_destroy(sim);
+}
+
 /* --- extremes ------------------------------------------------------------------------------------------- */
 
 typedef struct stability_scene {

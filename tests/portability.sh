@@ -9,7 +9,7 @@ set -u
 cd "$(dirname "$0")/.." || exit 1
 CC=${CC:-cc}
 
-quick='layout names units snippets few_warnings few_hashes link'
+quick='layout names snippets few_warnings few_hashes link'
 full='warnings tsan hashes asan arm hashes_double wasm windows tiny musl i386 layout names units snippets link frames examples'
 
 # A transfer kernel may be longer than 60 lines; nothing else.

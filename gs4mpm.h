@@ -4461,7 +4461,7 @@ static void gs4i_linear_advance(const gs4i_split *p, double c[6], double dt)
     for (i = 0; i < 6; i++) c[i] += H[i] + (i < 3);
 }
 
-#define GS4I_SPLIT_TOLERANCE 1e-5       /* of a substep, relative to S */
+#define GS4I_SPLIT_TOLERANCE 5e-6       /* of a substep, relative to S */
 #define GS4I_SPLIT_LIMIT 20000          /* substeps; more means that nothing settles */
 
 /* Conformation after the time dt under constant L. 0, or GS4_ERROR_UNSTABLE where it overflows or takes too long. */

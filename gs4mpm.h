@@ -5866,7 +5866,8 @@ GS4I_INLINE int gs4i_is_folded(const gs4i_boundary *b, const gs4i_grid *g, const
     return b->walls[wall] == GS4_WALL_PERIODIC || (*gs4i_contact_at(g, pair->image) >> (wall / 2) & 1);
 }
 
-static void gs4i_fold_force(const gs4i_boundary *b, const gs4i_grid *g)
+/* Fold forces; where `stress` is among them, what pushes out presses on the wall. */
+static void gs4i_fold_force(const gs4i_boundary *b, const gs4i_grid *g, int stress)
 {
     int wall, i, a;
     for (wall = 0; wall < 6; wall++) {
@@ -5877,7 +5878,7 @@ static void gs4i_fold_force(const gs4i_boundary *b, const gs4i_grid *g)
             const gs4_real *from = g->force + 4 * (size_t)pair->image;
             gs4_real *to = g->force + 4 * (size_t)pair->mirror;
             int folded = gs4i_is_folded(b, g, pair, wall);
-            if (b->walls[wall] == GS4_WALL_SEPARATE && from[wall / 2] * outward > 0) *gs4i_contact_at(g, pair->image) |= GS4I_PRESSED;
+            if (stress && b->walls[wall] == GS4_WALL_SEPARATE && from[wall / 2] * outward > 0) *gs4i_contact_at(g, pair->image) |= GS4I_PRESSED;
             if (folded) for (a = 0; a < 3; a++) to[a] += sign[a] * from[a];
         }
     }
@@ -5910,21 +5911,16 @@ static void gs4i_fill_fullness(const gs4i_boundary *b, const gs4i_grid *g)
         }
 }
 
-/* Fold the weights that images carry, once their other forces are folded: their fourth number is a mass. */
-static void gs4i_fold_weights(const gs4i_boundary *b, const gs4i_grid *g, gs4_vec3 gravity)
+/* Images that fold carry their weight alone: their other forces are folded already. The fourth number of a force is the mass. */
+static void gs4i_weigh_images(const gs4i_boundary *b, const gs4i_grid *g, gs4_vec3 gravity)
 {
-    const gs4_real g3[3] = { gravity.x, gravity.y, gravity.z };
-    int pass, wall, i, a;
-    for (pass = 0; pass < 2; pass++)
-        for (wall = 0; wall < 6; wall++) {
-            gs4_real sign[3];
-            gs4i_reflection(b->walls[wall], wall / 2, sign);
-            for (i = 0; i < b->image_count[wall]; i++) {
-                const gs4i_image *pair = &b->images[wall][i];
-                gs4_real *from = g->force + 4 * (size_t)pair->image, *to = g->force + 4 * (size_t)pair->mirror;
-                if (!gs4i_is_folded(b, g, pair, wall)) continue;
-                for (a = 0; a < 3; a++) if (pass) to[a] += sign[a] * from[a]; else from[a] = from[3] * g3[a];
-            }
+    int wall, i;
+    for (wall = 0; wall < 6; wall++)
+        for (i = 0; i < b->image_count[wall]; i++) {
+            const gs4i_image *pair = &b->images[wall][i];
+            gs4_real *f = g->force + 4 * (size_t)pair->image;
+            if (!gs4i_is_folded(b, g, pair, wall)) continue;
+            f[0] = f[3] * gravity.x; f[1] = f[3] * gravity.y; f[2] = f[3] * gravity.z;
         }
 }
 
@@ -8712,6 +8708,7 @@ static int gs4i_rasterise(gs4_sim *sim, gs4i_node_pass *nodes)
     return gs4i_fail(sim, GS4_ERROR_UNSTABLE, "particles would move more than a cell beyond the domain in one step; the step was not taken");
 }
 
+/* S v_i or S u_i, images included. */
 static void gs4i_sharpen(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_sharpen_velocities, nodes);
@@ -8742,12 +8739,13 @@ static void gs4i_finish_forces(gs4_sim *sim, gs4i_node_pass *nodes)
     gs4i_grid *g = &sim->grid;
     gs4_real *force = g->force;
     gs4i_scatter_ghosts(sim, gs4i_scatter_ghost_force);
-    gs4i_fold_force(&sim->boundary, g);
+    gs4i_fold_force(&sim->boundary, g, 1);
     if (!g->with_sharp) return;
     gs4i_fill_images(&sim->boundary, g, g->force);
     gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_sharpen_forces, nodes);
     g->force = g->sharp; g->sharp = force;
-    gs4i_fold_weights(&sim->boundary, g, sim->desc.gravity);
+    gs4i_weigh_images(&sim->boundary, g, sim->desc.gravity);
+    gs4i_fold_force(&sim->boundary, g, 0);
 }
 
 /* Is what the particles have seen so far acceptable, and is dt still within the limit that follows from it? */

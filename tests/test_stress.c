@@ -231,14 +231,17 @@ static void test_stress_split(void)
             }
         }
         if (rows->kind == REF_STEP || rows->kind == REF_CESSATION || (!test_slow && cost > 15)) continue;
-        stress_split_follow(rows, n, 200, fine);
+        stress_split_follow(rows, n, 200, fine); stress_split_follow(rows, n, 400, finer);
         for (k = 0; k < n; k++) {
             worst[1] = fmax(worst[1], fine[k]);
             CHECK(fine[k] < (rows->set < 0 ? 1e-9 : 1e-3));     /* UCM and Oldroyd-B: exact */
-        }
-        stress_split_follow(rows, n, 400, fine); stress_split_follow(rows, n, 800, finer);      /* at 200 one row is at order 1.899 on its way to 2 */
-        for (k = 0; k < n; k++) {
             if (finer[k] < 1e-9) continue;
+            if (first + k == 83) {                          /* 1.899 here, 1.95 with twice the steps, on its way to 2 */
+                double finest[8];
+                stress_split_follow(rows, n, 800, finest);
+                CHECK(log2(fine[k] / finer[k]) >= 1.89); CHECK(log2(finer[k] / finest[k]) >= 1.94); orders++;
+                continue;
+            }
             CHECK(log2(fine[k] / finer[k]) >= 1.9); orders++;
             if (test_filter[0] && (fine[k] > 1e-3 || !(log2(fine[k] / finer[k]) >= 1.9)))
                 printf("row %d: errors %.2e %.2e, order %.2f\n", first + k, fine[k], finer[k], log2(fine[k] / finer[k]));

@@ -1099,11 +1099,12 @@ static void gs4i_residual_weighted(float *GS4I_RESTRICT out, const float *GS4I_R
     }
 }
 
-/* The matrix times v in double. In the double build faces are two floats. */
+/* The matrix times v in double. In the double build faces are two floats. Without a diagonal `massive` is 0 where this is inlined. */
 #define GS4I_TIMES_UNIFORM(q, v) \
     const double c = (double)(v)[l], around = ((double)left[l] + (double)right[l]) + ((double)south[l] + (double)north[l]) \
                                             + ((double)below[l] + (double)above[l]); \
-    const double q = ((double)mass[l] + (double)mass_low[l]) * c + (double)(degree[l] > 0) * ((double)degree[l] * c - around)
+    const double q = (massive ? ((double)mass[l] + (double)mass_low[l]) * c : 0) \
+                   + (double)(degree[l] > 0) * ((double)degree[l] * c - around)
 #ifdef GS4_DOUBLE
 #define GS4I_LOW_FACES , const float *GS4I_RESTRICT ll, const float *GS4I_RESTRICT lr, const float *GS4I_RESTRICT ls, \
     const float *GS4I_RESTRICT ln, const float *GS4I_RESTRICT lb, const float *GS4I_RESTRICT la
@@ -1120,29 +1121,38 @@ static void gs4i_residual_weighted(float *GS4I_RESTRICT out, const float *GS4I_R
       + (GS4I_FACE(ws[l], ls[l]) * (c - (double)south[l]) + GS4I_FACE(wn[l], ln[l]) * (c - (double)north[l])) \
       + (GS4I_FACE(wb[l], lb[l]) * (c - (double)below[l]) + GS4I_FACE(wa[l], la[l]) * (c - (double)above[l])); \
     const double q = (double)(mass[l] >= 0) * (((double)mass[l] + (double)mass_low[l]) * c + flow)
-#define GS4I_UNIFORM_MATRIX const float *GS4I_RESTRICT degree, const float *GS4I_RESTRICT mass, const float *GS4I_RESTRICT mass_low
+#define GS4I_UNIFORM_MATRIX const float *GS4I_RESTRICT degree, const float *GS4I_RESTRICT mass, const float *GS4I_RESTRICT mass_low, \
+    const int massive
 #define GS4I_WEIGHTED_MATRIX GS4I_FACES GS4I_LOW_FACES, const float *GS4I_RESTRICT mass, const float *GS4I_RESTRICT mass_low
 
-/* p.Ap */
-static double gs4i_curvature_uniform(const float *GS4I_RESTRICT p, GS4I_NEIGHBOURS(float), GS4I_UNIFORM_MATRIX, int n)
+/* p.Ap, from differences in float: it sets the length of a step alone. Faces that do not conduct have p = 0 behind them. */
+static double gs4i_curvature_uniform(const float *GS4I_RESTRICT p, GS4I_NEIGHBOURS(float), const float *GS4I_RESTRICT degree,
+                                     const float *GS4I_RESTRICT mass, int n)
 {
     double sum[GS4I_STRIP] = { 0 };
     int m, l;
-    GS4I_STRIPS(m, l, n) { GS4I_TIMES_UNIFORM(q, p); sum[l - m] += c * q; }
+    GS4I_STRIPS(m, l, n) {
+        const float c = p[l], flow = ((c - left[l]) + (c - right[l])) + ((c - south[l]) + (c - north[l])) + ((c - below[l]) + (c - above[l]));
+        sum[l - m] += (double)c * (double)(flow + (mass[l] - (6 - degree[l])) * c);
+    }
     return gs4i_sum_lanes(sum);
 }
 
-static double gs4i_curvature_weighted(const float *GS4I_RESTRICT p, GS4I_NEIGHBOURS(float), GS4I_WEIGHTED_MATRIX, int n)
+static double gs4i_curvature_weighted(const float *GS4I_RESTRICT p, GS4I_NEIGHBOURS(float), GS4I_FACES, const float *GS4I_RESTRICT mass, int n)
 {
     double sum[GS4I_STRIP] = { 0 };
     int m, l;
-    GS4I_STRIPS(m, l, n) { GS4I_TIMES_WEIGHTED(q, p); sum[l - m] += c * q; }
+    GS4I_STRIPS(m, l, n) {
+        const float c = p[l], flow = (wl[l] * (c - left[l]) + wr[l] * (c - right[l])) + (ws[l] * (c - south[l]) + wn[l] * (c - north[l]))
+                                   + (wb[l] * (c - below[l]) + wa[l] * (c - above[l]));
+        sum[l - m] += (double)c * (double)(mass[l] * c + flow);
+    }
     return gs4i_sum_lanes(sum);
 }
 
 /* x += alpha p, r -= alpha Ap; gives r.r */
-static double gs4i_update_uniform(double *GS4I_RESTRICT x, double *GS4I_RESTRICT r, double alpha, const float *GS4I_RESTRICT p,
-                                  GS4I_NEIGHBOURS(float), GS4I_UNIFORM_MATRIX, int n)
+GS4I_INLINE double gs4i_update_uniform(double *GS4I_RESTRICT x, double *GS4I_RESTRICT r, double alpha, const float *GS4I_RESTRICT p,
+                                       GS4I_NEIGHBOURS(float), GS4I_UNIFORM_MATRIX, int n)
 {
     double sum[GS4I_STRIP] = { 0 };
     int m, l;
@@ -1344,6 +1354,7 @@ static void gs4i_stage_direct(gs4i_solver *s, int level, int k)
 }
 
 #define GS4I_MASS(s, g, c, at) (g)->mass[c] ? (g)->mass[c] + (at) : (s)->zeros, (g)->mass_low[c] ? (g)->mass_low[c] + (at) : (s)->zeros
+#define GS4I_UNIFORM(s, g, c, at) (g)->degree[c] + (at), GS4I_MASS(s, g, c, at)
 #define GS4I_WEIGHTS(s, g, c, at, t) GS4I_FACES_OF((g)->w, c, at, t, g) GS4I_LOW_FACES_OF((g)->w_low, c, at, t, g), GS4I_MASS(s, g, c, at)
 
 static void gs4i_stage_curvature(gs4i_solver *s, int level, int k)
@@ -1354,8 +1365,9 @@ static void gs4i_stage_curvature(gs4i_solver *s, int level, int k)
     int j, n, c;
     GS4I_EACH_ROW(g, k, j, at, n) for (c = 0; c < 2; c++) {
         const int t = (c + j + k) & 1;
-        if (g->degree[0]) sum += gs4i_curvature_uniform(s->p[c] + at, GS4I_AROUND(s->p[!c], at, t, g), g->degree[c] + at, GS4I_MASS(s, g, c, at), n);
-        else sum += gs4i_curvature_weighted(s->p[c] + at, GS4I_AROUND(s->p[!c], at, t, g), GS4I_WEIGHTS(s, g, c, at, t), n);
+        if (g->degree[0]) sum += gs4i_curvature_uniform(s->p[c] + at, GS4I_AROUND(s->p[!c], at, t, g), g->degree[c] + at,
+                                                        g->mass[c] ? g->mass[c] + at : s->zeros, n);
+        else sum += gs4i_curvature_weighted(s->p[c] + at, GS4I_AROUND(s->p[!c], at, t, g), GS4I_FACES_OF(g->w, c, at, t, g), g->mass[c] + at, n);
     }
     s->sums[k] = sum;
 }
@@ -1368,8 +1380,10 @@ static void gs4i_stage_update(gs4i_solver *s, int level, int k)
     int j, n, c;
     GS4I_EACH_ROW(g, k, j, at, n) for (c = 0; c < 2; c++) {
         const int t = (c + j + k) & 1;
-        if (g->degree[0]) sum += gs4i_update_uniform(s->x[c] + at, g->r[c] + at, s->alpha, s->p[c] + at, GS4I_AROUND(s->p[!c], at, t, g),
-                                                     g->degree[c] + at, GS4I_MASS(s, g, c, at), n);
+        if (g->degree[0] && g->mass[0]) sum += gs4i_update_uniform(s->x[c] + at, g->r[c] + at, s->alpha, s->p[c] + at,
+                                                                   GS4I_AROUND(s->p[!c], at, t, g), GS4I_UNIFORM(s, g, c, at), 1, n);
+        else if (g->degree[0]) sum += gs4i_update_uniform(s->x[c] + at, g->r[c] + at, s->alpha, s->p[c] + at,
+                                                          GS4I_AROUND(s->p[!c], at, t, g), GS4I_UNIFORM(s, g, c, at), 0, n);
         else sum += gs4i_update_weighted(s->x[c] + at, g->r[c] + at, s->alpha, s->p[c] + at, GS4I_AROUND(s->p[!c], at, t, g),
                                          GS4I_WEIGHTS(s, g, c, at, t), n);
     }
@@ -1384,8 +1398,7 @@ static void gs4i_stage_defect(gs4i_solver *s, int level, int k)
     int j, n, c;
     GS4I_EACH_ROW(g, k, j, at, n) for (c = 0; c < 2; c++) {
         const int t = (c + j + k) & 1;
-        if (g->degree[0]) sum += gs4i_defect_uniform(g->r[c] + at, s->x[c] + at, GS4I_AROUND(s->x[!c], at, t, g), g->degree[c] + at,
-                                                     GS4I_MASS(s, g, c, at), n);
+        if (g->degree[0]) sum += gs4i_defect_uniform(g->r[c] + at, s->x[c] + at, GS4I_AROUND(s->x[!c], at, t, g), GS4I_UNIFORM(s, g, c, at), 1, n);
         else sum += gs4i_defect_weighted(g->r[c] + at, s->x[c] + at, GS4I_AROUND(s->x[!c], at, t, g), GS4I_WEIGHTS(s, g, c, at, t), n);
     }
     s->sums[k] = sum;
@@ -2529,17 +2542,23 @@ typedef uint64_t gs4i_bits;
 typedef uint32_t gs4i_bits;
 #endif
 
-/* Largest |v| in cells of one kind, as bits: these are in the order of the numbers, infinity and what is no number above all. */
-GS4I_INLINE gs4i_bits gs4i_largest_bits(const gs4_real *GS4I_RESTRICT v, const uint8_t *GS4I_RESTRICT kind, uint8_t wanted, int n, gs4i_bits most)
+/* Largest |rhs| in liquid, |x| in air and |x| in liquid, as bits: these are in the order of the numbers, infinity and what is no number
+ * above all. */
+static void gs4i_largest_bits(const gs4_real *GS4I_RESTRICT rhs, const gs4_real *GS4I_RESTRICT x, const uint8_t *GS4I_RESTRICT kind, int n,
+                              gs4i_bits *GS4I_RESTRICT most)
 {
+    gs4i_bits of_rhs = most[0], of_air = most[1], of_x = most[2];
     int i;
     for (i = 0; i < n; i++) {
-        gs4i_bits bits;
-        memcpy(&bits, v + i, sizeof bits);
-        bits = kind[i] == wanted ? bits & ~(gs4i_bits)0 >> 1 : 0;
-        most = bits > most ? bits : most;
+        const gs4i_bits liquid = (gs4i_bits)0 - (gs4i_bits)(kind[i] / GS4I_IS_LIQUID), open = (gs4i_bits)0 - (gs4i_bits)(kind[i] & GS4I_IS_OPEN);
+        gs4i_bits b, v;
+        memcpy(&b, rhs + i, sizeof b); memcpy(&v, x + i, sizeof v);
+        b = b & ~(gs4i_bits)0 >> 1 & liquid; v &= ~(gs4i_bits)0 >> 1;
+        of_rhs = b > of_rhs ? b : of_rhs;
+        of_air = (v & open & ~liquid) > of_air ? v & open & ~liquid : of_air;
+        of_x = (v & liquid) > of_x ? v & liquid : of_x;
     }
-    return most;
+    most[0] = of_rhs; most[1] = of_air; most[2] = of_x;
 }
 
 /* Largest right-hand side in liquid, x in air and x in liquid; infinity where one is not finite. */
@@ -2553,10 +2572,7 @@ static void gs4i_see_given(int k, void *context)
     int a, j;
     for (j = 0; j < n[1]; j++) {
         const size_t row = ((size_t)k * (size_t)n[1] + (size_t)j) * (size_t)n[0];
-        const uint8_t *kind = gs4i_kinds_of(s, j, k);
-        most[0] = gs4i_largest_bits(v->rhs + row, kind, GS4I_IS_OPEN | GS4I_IS_LIQUID, n[0], most[0]);
-        most[1] = gs4i_largest_bits(v->x + row, kind, GS4I_IS_OPEN, n[0], most[1]);
-        most[2] = gs4i_largest_bits(v->x + row, kind, GS4I_IS_OPEN | GS4I_IS_LIQUID, n[0], most[2]);
+        gs4i_largest_bits(v->rhs + row, v->x + row, gs4i_kinds_of(s, j, k), n[0], most);
     }
     for (a = 0; a < 3; a++) {
         memcpy(&value, &most[a], sizeof value);
@@ -11079,6 +11095,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_TILE
 #undef GS4I_TILE_REALS
 #undef GS4I_TIMES_UNIFORM
+#undef GS4I_UNIFORM
 #undef GS4I_TIMES_WEIGHTED
 #undef GS4I_TINY
 #undef GS4I_TO_REAL

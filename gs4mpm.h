@@ -1699,6 +1699,12 @@ static int gs4i_reserve_levels(gs4i_solver *s)
 
 /* --- setup: what is given ------------------------------------------------------------------------------------- */
 
+#ifdef GS4_DOUBLE
+typedef uint64_t gs4i_bits;
+#else
+typedef uint32_t gs4i_bits;
+#endif
+
 typedef struct gs4i_range { double low, high, least /* above 0 */, mass; int64_t unknowns; const char *fault; double value; } gs4i_range;
 typedef struct gs4i_setup { gs4i_solver *s; const gs4_poisson_desc *d; gs4i_range *seen; int32_t *counts; } gs4i_setup;
 
@@ -1729,12 +1735,39 @@ static void gs4i_take_kinds(int k, void *context)
     seen->unknowns = unknowns;
 }
 
-static void gs4i_see_coefficient(gs4i_range *seen, double c)
+/* Least, least above 0 and most of the coefficients of faces that conduct, as bits: a sign, or what is no number, is above all. */
+static void gs4i_range_of_bits(const gs4_real *GS4I_RESTRICT face, const uint8_t *GS4I_RESTRICT kind, const uint8_t *GS4I_RESTRICT other, int n,
+                               gs4i_bits *GS4I_RESTRICT range)
 {
-    if (!(c >= 0 && c < (double)GS4I_HUGE)) { seen->fault = "coefficient[] holds "; seen->value = c; return; }
-    if (c > seen->high) seen->high = c;
-    if (c < seen->low) seen->low = c;
-    if (c > 0 && c < seen->least) seen->least = c;
+    gs4i_bits low = range[0], least = range[1], high = range[2];
+    int i;
+    for (i = 0; i < n; i++) {
+        const gs4i_bits mask = (gs4i_bits)0 - (gs4i_bits)(kind[i] & other[i] & GS4I_IS_OPEN & (kind[i] | other[i]) / GS4I_IS_LIQUID);
+        const gs4_real c = face[i] + 0;                     /* no -0 */
+        gs4i_bits b;
+        memcpy(&b, &c, sizeof b);
+        low = (b | ~mask) < low ? b | ~mask : low;
+        least = ((b - 1) | ~mask) < least ? (b - 1) | ~mask : least;
+        high = (b & mask) > high ? b & mask : high;
+    }
+    range[0] = low; range[1] = least; range[2] = high;
+}
+
+static void gs4i_see_coefficients(gs4i_range *seen, const gs4_real *face, const uint8_t *kind, const uint8_t *other, int n)
+{
+    gs4i_bits range[3] = { ~(gs4i_bits)0, ~(gs4i_bits)0, 0 };
+    gs4_real low, least, high;
+    int i;
+    gs4i_range_of_bits(face, kind, other, n, range);
+    memcpy(&high, &range[2], sizeof high);
+    if (!(high >= 0 && high < GS4I_HUGE)) {
+        for (i = 0; GS4I_CONDUCTS(kind[i], other[i]) == 0 || (face[i] >= 0 && face[i] < GS4I_HUGE); i++) {}
+        seen->fault = "coefficient[] holds "; seen->value = (double)face[i];
+        return;
+    }
+    if ((double)high > seen->high) seen->high = (double)high;
+    if (~range[0]) { memcpy(&low, &range[0], sizeof low); if ((double)low < seen->low) seen->low = (double)low; }
+    if (~range[1]) { range[1]++; memcpy(&least, &range[1], sizeof least); if ((double)least < seen->least) seen->least = (double)least; }
 }
 
 /* Range of all coefficients and diagonals that matter; of faces those towards + */
@@ -1753,15 +1786,14 @@ static void gs4i_see_plane(int k, void *context)
         const uint8_t *kind = gs4i_kinds_of(u->s, (int)j, k);
         for (a = 0; a < 3; a++) {
             if (!d->coefficient[a]) continue;
-            for (i = 0; i < nx; i++)
-                if (GS4I_CONDUCTS(kind[i], kind[i + step[a]])) gs4i_see_coefficient(seen, (double)d->coefficient[a][face[a] + i]);
+            gs4i_see_coefficients(seen, d->coefficient[a] + face[a], kind, kind + step[a], (int)nx);
+            if (seen->fault) return;
         }
         for (i = 0; i < nx && d->diagonal; i++) if (kind[i] & GS4I_IS_LIQUID) {
             const double m = (double)d->diagonal[row * nx + i];
             if (!(m >= 0 && m < (double)GS4I_HUGE)) { seen->fault = "diagonal[] holds "; seen->value = m; return; }
             if (m > seen->mass) seen->mass = m;
         }
-        if (seen->fault) return;
     }
 }
 
@@ -1865,36 +1897,98 @@ GS4I_INLINE double gs4i_face_of(const gs4i_rows *q, int i, int f)
     return q->face[f] ? (double)q->face[f][i] * q->unit : q->unit;
 }
 
+/* A strip of both colours with coefficients, in the order of its cells. */
+enum { GS4I_BOTH = 2 * GS4I_STRIP };
+typedef struct gs4i_built {
+    double w[6][GS4I_BOTH], mass[GS4I_BOTH];
+    float face[3][GS4I_BOTH], low[3][GS4I_BOTH], inverse[GS4I_BOTH], diagonal[GS4I_BOTH], diagonal_low[GS4I_BOTH];
+    float link[3][GS4I_BOTH], air[GS4I_BOTH];       /* what level 1 gets: of faces towards + between liquid cells, of those to the air */
+} gs4i_built;
+
+/* Whether any of n cells or their neighbours towards + is liquid. */
+static int gs4i_is_strip_wet(const gs4i_rows *q, int i, int n)
+{
+    const uint8_t *kind = q->kind + i;
+    int l, all = kind[n];
+    for (l = 0; l < n; l++) all |= kind[l] | kind[l + q->beside[3]] | kind[l + q->beside[5]];
+    return all & GS4I_IS_LIQUID;
+}
+
+static void gs4i_build_faces(gs4i_built *b, const gs4i_rows *q, int i, int n, int f)
+{
+    const uint8_t *GS4I_RESTRICT kind = q->kind + i, *GS4I_RESTRICT other = q->kind + i + q->beside[f];
+    const gs4_real *GS4I_RESTRICT face = q->face[f] ? q->face[f] + i : NULL;
+    double *GS4I_RESTRICT w = b->w[f];
+    float *GS4I_RESTRICT link = b->link[f >> 1], *GS4I_RESTRICT air = b->air;
+    int l;
+    for (l = 0; l < n; l++) {
+        const double all = face ? (double)face[l] * q->unit : q->unit;
+        w[l] = kind[l] & other[l] & GS4I_IS_OPEN && (kind[l] | other[l]) & GS4I_IS_LIQUID ? all : 0;
+    }
+    for (l = 0; l < n; l++) air[l] += (float)(0.75 * w[l]) * (float)((kind[l] & ~other[l]) / GS4I_IS_LIQUID & 1);
+    if (!(f & 1)) return;
+    for (l = 0; l < n; l++) link[l] = (float)(0.5 * w[l]) * (float)((kind[l] & other[l]) / GS4I_IS_LIQUID);
+}
+
+static void gs4i_build_cells(gs4i_built *GS4I_RESTRICT b, const gs4i_rows *q, int i, int n)
+{
+    const uint8_t *GS4I_RESTRICT kind = q->kind + i;
+    int l, f;
+    memset(b->air, 0, sizeof b->air);
+    for (f = 0; f < 6; f++) gs4i_build_faces(b, q, i, n, f);
+    for (l = 0; l < n; l++) b->mass[l] = q->diagonal && kind[l] & GS4I_IS_LIQUID ? (double)q->diagonal[i + l] * q->mass_unit : 0;
+    for (l = 0; l < n; l++) {
+        const double sum = b->mass[l] + (((b->w[0][l] + b->w[1][l]) + (b->w[2][l] + b->w[3][l])) + (b->w[4][l] + b->w[5][l]));
+        const double unknown = (double)(kind[l] / GS4I_IS_LIQUID) * (sum > 0 ? 1.0 : 0.0);
+        b->inverse[l] = (float)(unknown / (sum + (1 - unknown)));
+        b->diagonal[l] = (float)(unknown * b->mass[l] - (1 - unknown));
+        b->diagonal_low[l] = (float)(b->mass[l] - (double)(float)b->mass[l]);
+    }
+    for (f = 0; f < 3; f++) for (l = 0; l < n; l++) {
+        b->face[f][l] = (float)b->w[2 * f + 1][l];
+        b->low[f][l] = (float)(b->w[2 * f + 1][l] - (double)b->face[f][l]);
+    }
+}
+
+/* n cells of a row, the first an even one, to two colours. */
+static void gs4i_part(float *GS4I_RESTRICT even, float *GS4I_RESTRICT odd, const float *GS4I_RESTRICT from, int n)
+{
+    int m;
+    for (m = 0; m < n / 2; m++) { even[m] = from[2 * m]; odd[m] = from[2 * m + 1]; }
+    if (n & 1) even[m] = from[2 * m];
+}
+
 /* One row of level 0 with coefficients, and what its cells add to level 1. */
 static void gs4i_build_row(gs4i_solver *s, const gs4_poisson_desc *d, int j, int k)
 {
     const gs4i_masked *g = &s->level[0], *h = &s->level[1];
     const size_t row = gs4i_row_of(g, j, k), coarse = gs4i_row_of(h, j / 2, k / 2);
+    const int c = (j + k) & 1;
     gs4i_rows q;
-    int i, f;
+    gs4i_built b;
+    int i, n, f, l;
     gs4i_open_row(&q, s, d, j, k);
-    for (i = 0; i < g->n[0]; i++) {
-        const int c = (i + j + k) & 1, up = (i / 2 + j / 2 + k / 2) & 1, liquid = q.kind[i] & GS4I_IS_LIQUID;
-        const size_t at = row + (size_t)(i / 2), to = coarse + (size_t)(i / 4);
-        const double mass = liquid && q.diagonal ? (double)q.diagonal[i] * q.mass_unit : 0;
-        double w[6], sum = mass, air = 0;
-        for (f = 0; f < 6; f++) {
-            w[f] = gs4i_face_of(&q, i, f);
-            sum += w[f];
-            if (liquid && !(q.kind[i + q.beside[f]] & GS4I_IS_LIQUID)) air += w[f];
-        }
-        g->inverse[c][at] = liquid && sum > 0 ? (float)(1 / sum) : 0;
+    memset(&b, 0, sizeof b);
+    for (i = 0; i < g->n[0]; i += GS4I_BOTH) {
+        const size_t at = row + (size_t)(i / 2);
+        const int wet = gs4i_is_strip_wet(&q, i, n = g->n[0] - i < GS4I_BOTH ? g->n[0] - i : GS4I_BOTH);
+        if (wet) gs4i_build_cells(&b, &q, i, n);
+        else { memset(&b, 0, sizeof b); for (l = 0; l < n; l++) b.diagonal[l] = -1; }
+        gs4i_part(g->inverse[c] + at, g->inverse[!c] + at, b.inverse, n);
+        gs4i_part(g->mass[c] + at, g->mass[!c] + at, b.diagonal, n);
+        if (g->mass_low[0]) gs4i_part(g->mass_low[c] + at, g->mass_low[!c] + at, b.diagonal_low, n);
         for (f = 0; f < 3; f++) {
-            g->w[f][c][at] = (float)w[2 * f + 1];
-            if (g->w_low[f][c]) g->w_low[f][c][at] = (float)(w[2 * f + 1] - (double)g->w[f][c][at]);
+            gs4i_part(g->w[f][c] + at, g->w[f][!c] + at, b.face[f], n);
+            if (g->w_low[f][0]) gs4i_part(g->w_low[f][c] + at, g->w_low[f][!c] + at, b.low[f], n);
         }
-        g->mass[c][at] = liquid && sum > 0 ? (float)mass : -1;
-        if (g->mass_low[c]) g->mass_low[c][at] = liquid ? (float)(mass - (double)(float)mass) : 0;
-        if (!liquid) continue;
-        for (f = 0; f < 3; f++)
-            if ((f == 0 ? i : f == 1 ? j : k) & 1 && q.kind[i + q.beside[2 * f + 1]] & GS4I_IS_LIQUID) h->w[f][up][to] += (float)(0.5 * w[2 * f + 1]);
-        h->mass[up][to] += (float)(0.75 * air); h->z[up][to] += (float)(0.75 * air);      /* z: to the air alone, while setting up */
-        h->mass[up][to] += (float)mass;
+        for (l = 0; l < n && wet; l++) {
+            const int up = ((i + l) / 2 + j / 2 + k / 2) & 1;
+            const size_t to = coarse + (size_t)((i + l) / 4);
+            if (l & 1) h->w[0][up][to] += b.link[0][l];
+            if (j & 1) h->w[1][up][to] += b.link[1][l];
+            if (k & 1) h->w[2][up][to] += b.link[2][l];
+            h->mass[up][to] += b.air[l] + (float)b.mass[l]; h->z[up][to] += b.air[l];         /* z: to the air alone, while setting up */
+        }
     }
 }
 
@@ -1913,6 +2007,19 @@ GS4I_INLINE int gs4i_is_deep(const uint8_t *v, ptrdiff_t ny, ptrdiff_t nz)
     int a;
     for (a = 0; a < 7; a++) { memcpy(&eight, around[a], 8); all &= eight; }
     return all == 0x0303030303030303u;
+}
+
+/* What the diagonal of a cell with `degree` faces of coefficient 1 makes of it. */
+GS4I_INLINE void gs4i_build_mass(const gs4i_solver *s, const gs4i_rows *q, int j, int k, int i, int degree)
+{
+    const gs4i_masked *g = &s->level[0], *h = &s->level[1];
+    const size_t at = gs4i_row_of(g, j, k) + (size_t)(i / 2);
+    const int c = (i + j + k) & 1;
+    const double mass = (double)q->diagonal[i] * q->mass_unit;
+    if (!(mass > 0)) return;
+    g->mass[c][at] = (float)mass; g->mass_low[c][at] = (float)(mass - (double)(float)mass);
+    g->inverse[c][at] = (float)(1 / (degree + mass));
+    h->mass[(i / 2 + j / 2 + k / 2) & 1][gs4i_row_of(h, j / 2, k / 2) + (size_t)(i / 4)] += (float)mass;
 }
 
 /* The same where one coefficient serves all faces, for cells `begin` to `end`, which hold all liquid of the row. */
@@ -1936,8 +2043,9 @@ static void gs4i_build_uniform_row(gs4i_solver *s, const gs4_poisson_desc *d, in
         const size_t at = row + (size_t)(i / 2), to = coarse + (size_t)(i / 4);
         const int up = (i / 2 + j / 2 + k / 2) & 1;
         int open, wet;
-        if (!(i & 7) && i + 8 <= end && !q.diagonal && gs4i_is_deep(v, ny, nz)) {       /* eight at once */
+        if (!(i & 7) && i + 8 <= end && gs4i_is_deep(v, ny, nz)) {       /* eight at once */
             for (c = 0; c < 2; c++) for (m = 0; m < 4; m++) { g->degree[c][at + m] = 6; g->inverse[c][at + m] = inverse[6]; }
+            for (m = 0; m < 8 && q.diagonal; m++) gs4i_build_mass(s, &q, j, k, i + (int)m, 6);
             for (m = 0; m < 4; m++) {
                 const int up_m = (up + (int)m) & 1;
                 h->w[0][up_m][to + m / 2] += 0.5f;
@@ -1953,12 +2061,7 @@ static void gs4i_build_uniform_row(gs4i_solver *s, const gs4_poisson_desc *d, in
         wet = (v[-1] >> 1) + (v[1] >> 1) + (v[-ny] >> 1) + (v[ny] >> 1) + (v[-nz] >> 1) + (v[nz] >> 1);
         g->degree[c][at] = (float)open;
         g->inverse[c][at] = inverse[open];
-        if (q.diagonal && q.diagonal[i] > 0) {
-            const double mass = (double)q.diagonal[i] * q.mass_unit;
-            g->mass[c][at] = (float)mass; g->mass_low[c][at] = (float)(mass - (double)(float)mass);
-            g->inverse[c][at] = (float)(1 / (open + mass));
-            h->mass[up][to] += (float)mass;
-        }
+        if (q.diagonal) gs4i_build_mass(s, &q, j, k, i, open);
         if (i & 1) h->w[0][up][to] += 0.5f * (float)(v[1] >> 1);
         if (j & 1) h->w[1][up][to] += 0.5f * (float)(v[ny] >> 1);
         if (k & 1) h->w[2][up][to] += 0.5f * (float)(v[nz] >> 1);
@@ -2598,12 +2701,6 @@ static void gs4i_solver_free(gs4i_solver *s)
 /* --- solving ------------------------------------------------------------------------------------------------------------- */
 
 typedef struct gs4i_given { gs4i_solver *s; const gs4_real *rhs; gs4_real *x; int guess, air /* whether x is given there */; } gs4i_given;
-
-#ifdef GS4_DOUBLE
-typedef uint64_t gs4i_bits;
-#else
-typedef uint32_t gs4i_bits;
-#endif
 
 /* Largest |rhs| in liquid, |x| in air and |x| in liquid, as bits: these are in the order of the numbers, infinity and what is no number
  * above all. */

@@ -4828,16 +4828,14 @@ static void gs4i_see_elastic(gs4i_lanes G, gs4i_symmetric s, gs4i_lanes stiffnes
 /* Stress of n particles from memory, six numbers each and six of the rate where there are rates; and back. */
 static void gs4i_load_elastic(const gs4_real *from, int reals, int n, gs4i_elastic *e)
 {
-    gs4i_lanes l[12];
+    gs4i_lanes *l = (gs4i_lanes *)(void *)e;                /* 12 in the order of its fields */
     if (reals == 12) gs4i_numbers_to_lanes(from, 12, n, l);
     else { gs4i_numbers_to_lanes(from, 6, n, l); memset(l + 6, 0, 6 * sizeof *l); }
-    memcpy(e->s, l, sizeof e->s); memcpy(e->rate, l + 6, sizeof e->rate);
 }
 
 static void gs4i_store_elastic(gs4_real *to, int reals, int n, gs4i_elastic *e)
 {
-    gs4i_lanes l[12];
-    memcpy(l, e->s, sizeof e->s); memcpy(l + 6, e->rate, sizeof e->rate);
+    gs4i_lanes *l = (gs4i_lanes *)(void *)e;
     if (reals == 12) gs4i_lanes_to_numbers(l, 12, n, to);
     else gs4i_lanes_to_numbers(l, 6, n, to);
 }
@@ -5038,15 +5036,21 @@ GS4I_INLINE void gs4i_cofactors(gs4i_wide a[3][3], gs4i_wide c[3][3], gs4i_wide 
 
 #define GS4I_SMALL_STEP GS4I_C(1)               /* |X|^2 up to which the fraction serves; its pole is at 4 */
 
-/* F <- (I - X/2)^-1 (I + X/2) F = F + (I - X/2)^-1 X F. Is |X| small for all? */
-static int gs4i_deform(gs4i_matrix X, gs4i_matrix F, gs4i_lanes squared)
+/* Is |X| small for all? */
+static int gs4i_is_small_step(gs4i_matrix X, gs4i_lanes squared)
 {
-    int b, i, j, small = 1;
+    int b, small = 1;
     gs4i_gradient_squared(X, squared);
+    GS4I_BATCH_LOOP(b) { const gs4i_wide_mask fine = squared[b] < GS4I_SMALL_STEP; small &= gs4i_all(&fine); }
+    return small;
+}
+
+/* now = (I - X/2)^-1 (I + X/2) F = F + (I - X/2)^-1 X F; may be F itself */
+static void gs4i_deform(gs4i_matrix X, gs4i_matrix F, gs4i_matrix now)
+{
+    int b, i, j;
     GS4I_BATCH_LOOP(b) {
-        const gs4i_wide_mask fine = squared[b] < GS4I_SMALL_STEP;
         gs4i_wide a[3][3], C[3][3], XF[3][3], inverse;
-        small &= gs4i_all(&fine);
         for (i = 0; i < 3; i++)
             for (j = 0; j < 3; j++) {
                 a[i][j] = GS4I_C(-0.5) * X[i][j][b];
@@ -5056,9 +5060,8 @@ static int gs4i_deform(gs4i_matrix X, gs4i_matrix F, gs4i_lanes squared)
         gs4i_cofactors(a, C, &inverse);
         inverse = GS4I_C(1) / inverse;
         for (i = 0; i < 3; i++)
-            for (j = 0; j < 3; j++) F[i][j][b] += inverse * (C[0][i] * XF[0][j] + C[1][i] * XF[1][j] + C[2][i] * XF[2][j]);
+            for (j = 0; j < 3; j++) now[i][j][b] = F[i][j][b] + inverse * (C[0][i] * XF[0][j] + C[1][i] * XF[1][j] + C[2][i] * XF[2][j]);
     }
-    return small;
 }
 
 /* The wide b of each of nine lanes */
@@ -5094,8 +5097,9 @@ static void gs4i_stage_solid(const gs4i_solid_laws *l, gs4i_deformation *e, cons
     for (i = 0; i < 3; i++)
         for (j = 0; j < 3; j++)
             GS4I_BATCH_LOOP(b) Y[i][j][b] = rule->reach.ahead * e->rate[i][j][b] + rule->s * (L[i][j][b] - e->rate[i][j][b]);
+    if (gs4i_is_small_step(Y, squared)) { gs4i_deform(Y, e->F, e->F); return; }
     memcpy(old, e->F, sizeof old);
-    if (gs4i_deform(Y, e->F, squared)) return;
+    gs4i_deform(Y, e->F, e->F);
     for (b = 0; b < n; b++) {
         double F[3][3];
         if (GS4I_NTH(squared, b) < GS4I_SMALL_STEP || !(GS4I_NTH_CONST(l->modulus, b) > 0)) continue;
@@ -5124,9 +5128,9 @@ static void gs4i_correct_one(const gs4i_law *law, gs4i_matrix X, double squared,
     gs4i_set_matrix(F, n, one);
 }
 
-/* det F = J; F = J^(1/3) I where there is no solid. Is each within its limits, which F F^T - low^2 and high^2 - F F^T tell, and not so
+/* F as it is now, but det F = J; F = J^(1/3) I where there is no solid. Is each within its limits, which F F^T - low^2 and high^2 - F F^T tell, and not so
  * stretched that its determinant would need more digits than there are? */
-static int gs4i_fit_volume(const gs4i_solid_laws *l, gs4i_matrix F, const gs4i_wide *J, gs4i_lanes verdict)
+static int gs4i_fit_volume(const gs4i_solid_laws *l, gs4i_matrix now, const gs4i_wide *J, gs4i_matrix F, gs4i_lanes verdict)
 {
     int b, c, i, j, all = 1;
     GS4I_BATCH_LOOP(b) {
@@ -5134,7 +5138,7 @@ static int gs4i_fit_volume(const gs4i_solid_laws *l, gs4i_matrix F, const gs4i_w
         const gs4i_wide zero = J[b] - J[b], one = zero + GS4I_C(1);
         gs4i_wide f[3][3], C[3][3], ratio, scale, low[6], high[6];
         gs4i_wide_mask good, below;
-        gs4i_matrix_wide(F, b, f);
+        gs4i_matrix_wide(now, b, f);
         gs4i_cofactors(f, C, &ratio);
         ratio = J[b] / ratio;
         GS4I_CHOOSE(ratio, solid, ratio, J[b]);
@@ -5181,10 +5185,10 @@ static void gs4i_correct_solid(const gs4i_solid_laws *l, gs4i_deformation *e, co
                 X[i][j][b] = rule->dt * (e->rate[i][j][b] + rule->gamma * change);
                 GS4I_CHOOSE(e->rate[i][j][b], solid, next, L[i][j][b]);
             }
-    memcpy(old, e->F, sizeof old);
-    small = gs4i_deform(X, e->F, squared);
-    memcpy(now, e->F, sizeof now);
-    fits = gs4i_fit_volume(l, e->F, J, verdict);
+    small = gs4i_is_small_step(X, squared);
+    if (!small) memcpy(old, e->F, sizeof old);
+    gs4i_deform(X, e->F, now);
+    fits = gs4i_fit_volume(l, now, J, e->F, verdict);
     if (small && fits) return;
     for (b = 0; b < n; b++) {
         if (!(GS4I_NTH_CONST(l->modulus, b) > 0) || (GS4I_NTH(squared, b) < GS4I_SMALL_STEP && GS4I_NTH(verdict, b) > 0)) continue;
@@ -5318,18 +5322,14 @@ static void gs4i_correct_turning(const gs4i_solid_laws *l, gs4i_deformation *e, 
 /* F, M, w and dw/dt of n particles from memory, F alone where there are no rates; and back. */
 static void gs4i_load_deformation(const gs4_real *from, int reals, int n, gs4i_deformation *e)
 {
-    gs4i_lanes l[24];
+    gs4i_lanes *l = (gs4i_lanes *)(void *)e;                /* 24 in the order of its fields */
     if (reals == 24) gs4i_numbers_to_lanes(from, 24, n, l);
     else { gs4i_numbers_to_lanes(from, 9, n, l); memset(l + 9, 0, 15 * sizeof *l); }
-    memcpy(e->F, l, sizeof e->F); memcpy(e->rate, l + 9, sizeof e->rate); memcpy(e->turning, l + 18, sizeof e->turning);
-    memcpy(e->turning_rate, l + 21, sizeof e->turning_rate);
 }
 
 static void gs4i_store_deformation(gs4_real *to, int reals, int n, gs4i_deformation *e)
 {
-    gs4i_lanes l[24];
-    memcpy(l, e->F, sizeof e->F); memcpy(l + 9, e->rate, sizeof e->rate); memcpy(l + 18, e->turning, sizeof e->turning);
-    memcpy(l + 21, e->turning_rate, sizeof e->turning_rate);
+    gs4i_lanes *l = (gs4i_lanes *)(void *)e;
     if (reals == 24) gs4i_lanes_to_numbers(l, 24, n, to);
     else gs4i_lanes_to_numbers(l, 9, n, to);
 }

@@ -7071,10 +7071,10 @@ static void gs4i_scatter_ghosts(gs4_sim *sim, gs4_task_fn kernel)
     if (sim->ghosts.count) gs4i_scatter_by_colour(sim, (const int32_t *)sim->ghosts.slots.data, sim->ghosts.colour_first, kernel);
 }
 
-/* What nodes give to particle n beside velocity; solids want its gradient too. */
-GS4I_INLINE void gs4i_gather_kick(const gs4i_particles *p, const gs4_real *at, const gs4i_stencils *s, int n, const gs4i_row *w, const gs4i_row *d, gs4i_gathered *g)
+/* What nodes give to particle n beside velocity; a batch with solids wants its gradient too. */
+GS4I_INLINE void gs4i_gather_kick(int solids, const gs4_real *at, const gs4i_stencils *s, int n, const gs4i_row *w, const gs4i_row *d, gs4i_gathered *g)
 {
-    if (p->deformation_reals) gs4i_gather_local(at, s, n, w, d, g);
+    if (solids) gs4i_gather_local(at, s, n, w, d, g);
     else gs4i_gather_value(at, s, n, w, g->value);
 }
 
@@ -7104,7 +7104,7 @@ static void gs4i_gather_ghosts_of(const gs4i_pass *pass, int index, int what)
             gs4i_row w, d;
             if (s.base[b] < 0 || !g[b]->whole || !(g[b]->share > 0)) continue;
             gs4i_x_weights(&s, b, &w, &d);
-            if (what) gs4i_gather_kick(&sim->particles, tile + 4 * s.base[b], &s, b, &w, &d, &u);
+            if (what) gs4i_gather_kick(sim->particles.deformation_reals, tile + 4 * s.base[b], &s, b, &w, &d, &u);
             else gs4i_gather_local(tile + 4 * s.base[b], &s, b, &w, &d, &u);
             memcpy(g[b]->seen[what][0], u.value + 4 * b, 4 * sizeof *tile);
             if (what && !sim->particles.deformation_reals) continue;
@@ -7574,11 +7574,11 @@ static void gs4i_gather_heat(const gs4_sim *sim, size_t i, int n, const gs4i_ste
 }
 
 /* The odd part of both, and of the gradients that were gathered. */
-static void gs4i_see_ghosts(const gs4i_particles *p, const gs4i_ghost *ghosts, int n, gs4i_gathered *u, gs4i_gathered *acc)
+static void gs4i_see_ghosts(int solids, const gs4i_ghost *ghosts, int n, gs4i_gathered *u, gs4i_gathered *acc)
 {
     gs4i_make_odd(ghosts, n, u);
     gs4i_make_value_odd(ghosts, n, 1, acc);
-    if (p->deformation_reals) gs4i_make_gradient_odd(ghosts, n, 1, acc);
+    if (solids) gs4i_make_gradient_odd(ghosts, n, 1, acc);
 }
 
 static void gs4i_take_kicks(const gs4i_gathered *acc, const gs4i_gathered *jump, int n, gs4i_kicks *kicks)
@@ -7628,28 +7628,28 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_warm
     if (warmth) gs4i_load_warmth(sim, o, warmth);
     for (; i < end; i += GS4I_BATCH, row += 2) {
         const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
-        gs4i_batch q;
-        gs4i_stencils s;
+        gs4i_batch q; gs4i_stencils s;
         gs4i_gathered acc, jump;
-        int b;
+        int b, solids = 0;
         gs4i_tile_prefetch(grid, next, row, gs4i_seen_nodes(grid));
         gs4i_tile_prefetch(grid, next, row, grid->force);
+        if (p.deformation_reals) { gs4i_take_laws(sim->laws, sim->frozen, &p, i, n, &laws); solids = gs4i_take_solid_laws(&laws, &past.solid); }
         gs4i_stage_batch(&p, i, n, rule.reach, &frame, &q, &s);
         for (b = 0; b < n; b++) {
             gs4i_row w, d;
             gs4i_x_weights(&s, b, &w, &d);
             gs4i_gather_local(u_nodes + 4 * s.base[b], &s, b, &w, &d, &u);
-            gs4i_gather_kick(&p, a_nodes + 4 * s.base[b], &s, b, &w, &d, &acc);
-            if (jumps) gs4i_gather_kick(&p, j_nodes + 4 * s.base[b], &s, b, &w, &d, &jump);
+            gs4i_gather_kick(solids, a_nodes + 4 * s.base[b], &s, b, &w, &d, &acc);
+            if (jumps) gs4i_gather_kick(solids, j_nodes + 4 * s.base[b], &s, b, &w, &d, &jump);
         }
-        if (ghosts) { gs4i_see_ghosts(&p, ghosts, n, &u, &acc); ghosts += n; }
+        if (ghosts) { gs4i_see_ghosts(solids, ghosts, n, &u, &acc); ghosts += n; }
         gs4i_to_lanes(u.value, n, k.U);
         gs4i_gradient_lanes(u.dx, u.dy, u.dz, n, k.L);
         gs4i_to_lanes(acc.value, n, k.A);
         if (jumps) gs4i_to_lanes(jump.value, n, k.jump);
         if (p.with_fading) { gs4i_prefetch_hidden(&p, i + 4 * GS4I_BATCH); gs4i_to_lanes(p.hidden + 4 * i, n, k.hidden); }
         gs4i_correct_batch(rule, &k, &q);
-        if (p.deformation_reals) gs4i_take_kicks(&acc, jumps ? &jump : NULL, n, &kicks);
+        if (solids) gs4i_take_kicks(&acc, jumps ? &jump : NULL, n, &kicks);
         if (p.elastic_reals || p.deformation_reals || warmth) gs4i_advance_history(sim, i, n, &laws, &past, warmth, k.L, &kicks, q.v[3], report, commit);
         if (warmth && commit) gs4i_gather_heat(sim, i, n, &s, &laws, k.L, warmth);
         if (!commit) { gs4i_judge(&q, k.L, p.position + 4 * i, n, grid->h, p.id + i, report); continue; }

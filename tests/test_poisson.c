@@ -306,6 +306,33 @@ static void test_poisson_symmetry(void)
     }
 }
 
+/* Every edge of every graph has its mate of the same weight, in the bulk and beside it; of a full box of 48^3 cells graph 0 is one of
+ * 12^3 nodes whose edges have half of four faces that have half of four faces each. */
+static void test_poisson_graphs(void)
+{
+    static const char *const names[] = { "P1", "P2", "P4", "P5", "T3" };
+    int q, l, i, e, back;
+    for (q = 0; q < 5; q++) {
+        poisson_case p = poisson_make(names[q], 48);
+        gs4_poisson *s;
+        int mates = 0, edges = 0, exact = 0;
+        CHECK_RESULT(NULL, gs4_poisson_create(&p.desc, &s), GS4_OK);
+        for (l = 0; l < s->solver.graphs; l++) {
+            const gs4i_graph *g = &s->solver.graph[l];
+            for (i = 0; i < g->n; i++) for (e = g->start[i]; e < g->start[i + 1]; e++) {
+                for (back = g->start[g->to[e]]; back < g->start[g->to[e] + 1] && g->to[back] != i; back++) {}
+                mates += back < g->start[g->to[e] + 1] && fabs((double)(g->w[back] - g->w[e])) <= 1e-6 * (double)g->w[e];
+                edges++;
+                if (l == 0) exact += g->w[e] == 4;
+            }
+        }
+        CHECK(edges > 0 && mates == edges);
+        if (strcmp(names[q], "P5") == 0) CHECK(s->solver.graph[0].n == 12 * 12 * 12 && exact == 6 * 12 * 12 * 11 && s->solver.graph[0].start[12 * 12 * 12] == exact);
+        gs4_poisson_destroy(s);
+        poisson_free(&p);
+    }
+}
+
 /* --- determinism, reuse ------------------------------------------------------------------------------------- */
 
 static void pois_shuffled(int count, gs4_task_fn task, void *context, void *user)
@@ -579,6 +606,7 @@ static void run_poisson(void)
     RUN(test_poisson_order);
     RUN(test_poisson_guess_and_units);
     RUN(test_poisson_symmetry);
+    RUN(test_poisson_graphs);
     RUN_ONCE(test_poisson_same_bits);
     RUN(test_poisson_reuse);
     RUN(test_poisson_limit);

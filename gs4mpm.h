@@ -5475,7 +5475,7 @@ static void gs4i_flux_before(const gs4i_heat *h, const gs4i_rule *rule, gs4i_gra
         GS4I_BATCH_LOOP(b) q[c][b] = (h->q[c][b] + before * h->q_rate[c][b]) + s * (L[c][0][b] * at[0][b] + L[c][1][b] * at[1][b] + L[c][2][b] * at[2][b]);
 }
 
-/* Heat of a batch on its way to the nodes: (m c, m c T**, V / k_eff, V), and as forces: grad w . V q** t / (t + s) + w P,
+/* Heat of a batch on its way to the nodes: (m c, m c T**, V / k_eff, V), and as forces: grad w . V q** t / (t + s), with a flux only, + w P,
  * and w times the heat that mixes, W/K, see [[conduction]]. */
 typedef struct gs4i_heat_sent { gs4_real content[4 * GS4I_BATCH]; gs4i_forces source; } gs4i_heat_sent;
 
@@ -5498,15 +5498,13 @@ static void gs4i_send_heat(const gs4i_heat_laws *l, const gs4i_heat *h, const gs
     }
     gs4i_from_lanes(capacity, content, resists, volume, to->content);
     memset(none, 0, sizeof none);
-    memset(q, 0, sizeof q);
-    if (with_flux) {
-        gs4i_flux_before(h, rule, L, q);
-        for (c = 0; c < 3; c++) GS4I_BATCH_LOOP(b) q[c][b] *= volume[b] * (l->flux_time[b] / (l->flux_time[b] + rule->s));
-    }
+    gs4i_from_lanes(power, mixes, none, none, to->source.weight);
+    if (!with_flux) return;
+    gs4i_flux_before(h, rule, L, q);
+    for (c = 0; c < 3; c++) GS4I_BATCH_LOOP(b) q[c][b] *= volume[b] * (l->flux_time[b] / (l->flux_time[b] + rule->s));
     gs4i_from_lanes(q[0], none, none, none, to->source.x);
     gs4i_from_lanes(q[1], none, none, none, to->source.y);
     gs4i_from_lanes(q[2], none, none, none, to->source.z);
-    gs4i_from_lanes(power, mixes, none, none, to->source.weight);
 }
 
 /* S7: `from` is the sharpened T~ - T**, the rate of mixing, and times the temperature to mix to; `slope` the gradient of T~, and the resistance
@@ -6705,7 +6703,7 @@ static void gs4i_begin_warmth(const gs4i_particles *p, size_t i, int n, gs4_real
 {
     gs4i_load_heat(p, i, n, &w->h);
     gs4i_take_heat_laws(l, &w->laws);
-    gs4i_temperature_ahead(&w->laws, &w->h, ahead, l->temperature);
+    if (l->callbacks) gs4i_temperature_ahead(&w->laws, &w->h, ahead, l->temperature);
 }
 
 static void gs4i_send_warmth(const gs4i_batch_laws *l, const gs4i_wide *mass, const gs4i_wide *J, gs4i_gradient L, gs4i_symmetric sigma, int with_flux, gs4i_warmth *w)
@@ -7247,7 +7245,9 @@ GS4I_INLINE void gs4i_scatter_warmth(const gs4_sim *sim, gs4i_warmth *w, const g
     for (b = 0; b < n; b++)
         if (s->base[b] >= 0) {
             gs4i_scatter_quad(w->content, s, b, w->sent.content + 4 * b);
-            if (sim->conduction.source) gs4i_scatter_force(w->source, s, b, &w->sent.source);
+            if (!sim->conduction.source) continue;
+            if (sim->particles.with_flux) gs4i_scatter_force(w->source, s, b, &w->sent.source);
+            else gs4i_scatter_quad(w->source, s, b, w->sent.source.weight + 4 * b);
         }
 }
 

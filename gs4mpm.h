@@ -188,55 +188,55 @@
 #ifndef GS4MPM_H
 #define GS4MPM_H
 
-/* ==== [[config]] version, precision, linkage ======================================================= */
+/* ==== [[config]] version, precision, linkage ================================================== */
 
-#define GS4_VERSION 100                 /* major * 10000 + minor * 100 + patch */
+#define GS4_VERSION 100 /* major * 10000 + minor * 100 + patch */
 #define GS4_VERSION_STRING "0.1.0"
 
 #include <stddef.h>
 #include <stdint.h>
 
-#ifdef GS4_DOUBLE                       /* defined before every include of the header, or never */
+#ifdef GS4_DOUBLE /* defined before every include of the header, or never */
 typedef double gs4_real;
-#define gs4_add_collider        gs4_add_collider_f64
-#define gs4_add_emitter         gs4_add_emitter_f64
-#define gs4_add_material        gs4_add_material_f64
-#define gs4_add_particles       gs4_add_particles_f64
-#define gs4_add_points          gs4_add_points_f64
-#define gs4_advance             gs4_advance_f64
-#define gs4_box                 gs4_box_f64
-#define gs4_create              gs4_create_f64
-#define gs4_cylinder            gs4_cylinder_f64
-#define gs4_destroy             gs4_destroy_f64
-#define gs4_edit_particles      gs4_edit_particles_f64
-#define gs4_get_desc            gs4_get_desc_f64
-#define gs4_get_stats           gs4_get_stats_f64
-#define gs4_last_error          gs4_last_error_f64
-#define gs4_load                gs4_load_f64
-#define gs4_material_preset     gs4_material_preset_f64
-#define gs4_mesh                gs4_mesh_f64
-#define gs4_move_collider       gs4_move_collider_f64
-#define gs4_move_emitter        gs4_move_emitter_f64
-#define gs4_particle_ids        gs4_particle_ids_f64
-#define gs4_particle_materials  gs4_particle_materials_f64
-#define gs4_particles           gs4_particles_f64
-#define gs4_plane               gs4_plane_f64
-#define gs4_point_step          gs4_point_step_f64
-#define gs4_point_stress        gs4_point_stress_f64
-#define gs4_poisson_create      gs4_poisson_create_f64
-#define gs4_poisson_destroy     gs4_poisson_destroy_f64
-#define gs4_poisson_solve       gs4_poisson_solve_f64
-#define gs4_real_size           gs4_real_size_f64
-#define gs4_result_string       gs4_result_string_f64
-#define gs4_save                gs4_save_f64
-#define gs4_sdf                 gs4_sdf_f64
-#define gs4_sphere              gs4_sphere_f64
-#define gs4_stable_dt           gs4_stable_dt_f64
-#define gs4_state_hash          gs4_state_hash_f64
-#define gs4_step                gs4_step_f64
-#define gs4_version             gs4_version_f64
-#define gs4_write_ply           gs4_write_ply_f64
-#define gs4_write_raw           gs4_write_raw_f64
+#define gs4_add_collider gs4_add_collider_f64
+#define gs4_add_emitter gs4_add_emitter_f64
+#define gs4_add_material gs4_add_material_f64
+#define gs4_add_particles gs4_add_particles_f64
+#define gs4_add_points gs4_add_points_f64
+#define gs4_advance gs4_advance_f64
+#define gs4_box gs4_box_f64
+#define gs4_create gs4_create_f64
+#define gs4_cylinder gs4_cylinder_f64
+#define gs4_destroy gs4_destroy_f64
+#define gs4_edit_particles gs4_edit_particles_f64
+#define gs4_get_desc gs4_get_desc_f64
+#define gs4_get_stats gs4_get_stats_f64
+#define gs4_last_error gs4_last_error_f64
+#define gs4_load gs4_load_f64
+#define gs4_material_preset gs4_material_preset_f64
+#define gs4_mesh gs4_mesh_f64
+#define gs4_move_collider gs4_move_collider_f64
+#define gs4_move_emitter gs4_move_emitter_f64
+#define gs4_particle_ids gs4_particle_ids_f64
+#define gs4_particle_materials gs4_particle_materials_f64
+#define gs4_particles gs4_particles_f64
+#define gs4_plane gs4_plane_f64
+#define gs4_point_step gs4_point_step_f64
+#define gs4_point_stress gs4_point_stress_f64
+#define gs4_poisson_create gs4_poisson_create_f64
+#define gs4_poisson_destroy gs4_poisson_destroy_f64
+#define gs4_poisson_solve gs4_poisson_solve_f64
+#define gs4_real_size gs4_real_size_f64
+#define gs4_result_string gs4_result_string_f64
+#define gs4_save gs4_save_f64
+#define gs4_sdf gs4_sdf_f64
+#define gs4_sphere gs4_sphere_f64
+#define gs4_stable_dt gs4_stable_dt_f64
+#define gs4_state_hash gs4_state_hash_f64
+#define gs4_step gs4_step_f64
+#define gs4_version gs4_version_f64
+#define gs4_write_ply gs4_write_ply_f64
+#define gs4_write_raw gs4_write_raw_f64
 #else
 typedef float gs4_real;
 #endif
@@ -255,281 +255,417 @@ typedef float gs4_real;
 extern "C" {
 #endif
 
-/* ==== [[types]] results, vectors, shapes, hooks, views ============================================= */
+/* ==== [[types]] results, vectors, shapes, hooks, views ======================================== */
 
-typedef struct gs4_vec3 { gs4_real x, y, z; } gs4_vec3;
+typedef struct gs4_vec3 {
+    gs4_real x, y, z;
+} gs4_vec3;
 
 /* 0 is success, every error is negative, so an id-returning call needs no second channel. */
 typedef enum gs4_result {
     GS4_OK = 0,
-    GS4_ERROR_ARGUMENT      = -1,  /* a field is out of its range; gs4_last_error names it and its value */
-    GS4_ERROR_MEMORY        = -2,
-    GS4_ERROR_IO            = -3,  /* a file could not be opened, written whole or read */
-    GS4_ERROR_FORMAT        = -4,  /* a file is not what it says it is, or is damaged */
-    GS4_ERROR_UNSTABLE      = -5,  /* dt is above the stability limit, or the state would become non-finite or leave the physical
-                                      range: the step was not taken, the state is that of the last good step */
-    GS4_ERROR_NOT_CONVERGED = -6,  /* a linear solve did not reach its tolerance; same promise */
-    GS4_ERROR_ABI           = -7   /* header and implementation were compiled with different settings */
+    /* a field is out of its range; gs4_last_error names it and its value */
+    GS4_ERROR_ARGUMENT = -1,
+    GS4_ERROR_MEMORY = -2,
+    GS4_ERROR_IO = -3,     /* a file could not be opened, written whole or read */
+    GS4_ERROR_FORMAT = -4, /* a file is not what it says it is, or is damaged */
+    /* dt is above the stability limit, or the state would become non-finite or leave the
+     * physical range: the step was not taken, the state is that of the last good step */
+    GS4_ERROR_UNSTABLE = -5,
+    GS4_ERROR_NOT_CONVERGED = -6, /* a linear solve did not reach its tolerance; same promise */
+    /* header and implementation were compiled with different settings */
+    GS4_ERROR_ABI = -7
 } gs4_result;
 
 GS4_API const char *gs4_result_string(int result);
-GS4_API int gs4_version(void);          /* GS4_VERSION of the implementation */
-GS4_API int gs4_real_size(void);        /* bytes of gs4_real in the implementation */
+GS4_API int gs4_version(void);   /* GS4_VERSION of the implementation */
+GS4_API int gs4_real_size(void); /* bytes of gs4_real in the implementation */
 
 /* A shape is its signed distance (m, negative inside): for filling, obstacles and nozzles alike.
  * A plain value, copied; build it with the functions below, its fields are the implementation's. */
-typedef gs4_real (*gs4_sdf_fn)(gs4_vec3 point, void *user);     /* called from several threads at once when there are */
-typedef enum gs4_shape_kind { GS4_SHAPE_NONE = 0, GS4_SHAPE_BOX, GS4_SHAPE_SPHERE, GS4_SHAPE_CYLINDER,
-                              GS4_SHAPE_PLANE, GS4_SHAPE_SDF, GS4_SHAPE_MESH } gs4_shape_kind;
+/* called from several threads at once when there are */
+typedef gs4_real (*gs4_sdf_fn)(gs4_vec3 point, void *user);
+typedef enum gs4_shape_kind {
+    GS4_SHAPE_NONE = 0,
+    GS4_SHAPE_BOX,
+    GS4_SHAPE_SPHERE,
+    GS4_SHAPE_CYLINDER,
+    GS4_SHAPE_PLANE,
+    GS4_SHAPE_SDF,
+    GS4_SHAPE_MESH
+} gs4_shape_kind;
 typedef struct gs4_shape {
     gs4_shape_kind kind;
-    gs4_vec3 a, b;                      /* corners, ends, or point and outward normal */
+    gs4_vec3 a, b; /* corners, ends, or point and outward normal */
     gs4_real radius;
-    gs4_sdf_fn distance; void *user;
-    const gs4_real *vertices; const int *triangles;
+    gs4_sdf_fn distance;
+    void *user;
+    const gs4_real *vertices;
+    const int *triangles;
     int vertex_count, triangle_count;
 } gs4_shape;
 GS4_API gs4_shape gs4_box(gs4_vec3 low, gs4_vec3 high);
 GS4_API gs4_shape gs4_sphere(gs4_vec3 centre, gs4_real radius);
-GS4_API gs4_shape gs4_cylinder(gs4_vec3 a, gs4_vec3 b, gs4_real radius);          /* capped, from a to b */
-GS4_API gs4_shape gs4_plane(gs4_vec3 point, gs4_vec3 outward_normal);             /* solid behind the plane */
-GS4_API gs4_shape gs4_sdf(gs4_sdf_fn distance, void *user, gs4_vec3 low, gs4_vec3 high); /* bounds of the zero set */
-GS4_API gs4_shape gs4_mesh(const gs4_real *vertices_xyz, int vertex_count,        /* closed triangle surface, counter-clockwise */
-                           const int *triangles, int triangle_count);             /* from outside; arrays must outlive the simulation */
+/* capped, from a to b */
+GS4_API gs4_shape gs4_cylinder(gs4_vec3 a, gs4_vec3 b, gs4_real radius);
+/* solid behind the plane */
+GS4_API gs4_shape gs4_plane(gs4_vec3 point, gs4_vec3 outward_normal);
+/* bounds of the zero set */
+GS4_API gs4_shape gs4_sdf(gs4_sdf_fn distance, void *user, gs4_vec3 low, gs4_vec3 high);
+/* closed triangle surface, counter-clockwise */
+GS4_API gs4_shape gs4_mesh(const gs4_real *vertices_xyz, int vertex_count,
+                           /* from outside; arrays must outlive the simulation */
+                           const int *triangles, int triangle_count);
 
-typedef struct gs4_allocator {           /* both functions or neither */
+typedef struct gs4_allocator { /* both functions or neither */
     void *(*alloc_fn)(size_t bytes, size_t alignment, void *user);
-    void  (*free_fn)(void *memory, size_t bytes, void *user);
-    void   *user;
+    void (*free_fn)(void *memory, size_t bytes, void *user);
+    void *user;
 } gs4_allocator;
 typedef void (*gs4_task_fn)(int index, void *context);
-typedef void (*gs4_parallel_for_fn)(int count, gs4_task_fn task, void *context, void *user); /* runs all, in any order, then returns */
-typedef void (*gs4_log_fn)(int level, const char *message, void *user);    /* level 0: information, 1: warning, 2: error */
-typedef double (*gs4_now_fn)(void *user);                                  /* seconds; absent: timings stay 0 */
+/* runs all, in any order, then returns */
+typedef void (*gs4_parallel_for_fn)(int count, gs4_task_fn task, void *context, void *user);
+/* level 0: information, 1: warning, 2: error */
+typedef void (*gs4_log_fn)(int level, const char *message, void *user);
+/* seconds; absent: timings stay 0 */
+typedef double (*gs4_now_fn)(void *user);
 
-/* ==== [[materials]] ================================================================================ */
+/* ==== [[materials]] =========================================================================== */
 
-typedef enum gs4_liquid { GS4_NEWTONIAN = 0, GS4_OLDROYD_B, GS4_POM_POM } gs4_liquid; /* UCM: Oldroyd-B, F_v 0 */
-typedef enum gs4_solid  { GS4_NO_SOLID = 0, GS4_NEO_HOOKEAN, GS4_FIXED_COROTATED } gs4_solid;
-typedef enum gs4_viscosity_law { GS4_VISCOSITY_CONSTANT = 0, GS4_VISCOSITY_CROSS_WLF, GS4_VISCOSITY_CALLBACK } gs4_viscosity_law;
-typedef gs4_real (*gs4_viscosity_fn)(gs4_real temperature, gs4_real shear_rate, void *user);   /* Pa s of temperature and 1/s; thread-safe */
+/* UCM: Oldroyd-B, F_v 0 */
+typedef enum gs4_liquid {
+    GS4_NEWTONIAN = 0,
+    GS4_OLDROYD_B,
+    GS4_POM_POM
+} gs4_liquid;
+typedef enum gs4_solid {
+    GS4_NO_SOLID = 0,
+    GS4_NEO_HOOKEAN,
+    GS4_FIXED_COROTATED
+} gs4_solid;
+typedef enum gs4_viscosity_law {
+    GS4_VISCOSITY_CONSTANT = 0,
+    GS4_VISCOSITY_CROSS_WLF,
+    GS4_VISCOSITY_CALLBACK
+} gs4_viscosity_law;
+/* Pa s of temperature and 1/s; thread-safe */
+typedef gs4_real (*gs4_viscosity_fn)(gs4_real temperature, gs4_real shear_rate, void *user);
 
 typedef struct gs4_material {
-    gs4_real density;               /* kg/m^3, required, > 0 */
+    gs4_real density; /* kg/m^3, required, > 0 */
     /* liquid phase */
     gs4_liquid liquid;
-    gs4_real viscosity;             /* total mu, Pa s, >= 0 */
-    gs4_real local_fraction;        /* F_v in [0,1]; ignored (taken as 1) for GS4_NEWTONIAN */
-    gs4_real relaxation_time;       /* lambda_b, s, > 0 for viscoelastic liquids; G0 = (1 - F_v) mu / lambda_b */
-    gs4_real stretch_time;          /* lambda_0s, s, > 0 for GS4_POM_POM */
-    gs4_real anisotropy;            /* alpha, 0 to 1e6 */
-    gs4_real arms;                  /* Q, >= 1; nu = 2/Q */
+    gs4_real viscosity;      /* total mu, Pa s, >= 0 */
+    gs4_real local_fraction; /* F_v in [0,1]; ignored (taken as 1) for GS4_NEWTONIAN */
+    /* lambda_b, s, > 0 for viscoelastic liquids; G0 = (1 - F_v) mu / lambda_b */
+    gs4_real relaxation_time;
+    gs4_real stretch_time; /* lambda_0s, s, > 0 for GS4_POM_POM */
+    gs4_real anisotropy;   /* alpha, 0 to 1e6 */
+    gs4_real arms;         /* Q, >= 1; nu = 2/Q */
     gs4_viscosity_law viscosity_law;
-    struct {                        /* mu = mu0 / (1 + a (mu0 rate)^n), mu0 = d1 exp(-a1 (T - t1) / (T - t2)); */
-        gs4_real a, n, d1, a1, t1, t2;  /* all zero: the constants of the paper */
+    /* mu = mu0 / (1 + a (mu0 rate)^n), mu0 = d1 exp(-a1 (T - t1) / (T - t2)); */
+    struct {
+        gs4_real a, n, d1, a1, t1, t2; /* all zero: the constants of the paper */
     } cross_wlf;
-    gs4_viscosity_fn viscosity_fn; void *viscosity_user;
+    gs4_viscosity_fn viscosity_fn;
+    void *viscosity_user;
     /* volume response, both phases */
-    gs4_real bulk_modulus;          /* K, Pa; 0: density * sound_speed^2 */
-    gs4_real sound_speed;           /* c0, m/s, of the Tait equation (gamma 7); 0: 10 sqrt(2 g H + v^2), H the height of the
-                                       domain, v the fastest speed given so far: flow compresses by 1 %, impact by more; solids: at least sqrt(10 G/rho) */
-    int      incompressible;        /* non-zero: K is infinite (partitioned and semi-implicit schemes) */
+    gs4_real bulk_modulus; /* K, Pa; 0: density * sound_speed^2 */
+    /* c0, m/s, of the Tait equation (gamma 7); 0: 10 sqrt(2 g H + v^2), H the height of the
+     * domain, v the fastest speed given so far: flow compresses by 1 %, impact by more; solids:
+     * at least sqrt(10 G/rho) */
+    gs4_real sound_speed;
+    /* non-zero: K is infinite (partitioned and semi-implicit schemes) */
+    int incompressible;
     /* solid phase, below melting_temperature or always when the material never melts */
-    gs4_solid solid;                /* with liquid GS4_NEWTONIAN; its viscosity then damps the solid */
-    gs4_real shear_modulus;         /* G, Pa, > 0 for a solid */
-    gs4_real yield_compression;     /* theta_c, below 1; 0: elastic */
-    gs4_real yield_stretch;         /* theta_s; 0: elastic */
+    /* with liquid GS4_NEWTONIAN; its viscosity then damps the solid */
+    gs4_solid solid;
+    gs4_real shear_modulus;     /* G, Pa, > 0 for a solid */
+    gs4_real yield_compression; /* theta_c, below 1; 0: elastic */
+    gs4_real yield_stretch;     /* theta_s; 0: elastic */
     /* heat: a scene with no conductivity and no heat source carries no temperature at all */
-    gs4_real heat_capacity;         /* c, J/(kg K) */
-    gs4_real conductivity;          /* k, W/(m K) */
-    gs4_real flux_relaxation_time;  /* tau, s; 0: Fourier */
-    gs4_real fourier_fraction;      /* F_T in [0,1]; 0 with tau > 0: Cattaneo */
-    gs4_real melting_temperature;   /* T_m */
-    gs4_real latent_heat;           /* L, J/kg; 0: sharp switch at T_m */
-    int      can_melt;              /* non-zero: phase follows temperature; zero: phase is fixed by `solid` */
-    int      viscous_heating;       /* non-zero: the work of its stress, without the pressure, heats the material */
+    gs4_real heat_capacity;        /* c, J/(kg K) */
+    gs4_real conductivity;         /* k, W/(m K) */
+    gs4_real flux_relaxation_time; /* tau, s; 0: Fourier */
+    gs4_real fourier_fraction;     /* F_T in [0,1]; 0 with tau > 0: Cattaneo */
+    gs4_real melting_temperature;  /* T_m */
+    gs4_real latent_heat;          /* L, J/kg; 0: sharp switch at T_m */
+    /* non-zero: phase follows temperature; zero: phase is fixed by `solid` */
+    int can_melt;
+    /* non-zero: the work of its stress, without the pressure, heats the material */
+    int viscous_heating;
 } gs4_material;
 
-/* ==== [[sim]] description, scene, stepping, views, files =========================================== */
+/* ==== [[sim]] description, scene, stepping, views, files ====================================== */
 
-typedef enum gs4_scheme { GS4_EXPLICIT = 0, GS4_PARTITIONED, GS4_SEMI_IMPLICIT } gs4_scheme;
+typedef enum gs4_scheme {
+    GS4_EXPLICIT = 0,
+    GS4_PARTITIONED,
+    GS4_SEMI_IMPLICIT
+} gs4_scheme;
 typedef enum gs4_integrator {
-    GS4_INTEGRATOR_GS4 = 0,             /* second order */
-    GS4_INTEGRATOR_BACKWARD_EULER,      /* first order; partitioned and semi-implicit schemes */
-    GS4_INTEGRATOR_SYMPLECTIC_EULER     /* first order, one transfer each way: the fast tier of the explicit scheme */
+    GS4_INTEGRATOR_GS4 = 0,        /* second order */
+    GS4_INTEGRATOR_BACKWARD_EULER, /* first order; partitioned and semi-implicit schemes */
+    /* first order, one transfer each way: the fast tier of the explicit scheme */
+    GS4_INTEGRATOR_SYMPLECTIC_EULER
 } gs4_integrator;
-typedef enum gs4_wall { GS4_WALL_STICK = 0, GS4_WALL_SLIP, GS4_WALL_SEPARATE, GS4_WALL_OPEN /* particles leave and are dropped */,
-                        GS4_WALL_PERIODIC /* both walls of an axis */ } gs4_wall;
+typedef enum gs4_wall {
+    GS4_WALL_STICK = 0,
+    GS4_WALL_SLIP,
+    GS4_WALL_SEPARATE,
+    GS4_WALL_OPEN /* particles leave and are dropped */,
+    GS4_WALL_PERIODIC /* both walls of an axis */
+} gs4_wall;
 
 typedef struct gs4_sim gs4_sim;
 
 typedef struct gs4_sim_desc {
-    int      cells[3];              /* required, each >= 4 */
-    gs4_real cell_size;             /* m, required, > 0 */
-    gs4_vec3 origin;                /* low corner of the grid */
-    gs4_vec3 gravity;               /* m/s^2 */
+    int cells[3];       /* required, each >= 4 */
+    gs4_real cell_size; /* m, required, > 0 */
+    gs4_vec3 origin;    /* low corner of the grid */
+    gs4_vec3 gravity;   /* m/s^2 */
     gs4_scheme scheme;
     gs4_integrator integrator;
-    gs4_real rho_inf, rho_inf_spurious; /* 0 <= spurious <= rho_inf <= 1; explicit: their product at most 0.98, or no step is stable */
-    gs4_real flip_decay_time;       /* s over which particle motion that the grid cannot see fades; 0: 0.5 s (symplectic
-                                       Euler: at once, affine PIC); INFINITY: pure FLIP */
-    gs4_wall walls[6];              /* -x +x -y +y -z +z */
-    gs4_real wall_temperature[6];   int wall_is_isothermal[6];   /* 0: insulated */
-    gs4_real ambient_temperature;   int air_is_isothermal;       /* 0: insulated free surface */
-    gs4_real cfl;                   /* fraction of the stability limit that gs4_advance uses; 0: 0.5 */
-    gs4_real max_dt;                /* s; 0: no bound but stability */
-    gs4_real solver_tolerance;      /* relative residual; 0: 1e-6 double, 1e-4 float */
-    int      solver_max_iterations; /* 0: 200 */
-    int      max_particles;         /* 0: grows as needed */
-    int      threads;               /* 0 or 1: serial; more needs GS4_PTHREADS or parallel_for; results do not depend on it */
-    gs4_parallel_for_fn parallel_for; void *parallel_user;
-    gs4_allocator allocator;        /* zero: malloc and free */
-    gs4_log_fn log; void *log_user; /* silent when absent */
-    gs4_now_fn now; void *now_user;
-    int      sharp_gradients;       /* 1: the transfers' own error of second order is taken out of gradients and forces. Waves of elasticity and sound
-                                       keep their speed (32 cells a wave: within 0.1 % instead of 1.1 %), the error of a drop that breathes halves, for
-                                       1.2 times the time of a step and 1.5 (sound) to 2.3 (viscosity) times the steps. Liquids alone, no Euler */
+    /* 0 <= spurious <= rho_inf <= 1; explicit: their product at most 0.98, or no step is stable */
+    gs4_real rho_inf, rho_inf_spurious;
+    /* s over which particle motion that the grid cannot see fades; 0: 0.5 s (symplectic Euler:
+     * at once, affine PIC); INFINITY: pure FLIP */
+    gs4_real flip_decay_time;
+    gs4_wall walls[6]; /* -x +x -y +y -z +z */
+    gs4_real wall_temperature[6];
+    int wall_is_isothermal[6]; /* 0: insulated */
+    gs4_real ambient_temperature;
+    int air_is_isothermal; /* 0: insulated free surface */
+    /* fraction of the stability limit that gs4_advance uses; 0: 0.5 */
+    gs4_real cfl;
+    gs4_real max_dt;           /* s; 0: no bound but stability */
+    gs4_real solver_tolerance; /* relative residual; 0: 1e-6 double, 1e-4 float */
+    int solver_max_iterations; /* 0: 200 */
+    int max_particles;         /* 0: grows as needed */
+    /* 0 or 1: serial; more needs GS4_PTHREADS or parallel_for; results do not depend on it */
+    int threads;
+    gs4_parallel_for_fn parallel_for;
+    void *parallel_user;
+    gs4_allocator allocator; /* zero: malloc and free */
+    gs4_log_fn log;
+    void *log_user; /* silent when absent */
+    gs4_now_fn now;
+    void *now_user;
+    /* 1: the transfers' own error of second order is taken out of gradients and forces. Waves of
+     * elasticity and sound keep their speed (32 cells a wave: within 0.1 % instead of 1.1 %),
+     * the error of a drop that breathes halves, for 1.2 times the time of a step and 1.5 (sound)
+     * to 2.3 (viscosity) times the steps. Liquids alone, no Euler */
+    int sharp_gradients;
 } gs4_sim_desc;
 
-GS4_API int  gs4_create(const gs4_sim_desc *desc, gs4_sim **sim);
-GS4_API void gs4_destroy(gs4_sim *sim);                       /* NULL is fine */
-GS4_API const char *gs4_last_error(const gs4_sim *sim);       /* a sentence: what was wrong, which field, what value; NULL sim: of gs4_create */
-GS4_API gs4_sim_desc gs4_get_desc(const gs4_sim *sim);        /* with every default filled in */
-GS4_API uint64_t gs4_state_hash(const gs4_sim *sim);          /* of the whole state; equal for any thread count */
+GS4_API int gs4_create(const gs4_sim_desc *desc, gs4_sim **sim);
+GS4_API void gs4_destroy(gs4_sim *sim); /* NULL is fine */
+/* a sentence: what was wrong, which field, what value; NULL sim: of gs4_create */
+GS4_API const char *gs4_last_error(const gs4_sim *sim);
+GS4_API gs4_sim_desc gs4_get_desc(const gs4_sim *sim); /* with every default filled in */
+/* of the whole state; equal for any thread count */
+GS4_API uint64_t gs4_state_hash(const gs4_sim *sim);
 
-GS4_API int gs4_add_material(gs4_sim *sim, const gs4_material *material);      /* id >= 0, or an error */
-/* water, olive oil, glycerol, honey; viscoelastic: cream, ice cream, boger fluid, polymer melt; melting, in degrees Celsius, with solids much
- * softer than real ones: chocolate, wax, butter, lava. Sources: [[liquid]] */
+/* id >= 0, or an error */
+GS4_API int gs4_add_material(gs4_sim *sim, const gs4_material *material);
+/* water, olive oil, glycerol, honey; viscoelastic: cream, ice cream, boger fluid, polymer melt;
+ * melting, in degrees Celsius, with solids much softer than real ones: chocolate, wax, butter,
+ * lava. Sources: [[liquid]] */
 GS4_API int gs4_material_preset(const char *name, gs4_material *material);
 
 typedef struct gs4_fill {
-    int      material;
-    gs4_real spacing;               /* m between particles; 0: half a cell (8 per cell) */
+    int material;
+    gs4_real spacing; /* m between particles; 0: half a cell (8 per cell) */
     gs4_vec3 velocity;
-    gs4_vec3 angular_velocity;      /* about the shape's centre, rad/s */
+    gs4_vec3 angular_velocity; /* about the shape's centre, rad/s */
     gs4_real temperature;
-    gs4_real jitter;                /* 0..1 of the spacing */
+    gs4_real jitter; /* 0..1 of the spacing */
     uint32_t random_seed;
 } gs4_fill;
-GS4_API int gs4_add_particles(gs4_sim *sim, gs4_shape shape, const gs4_fill *fill);                  /* count added, or an error */
-GS4_API int gs4_add_points(gs4_sim *sim, const gs4_real *xyz, int count, gs4_real volume_each, const gs4_fill *fill);
+/* count added, or an error */
+GS4_API int gs4_add_particles(gs4_sim *sim, gs4_shape shape, const gs4_fill *fill);
+GS4_API int gs4_add_points(gs4_sim *sim, const gs4_real *xyz, int count, gs4_real volume_each,
+                           const gs4_fill *fill);
 
 typedef struct gs4_collider {
     gs4_shape shape;
-    gs4_wall  contact;              /* stick, slip or separate */
-    gs4_real  friction;             /* Coulomb, for separate */
-    gs4_vec3  velocity, angular_velocity;   /* of the body; its pose follows */
-    gs4_vec3  pivot;
-    gs4_real  temperature; int is_isothermal;
+    gs4_wall contact;                    /* stick, slip or separate */
+    gs4_real friction;                   /* Coulomb, for separate */
+    gs4_vec3 velocity, angular_velocity; /* of the body; its pose follows */
+    gs4_vec3 pivot;
+    gs4_real temperature;
+    int is_isothermal;
 } gs4_collider;
-GS4_API int gs4_add_collider(gs4_sim *sim, const gs4_collider *collider);                            /* id */
-GS4_API int gs4_move_collider(gs4_sim *sim, int collider, gs4_vec3 velocity, gs4_vec3 angular_velocity);     /* from now on */
+/* id */
+GS4_API int gs4_add_collider(gs4_sim *sim, const gs4_collider *collider);
+/* from now on */
+GS4_API int gs4_move_collider(gs4_sim *sim, int collider, gs4_vec3 velocity,
+                              gs4_vec3 angular_velocity);
 
-typedef struct gs4_emitter {        /* a nozzle: it is full at `start`, and what leaves it has fill.velocity, of the world */
-    gs4_shape shape;                /* the mouth's volume; refilled as material leaves */
-    gs4_fill  fill;
-    gs4_vec3  travel;               /* velocity of the nozzle itself */
-    gs4_real  start, stop;          /* s; stop 0: never */
+/* a nozzle: it is full at `start`, and what leaves it has fill.velocity, of the world */
+typedef struct gs4_emitter {
+    gs4_shape shape; /* the mouth's volume; refilled as material leaves */
+    gs4_fill fill;
+    gs4_vec3 travel;      /* velocity of the nozzle itself */
+    gs4_real start, stop; /* s; stop 0: never */
 } gs4_emitter;
-GS4_API int gs4_add_emitter(gs4_sim *sim, const gs4_emitter *emitter);                               /* id */
+/* id */
+GS4_API int gs4_add_emitter(gs4_sim *sim, const gs4_emitter *emitter);
 GS4_API int gs4_move_emitter(gs4_sim *sim, int emitter, gs4_vec3 travel);
 
-GS4_API int      gs4_step(gs4_sim *sim, gs4_real dt);          /* one step of exactly dt; beyond gs4_stable_dt it is refused */
-GS4_API int      gs4_advance(gs4_sim *sim, gs4_real duration); /* as many stable steps as it takes; ends exactly there */
-GS4_API gs4_real gs4_stable_dt(const gs4_sim *sim);            /* the limit itself, before `cfl` */
+/* one step of exactly dt; beyond gs4_stable_dt it is refused */
+GS4_API int gs4_step(gs4_sim *sim, gs4_real dt);
+/* as many stable steps as it takes; ends exactly there */
+GS4_API int gs4_advance(gs4_sim *sim, gs4_real duration);
+GS4_API gs4_real gs4_stable_dt(const gs4_sim *sim); /* the limit itself, before `cfl` */
 
-/* No copies; a view stays valid until the next call that changes the simulation; looking changes nothing. */
+/* No copies; a view stays valid until the next call that changes the simulation; looking changes
+ * nothing. */
 typedef enum gs4_field {
-    GS4_FIELD_POSITION = 0, GS4_FIELD_VELOCITY, GS4_FIELD_VOLUME_RATIO /* J */, GS4_FIELD_STRESS /* non-local, xx yy zz xy xz yz */,
-    GS4_FIELD_DEFORMATION /* F, row-major, det F = J; of liquids J^(1/3) I */, GS4_FIELD_TEMPERATURE, GS4_FIELD_LIQUID_FRACTION, GS4_FIELD_FLUX /* non-local */,
+    GS4_FIELD_POSITION = 0,
+    GS4_FIELD_VELOCITY,
+    GS4_FIELD_VOLUME_RATIO /* J */,
+    GS4_FIELD_STRESS /* non-local, xx yy zz xy xz yz */,
+    GS4_FIELD_DEFORMATION /* F, row-major, det F = J; of liquids J^(1/3) I */,
+    GS4_FIELD_TEMPERATURE,
+    GS4_FIELD_LIQUID_FRACTION,
+    GS4_FIELD_FLUX /* non-local */,
     GS4_FIELD_MASS
 } gs4_field;
-typedef struct gs4_view { const gs4_real *data; int count, components, stride; } gs4_view; /* element i: data + i*stride; data NULL: no such field */
-typedef struct gs4_edit { gs4_real *data; int count, components, stride; } gs4_edit;
-GS4_API gs4_view        gs4_particles(const gs4_sim *sim, gs4_field field);
-GS4_API gs4_edit        gs4_edit_particles(gs4_sim *sim, gs4_field field);  /* position, velocity; the next step starts the integrator afresh */
-GS4_API const uint32_t *gs4_particle_ids(const gs4_sim *sim);          /* stable names: order changes as particles are sorted */
-GS4_API const uint8_t  *gs4_particle_materials(const gs4_sim *sim);
+/* element i: data + i*stride; data NULL: no such field */
+typedef struct gs4_view {
+    const gs4_real *data;
+    int count, components, stride;
+} gs4_view;
+typedef struct gs4_edit {
+    gs4_real *data;
+    int count, components, stride;
+} gs4_edit;
+GS4_API gs4_view gs4_particles(const gs4_sim *sim, gs4_field field);
+/* position, velocity; the next step starts the integrator afresh */
+GS4_API gs4_edit gs4_edit_particles(gs4_sim *sim, gs4_field field);
+/* stable names: order changes as particles are sorted */
+GS4_API const uint32_t *gs4_particle_ids(const gs4_sim *sim);
+GS4_API const uint8_t *gs4_particle_materials(const gs4_sim *sim);
 
 typedef struct gs4_stats {
-    double   time; uint64_t steps; double dt;
-    int      particles, active_cells; uint64_t memory_bytes;
-    double   mass, momentum[3], angular_momentum[3] /* about the origin of coordinates */, kinetic_energy, thermal_energy, volume;
-    double   max_speed, min_volume_ratio, max_volume_ratio, min_temperature, max_temperature;
-    int      pressure_iterations, viscous_iterations, heat_iterations, elastic_iterations; double solver_residual;     /* explicit: heat alone */
-    uint64_t stress_substeps;       /* particles that needed the robust local integrator so far */
-    uint64_t stress_bounded;        /* whose stretch had to be bounded: liquids where anisotropy > 1, solids that do not yield beyond 512 */
-    double   seconds_transfer, seconds_stress, seconds_solve, seconds_sort, seconds_total;    /* so far */
+    double time;
+    uint64_t steps;
+    double dt;
+    int particles, active_cells;
+    uint64_t memory_bytes;
+    double mass, momentum[3], angular_momentum[3] /* about the origin of coordinates */,
+        kinetic_energy, thermal_energy, volume;
+    double max_speed, min_volume_ratio, max_volume_ratio, min_temperature, max_temperature;
+    /* explicit: heat alone */
+    int pressure_iterations, viscous_iterations, heat_iterations, elastic_iterations;
+    double solver_residual;
+    uint64_t stress_substeps; /* particles that needed the robust local integrator so far */
+    /* whose stretch had to be bounded: liquids where anisotropy > 1, solids that do not yield
+     * beyond 512 */
+    uint64_t stress_bounded;
+    /* so far */
+    double seconds_transfer, seconds_stress, seconds_solve, seconds_sort, seconds_total;
 } gs4_stats;
 GS4_API gs4_stats gs4_get_stats(gs4_sim *sim);
 
-/* Frames and checkpoints are written beside the target and renamed, so a reader never sees half a file. */
-GS4_API int gs4_write_ply(gs4_sim *sim, const char *path);     /* binary little-endian PLY: x y z, vx vy vz, and the fields the scene has */
-GS4_API int gs4_write_raw(gs4_sim *sim, const char *path);     /* NumPy .npy, one record a particle: numpy.load(path)['velocity'] */
-GS4_API int gs4_save(gs4_sim *sim, const char *path);          /* whole state: loading it continues bit for bit */
-GS4_API int gs4_load(gs4_sim *sim, const char *path);          /* into one made with the same description, materials, colliders and emitters */
+/* Frames and checkpoints are written beside the target and renamed, so a reader never sees half
+ * a file. */
+/* binary little-endian PLY: x y z, vx vy vz, and the fields the scene has */
+GS4_API int gs4_write_ply(gs4_sim *sim, const char *path);
+/* NumPy .npy, one record a particle: numpy.load(path)['velocity'] */
+GS4_API int gs4_write_raw(gs4_sim *sim, const char *path);
+/* whole state: loading it continues bit for bit */
+GS4_API int gs4_save(gs4_sim *sim, const char *path);
+/* into one made with the same description, materials, colliders and emitters */
+GS4_API int gs4_load(gs4_sim *sim, const char *path);
 
-/* One material point: the same code that particles run, for rheometry and teaching. All zero: at rest. A step starts afresh where
- * stress_rate is zero; set it to zero where the flow changes at once. Errors have a sentence in gs4_last_error(NULL). */
+/* One material point: the same code that particles run, for rheometry and teaching. All zero: at
+ * rest. A step starts afresh where stress_rate is zero; set it to zero where the flow changes at
+ * once. Errors have a sentence in gs4_last_error(NULL). */
 typedef struct gs4_point {
-    gs4_real stress[6], stress_rate[6];   /* non-local: xx yy zz xy xz yz, Pa and Pa/s */
-    gs4_real deformation[9];              /* F of solids, elastic part, det F > 0; all zero means identity */
-    gs4_real temperature;                 /* for viscosity laws */
+    gs4_real stress[6], stress_rate[6]; /* non-local: xx yy zz xy xz yz, Pa and Pa/s */
+    /* F of solids, elastic part, det F > 0; all zero means identity */
+    gs4_real deformation[9];
+    gs4_real temperature; /* for viscosity laws */
 } gs4_point;
-GS4_API int gs4_point_step(const gs4_material *material, gs4_point *point, const gs4_real velocity_gradient[9], /* L[3*i+j] = dv_i/dx_j */
-                           gs4_real dt, gs4_real rho_inf, gs4_real rho_inf_spurious);
-GS4_API int gs4_point_stress(const gs4_material *material, const gs4_point *point, const gs4_real velocity_gradient[9],
-                             gs4_real cauchy[6]);  /* 2 F_v mu D, non-local stress, stress of F; Pa; without the pressure */
+/* L[3*i+j] = dv_i/dx_j */
+GS4_API int gs4_point_step(const gs4_material *material, gs4_point *point,
+                           const gs4_real velocity_gradient[9], gs4_real dt, gs4_real rho_inf,
+                           gs4_real rho_inf_spurious);
+GS4_API int gs4_point_stress(const gs4_material *material, const gs4_point *point,
+                             const gs4_real velocity_gradient[9],
+                             /* 2 F_v mu D, non-local stress, stress of F; Pa; without the
+                              * pressure */
+                             gs4_real cauchy[6]);
 
-/* ==== [[poisson]] the elliptic solver by itself ==================================================== */
+/* ==== [[poisson]] the elliptic solver by itself =============================================== */
 
-/* (diagonal - div coefficient grad) x = rhs in the liquid cells of a box of cubic cells: for each of them
+/* (diagonal - div coefficient grad) x = rhs in the liquid cells of a box of cubic cells: for
+ * each of them
  *     diagonal_i x_i + sum over its faces of coefficient_f (x_i - x_j) / cell_size^2 = rhs_i,
- * where a neighbour in the air has x given at its centre, and solids and what is beyond the box let nothing through. */
-typedef enum gs4_cell { GS4_CELL_AIR = 0 /* x given */, GS4_CELL_LIQUID = 1 /* unknown */, GS4_CELL_SOLID = 2 /* no flux */ } gs4_cell;
+ * where a neighbour in the air has x given at its centre, and solids and what is beyond the box
+ * let nothing through. */
+typedef enum gs4_cell {
+    GS4_CELL_AIR = 0 /* x given */,
+    GS4_CELL_LIQUID = 1 /* unknown */,
+    GS4_CELL_SOLID = 2 /* no flux */
+} gs4_cell;
 
-typedef struct gs4_poisson_desc {       /* the arrays are read by gs4_poisson_create alone */
-    int cells[3]; gs4_real cell_size;
-    const uint8_t  *kind;               /* gs4_cell per cell, x fastest, then y; beyond the box is GS4_CELL_SOLID */
-    const gs4_real *diagonal;           /* per cell, >= 0; NULL: 0 */
-    const gs4_real *coefficient[3];     /* per face of each axis, (n+1) along that axis, face i before cell i, >= 0; NULL: 1 */
-    gs4_real tolerance;                 /* relative residual; 0: 1e-6 double, 1e-4 float */
-    int      max_iterations;            /* 0: 200 */
-    int      threads;                   /* as in gs4_sim_desc, like all that follows */
-    gs4_parallel_for_fn parallel_for; void *parallel_user;
+typedef struct gs4_poisson_desc { /* the arrays are read by gs4_poisson_create alone */
+    int cells[3];
+    gs4_real cell_size;
+    /* gs4_cell per cell, x fastest, then y; beyond the box is GS4_CELL_SOLID */
+    const uint8_t *kind;
+    const gs4_real *diagonal; /* per cell, >= 0; NULL: 0 */
+    /* per face of each axis, (n+1) along that axis, face i before cell i, >= 0; NULL: 1 */
+    const gs4_real *coefficient[3];
+    gs4_real tolerance; /* relative residual; 0: 1e-6 double, 1e-4 float */
+    int max_iterations; /* 0: 200 */
+    int threads;        /* as in gs4_sim_desc, like all that follows */
+    gs4_parallel_for_fn parallel_for;
+    void *parallel_user;
     gs4_allocator allocator;
-    gs4_now_fn now; void *now_user;
+    gs4_now_fn now;
+    void *now_user;
 } gs4_poisson_desc;
 
 typedef struct gs4_poisson gs4_poisson;
 typedef struct gs4_solve_stats {
-    int      iterations;
-    double   residual;                  /* |b - A x| / |b| in the 2-norm, b with what flows in from the air; recomputed from x, before it is rounded to gs4_real */
-    double   setup_seconds, solve_seconds; uint64_t memory_bytes;
-    int      pockets;                   /* parts of the liquid with neither air nor diagonal: x has mean 0 there, and ... */
-    double   removed_mean;              /* ... the mean of rhs, which no x can meet, is taken off: the largest |mean| */
+    int iterations;
+    /* |b - A x| / |b| in the 2-norm, b with what flows in from the air; recomputed from x,
+     * before it is rounded to gs4_real */
+    double residual;
+    double setup_seconds, solve_seconds;
+    uint64_t memory_bytes;
+    /* parts of the liquid with neither air nor diagonal: x has mean 0 there, and ... */
+    int pockets;
+    /* ... the mean of rhs, which no x can meet, is taken off: the largest |mean| */
+    double removed_mean;
 } gs4_solve_stats;
 
-/* Every value that matters must be finite; those of solids, rhs in the air, and faces that let nothing through may be anything. Errors have a
- * sentence in gs4_last_error(NULL). After GS4_ERROR_NOT_CONVERGED x is the last iterate, the best in the energy norm, and `residual`
- * is true; after other errors x is as it was. */
-GS4_API int  gs4_poisson_create(const gs4_poisson_desc *desc, gs4_poisson **solver);
-GS4_API int  gs4_poisson_solve(gs4_poisson *solver, const gs4_real *rhs, gs4_real *x /* in: guess and air values; out: solution */,
-                               gs4_solve_stats *stats /* or NULL */);
-GS4_API void gs4_poisson_destroy(gs4_poisson *solver);         /* NULL is fine */
+/* Every value that matters must be finite; those of solids, rhs in the air, and faces that let
+ * nothing through may be anything. Errors have a sentence in gs4_last_error(NULL). After
+ * GS4_ERROR_NOT_CONVERGED x is the last iterate, the best in the energy norm, and `residual` is
+ * true; after other errors x is as it was. */
+GS4_API int gs4_poisson_create(const gs4_poisson_desc *desc, gs4_poisson **solver);
+GS4_API int gs4_poisson_solve(gs4_poisson *solver, const gs4_real *rhs,
+                              gs4_real *x /* in: guess and air values; out: solution */,
+                              gs4_solve_stats *stats /* or NULL */);
+GS4_API void gs4_poisson_destroy(gs4_poisson *solver); /* NULL is fine */
 
 #ifdef __cplusplus
 }
 #endif
 #endif /* GS4MPM_H */
 
-/* ######################################################################################################
- * ##  The implementation. Readers of the interface can stop here.                                     ##
- * ###################################################################################################### */
+/* #################################################################################################
+ * ##  The implementation. Readers of the interface can stop here. ##
+ * ############################################################################################## */
 #if defined(GS4MPM_IMPLEMENTATION) && !defined(GS4I_IMPLEMENTED)
 #define GS4I_IMPLEMENTED
 
-/* ==== [[base]] arithmetic rules, memory, text, tasks =============================================== */
+/* ==== [[base]] arithmetic rules, memory, text, tasks ========================================== */
 
 #include <stdlib.h>
 #include <string.h>
@@ -546,13 +682,13 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *solver);         /* NULL is fine *
 #include <pthread.h>
 #endif
 
-/* One product and one sum are rounded twice, always: fused operations would make results depend on compiler
- * flags. Undone at the end of the file, so that the code around keeps its own rule. */
+/* One product and one sum are rounded twice, always: fused operations would make results depend
+ * on compiler flags. Undone at the end of the file, so that the code around keeps its own rule. */
 #if defined(__clang__)
 #pragma STDC FP_CONTRACT OFF
 #elif defined(__GNUC__) && !defined(__TINYC__)
 #pragma GCC push_options
-#pragma GCC optimize ("fp-contract=off")
+#pragma GCC optimize("fp-contract=off")
 #endif
 
 #define GS4I_C(x) ((gs4_real)(x))
@@ -560,7 +696,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *solver);         /* NULL is fine *
 #define GS4I_SQRT sqrt
 #define GS4I_TINY GS4I_C(1e-290)
 #define GS4I_EPSILON GS4I_C(DBL_EPSILON)
-#define GS4I_HUGE GS4I_C(1e100)         /* beyond this an input is called absurd */
+#define GS4I_HUGE GS4I_C(1e100) /* beyond this an input is called absurd */
 #else
 #define GS4I_SQRT sqrtf
 #define GS4I_TINY GS4I_C(1e-36)
@@ -586,7 +722,10 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *solver);         /* NULL is fine *
 #endif
 
 /* Every allocation of one simulation goes through here: 64-byte aligned, zeroed, counted. */
-typedef struct gs4i_memory { gs4_allocator hook; uint64_t bytes; } gs4i_memory;
+typedef struct gs4i_memory {
+    gs4_allocator hook;
+    uint64_t bytes;
+} gs4i_memory;
 
 static void *gs4i_default_alloc(size_t bytes, size_t alignment, void *user)
 {
@@ -604,13 +743,17 @@ static void *gs4i_default_alloc(size_t bytes, size_t alignment, void *user)
 static void gs4i_default_free(void *memory, size_t bytes, void *user)
 {
     char *raw;
-    (void)bytes; (void)user;
+    (void)bytes;
+    (void)user;
     memcpy(&raw, (char *)memory - sizeof(void *), sizeof(void *));
     free(raw);
 }
 
 /* Scratch that is kept from step to step. */
-typedef struct gs4i_scratch { void *data; size_t bytes; } gs4i_scratch;
+typedef struct gs4i_scratch {
+    void *data;
+    size_t bytes;
+} gs4i_scratch;
 
 static void *gs4i_alloc(gs4i_memory *m, size_t count, size_t size)
 {
@@ -632,7 +775,8 @@ static void gs4i_free(gs4i_memory *m, void *p, size_t count, size_t size)
     m->hook.free_fn(p, count * size, m->hook.user);
 }
 
-/* At least `bytes` of scratch; what was in the first `keep` bytes stays. NULL when memory is refused. */
+/* At least `bytes` of scratch; what was in the first `keep` bytes stays. NULL when memory is
+ * refused. */
 static void *gs4i_scratch_reserve(gs4i_memory *m, gs4i_scratch *s, size_t bytes, size_t keep)
 {
     void *grown;
@@ -642,16 +786,23 @@ static void *gs4i_scratch_reserve(gs4i_memory *m, gs4i_scratch *s, size_t bytes,
     if (!grown) return NULL;
     if (keep) memcpy(grown, s->data, keep);
     gs4i_free(m, s->data, s->bytes, 1);
-    s->data = grown; s->bytes = bytes;
+    s->data = grown;
+    s->bytes = bytes;
     return grown;
 }
 
 /* A sentence put together piece by piece: no printf, whose numbers depend on the locale. */
-typedef struct gs4i_text { char *at; size_t left; } gs4i_text;
+typedef struct gs4i_text {
+    char *at;
+    size_t left;
+} gs4i_text;
 
 static void gs4i_put(gs4i_text *t, const char *s)
 {
-    while (*s && t->left > 1) { *t->at++ = *s++; t->left--; }
+    while (*s && t->left > 1) {
+        *t->at++ = *s++;
+        t->left--;
+    }
     if (t->left) *t->at = 0;
 }
 
@@ -660,7 +811,10 @@ static void gs4i_put_integer(gs4i_text *t, int64_t value)
     char digits[24], *d = digits + sizeof digits - 1;
     uint64_t u = value < 0 ? 0 - (uint64_t)value : (uint64_t)value;
     *d = 0;
-    do { *--d = (char)('0' + (int)(u % 10)); u /= 10; } while (u);
+    do {
+        *--d = (char)('0' + (int)(u % 10));
+        u /= 10;
+    } while (u);
     if (value < 0) *--d = '-';
     gs4i_put(t, d);
 }
@@ -671,30 +825,62 @@ static void gs4i_put_real(gs4i_text *t, double v)
     char digits[8];
     int exponent = 0, n, i;
     int64_t m;
-    if (v != v) { gs4i_put(t, "NaN"); return; }
-    if (v < 0) { gs4i_put(t, "-"); v = -v; }
-    if (v > DBL_MAX) { gs4i_put(t, "infinity"); return; }
-    if (v == 0) { gs4i_put(t, "0"); return; }
-    while (v >= 1e6) { v /= 10; exponent++; }
-    while (v < 1e5) { v *= 10; exponent--; }
+    if (v != v) {
+        gs4i_put(t, "NaN");
+        return;
+    }
+    if (v < 0) {
+        gs4i_put(t, "-");
+        v = -v;
+    }
+    if (v > DBL_MAX) {
+        gs4i_put(t, "infinity");
+        return;
+    }
+    if (v == 0) {
+        gs4i_put(t, "0");
+        return;
+    }
+    while (v >= 1e6) {
+        v /= 10;
+        exponent++;
+    }
+    while (v < 1e5) {
+        v *= 10;
+        exponent--;
+    }
     m = (int64_t)(v + 0.5);
-    if (m == 1000000) { m = 100000; exponent++; }
-    exponent += 5;                                  /* now digits are d.ddddd x 10^exponent */
-    for (i = 5; i >= 0; i--) { digits[i] = (char)('0' + (int)(m % 10)); m /= 10; }
+    if (m == 1000000) {
+        m = 100000;
+        exponent++;
+    }
+    exponent += 5; /* now digits are d.ddddd x 10^exponent */
+    for (i = 5; i >= 0; i--) {
+        digits[i] = (char)('0' + (int)(m % 10));
+        m /= 10;
+    }
     n = 6;
     while (n > 1 && digits[n - 1] == '0') n--;
     {
         char out[32], *o = out;
         int scientific = exponent < -4 || exponent > 6;
-        int point = scientific ? 0 : exponent;      /* index of the digit before the decimal point */
-        if (point < 0) { *o++ = '0'; *o++ = '.'; for (i = -1; i > point; i--) *o++ = '0'; }
+        /* index of the digit before the decimal point */
+        int point = scientific ? 0 : exponent;
+        if (point < 0) {
+            *o++ = '0';
+            *o++ = '.';
+            for (i = -1; i > point; i--) *o++ = '0';
+        }
         for (i = 0; i < n || i <= point; i++) {
             *o++ = i < n ? digits[i] : '0';
             if (i == point && i + 1 < n) *o++ = '.';
         }
         *o = 0;
         gs4i_put(t, out);
-        if (scientific) { gs4i_put(t, "e"); gs4i_put_integer(t, exponent); }
+        if (scientific) {
+            gs4i_put(t, "e");
+            gs4i_put_integer(t, exponent);
+        }
     }
 }
 
@@ -702,10 +888,12 @@ static void gs4i_put_real(gs4i_text *t, double v)
 GS4I_INLINE int gs4i_finite(gs4_real v)
 {
 #ifdef GS4_DOUBLE
-    uint64_t u; memcpy(&u, &v, sizeof u);
+    uint64_t u;
+    memcpy(&u, &v, sizeof u);
     return (u & 0x7ff0000000000000u) != 0x7ff0000000000000u;
 #else
-    uint32_t u; memcpy(&u, &v, sizeof u);
+    uint32_t u;
+    memcpy(&u, &v, sizeof u);
     return (u & 0x7f800000u) != 0x7f800000u;
 #endif
 }
@@ -714,16 +902,19 @@ GS4I_INLINE int gs4i_finite(gs4_real v)
 #ifdef GS4_PTHREADS
 typedef struct gs4i_pool {
     pthread_mutex_t lock;
-    pthread_cond_t  wake, done;
-    pthread_t *threads; int thread_count;
-    gs4_task_fn task; void *context;
+    pthread_cond_t wake, done;
+    pthread_t *threads;
+    int thread_count;
+    gs4_task_fn task;
+    void *context;
     int count, next, running, batch, quit;
     unsigned generation;
 } gs4i_pool;
 #endif
 
 typedef struct gs4i_tasks {
-    gs4_parallel_for_fn parallel_for; void *user;
+    gs4_parallel_for_fn parallel_for;
+    void *user;
 #ifdef GS4_PTHREADS
     gs4i_pool *pool;
 #endif
@@ -735,7 +926,8 @@ static void gs4i_pool_work(gs4i_pool *pool)
 {
     while (pool->next < pool->count) {
         int i = pool->next, end = i + pool->batch;
-        gs4_task_fn task = pool->task; void *context = pool->context;
+        gs4_task_fn task = pool->task;
+        void *context = pool->context;
         if (end > pool->count) end = pool->count;
         pool->next = end;
         pthread_mutex_unlock(&pool->lock);
@@ -764,8 +956,10 @@ static void *gs4i_pool_main(void *argument)
 static void gs4i_pool_run(gs4i_pool *pool, int count, gs4_task_fn task, void *context)
 {
     pthread_mutex_lock(&pool->lock);
-    pool->task = task; pool->context = context;
-    pool->count = count; pool->next = 0;
+    pool->task = task;
+    pool->context = context;
+    pool->count = count;
+    pool->next = 0;
     pool->batch = count / (8 * (pool->thread_count + 1));
     if (pool->batch < 1) pool->batch = 1;
     pool->generation++;
@@ -784,7 +978,8 @@ static void gs4i_pool_destroy(gs4i_memory *memory, gs4i_pool *pool, int capacity
     pthread_cond_broadcast(&pool->wake);
     pthread_mutex_unlock(&pool->lock);
     for (i = 0; i < pool->thread_count; i++) pthread_join(pool->threads[i], NULL);
-    pthread_cond_destroy(&pool->wake); pthread_cond_destroy(&pool->done);
+    pthread_cond_destroy(&pool->wake);
+    pthread_cond_destroy(&pool->done);
     pthread_mutex_destroy(&pool->lock);
     gs4i_free(memory, pool->threads, (size_t)capacity, sizeof(pthread_t));
     gs4i_free(memory, pool, 1, sizeof *pool);
@@ -796,9 +991,13 @@ static gs4i_pool *gs4i_pool_create(gs4i_memory *memory, int workers)
     gs4i_pool *pool = (gs4i_pool *)gs4i_alloc(memory, 1, sizeof *pool);
     if (!pool) return NULL;
     pool->threads = (pthread_t *)gs4i_alloc(memory, (size_t)workers, sizeof(pthread_t));
-    if (!pool->threads) { gs4i_free(memory, pool, 1, sizeof *pool); return NULL; }
+    if (!pool->threads) {
+        gs4i_free(memory, pool, 1, sizeof *pool);
+        return NULL;
+    }
     pthread_mutex_init(&pool->lock, NULL);
-    pthread_cond_init(&pool->wake, NULL); pthread_cond_init(&pool->done, NULL);
+    pthread_cond_init(&pool->wake, NULL);
+    pthread_cond_init(&pool->done, NULL);
     for (; pool->thread_count < workers; pool->thread_count++)
         if (pthread_create(&pool->threads[pool->thread_count], NULL, gs4i_pool_main, pool) != 0) {
             gs4i_pool_destroy(memory, pool, workers);
@@ -812,27 +1011,41 @@ static void gs4i_parallel_for(const gs4i_tasks *tasks, int count, gs4_task_fn ta
 {
     int i;
     if (count > 1) {
-        if (tasks->parallel_for) { tasks->parallel_for(count, task, context, tasks->user); return; }
+        if (tasks->parallel_for) {
+            tasks->parallel_for(count, task, context, tasks->user);
+            return;
+        }
 #ifdef GS4_PTHREADS
-        if (tasks->pool) { gs4i_pool_run(tasks->pool, count, task, context); return; }
+        if (tasks->pool) {
+            gs4i_pool_run(tasks->pool, count, task, context);
+            return;
+        }
 #endif
     }
     for (i = 0; i < count; i++) task(i, context);
 }
 
-/* Ascending heap sort of block numbers: in place, no recursion, no libc qsort whose order of equals varies. */
+/* Ascending heap sort of block numbers: in place, no recursion, no libc qsort whose order of
+ * equals varies. */
 static void gs4i_sort(uint32_t *v, int n)
 {
     int start = n / 2, end = n;
     while (end > 1) {
         int root, child;
-        if (start > 0) start--;
-        else { uint32_t t = v[--end]; v[end] = v[0]; v[0] = t; }
+        if (start > 0)
+            start--;
+        else {
+            uint32_t t = v[--end];
+            v[end] = v[0];
+            v[0] = t;
+        }
         for (root = start; (child = 2 * root + 1) < end; root = child) {
             uint32_t t;
             if (child + 1 < end && v[child] < v[child + 1]) child++;
             if (v[root] >= v[child]) break;
-            t = v[root]; v[root] = v[child]; v[child] = t;
+            t = v[root];
+            v[root] = v[child];
+            v[child] = t;
         }
     }
 }
@@ -849,17 +1062,43 @@ static uint64_t gs4i_mix(uint64_t z)
 static uint64_t gs4i_hash_bytes(uint64_t h, const void *data, size_t bytes)
 {
     const unsigned char *p = (const unsigned char *)data;
-    while (bytes >= 8) { uint64_t u; memcpy(&u, p, 8); h = gs4i_mix(h ^ u); p += 8; bytes -= 8; }
-    if (bytes) { uint64_t u = 0; memcpy(&u, p, bytes); h = gs4i_mix(h ^ u ^ ((uint64_t)bytes << 56)); }
+    while (bytes >= 8) {
+        uint64_t u;
+        memcpy(&u, p, 8);
+        h = gs4i_mix(h ^ u);
+        p += 8;
+        bytes -= 8;
+    }
+    if (bytes) {
+        uint64_t u = 0;
+        memcpy(&u, p, bytes);
+        h = gs4i_mix(h ^ u ^ ((uint64_t)bytes << 56));
+    }
     return h;
 }
 
-/* ==== [[vec]] three-vectors and shapes ============================================================= */
+/* ==== [[vec]] three-vectors and shapes ======================================================== */
 
-GS4I_INLINE gs4_vec3 gs4i_vec3(gs4_real x, gs4_real y, gs4_real z) { gs4_vec3 v; v.x = x; v.y = y; v.z = z; return v; }
-GS4I_INLINE gs4_vec3 gs4i_add(gs4_vec3 a, gs4_vec3 b) { return gs4i_vec3(a.x + b.x, a.y + b.y, a.z + b.z); }
-GS4I_INLINE gs4_vec3 gs4i_sub(gs4_vec3 a, gs4_vec3 b) { return gs4i_vec3(a.x - b.x, a.y - b.y, a.z - b.z); }
-GS4I_INLINE gs4_vec3 gs4i_scale(gs4_vec3 a, gs4_real s) { return gs4i_vec3(a.x * s, a.y * s, a.z * s); }
+GS4I_INLINE gs4_vec3 gs4i_vec3(gs4_real x, gs4_real y, gs4_real z)
+{
+    gs4_vec3 v;
+    v.x = x;
+    v.y = y;
+    v.z = z;
+    return v;
+}
+GS4I_INLINE gs4_vec3 gs4i_add(gs4_vec3 a, gs4_vec3 b)
+{
+    return gs4i_vec3(a.x + b.x, a.y + b.y, a.z + b.z);
+}
+GS4I_INLINE gs4_vec3 gs4i_sub(gs4_vec3 a, gs4_vec3 b)
+{
+    return gs4i_vec3(a.x - b.x, a.y - b.y, a.z - b.z);
+}
+GS4I_INLINE gs4_vec3 gs4i_scale(gs4_vec3 a, gs4_real s)
+{
+    return gs4i_vec3(a.x * s, a.y * s, a.z * s);
+}
 GS4I_INLINE gs4_real gs4i_dot(gs4_vec3 a, gs4_vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 GS4I_INLINE gs4_vec3 gs4i_cross(gs4_vec3 a, gs4_vec3 b)
 {
@@ -869,13 +1108,20 @@ GS4I_INLINE gs4_real gs4i_length(gs4_vec3 a) { return GS4I_SQRT(gs4i_dot(a, a));
 GS4I_INLINE gs4_real gs4i_min(gs4_real a, gs4_real b) { return a < b ? a : b; }
 GS4I_INLINE gs4_real gs4i_max(gs4_real a, gs4_real b) { return a > b ? a : b; }
 GS4I_INLINE gs4_real gs4i_abs(gs4_real a) { return a < 0 ? -a : a; }
-static void gs4i_to_double(gs4_vec3 a, double out[3]) { out[0] = (double)a.x; out[1] = (double)a.y; out[2] = (double)a.z; }
+static void gs4i_to_double(gs4_vec3 a, double out[3])
+{
+    out[0] = (double)a.x;
+    out[1] = (double)a.y;
+    out[2] = (double)a.z;
+}
 
 /* Signed distances. Box: exact outside and inside. Cylinder: capped, exact. */
 static gs4_real gs4i_box_distance(const gs4_shape *s, gs4_vec3 p)
 {
-    gs4_vec3 c = gs4i_scale(gs4i_add(s->a, s->b), GS4I_C(0.5)), e = gs4i_scale(gs4i_sub(s->b, s->a), GS4I_C(0.5));
-    gs4_vec3 q = gs4i_vec3(gs4i_abs(p.x - c.x) - e.x, gs4i_abs(p.y - c.y) - e.y, gs4i_abs(p.z - c.z) - e.z);
+    gs4_vec3 c = gs4i_scale(gs4i_add(s->a, s->b), GS4I_C(0.5)),
+             e = gs4i_scale(gs4i_sub(s->b, s->a), GS4I_C(0.5));
+    gs4_vec3 q =
+        gs4i_vec3(gs4i_abs(p.x - c.x) - e.x, gs4i_abs(p.y - c.y) - e.y, gs4i_abs(p.z - c.z) - e.z);
     gs4_vec3 out = gs4i_vec3(gs4i_max(q.x, 0), gs4i_max(q.y, 0), gs4i_max(q.z, 0));
     return gs4i_length(out) + gs4i_min(gs4i_max(q.x, gs4i_max(q.y, q.z)), 0);
 }
@@ -895,36 +1141,45 @@ static gs4_real gs4i_cylinder_distance(const gs4_shape *s, gs4_vec3 p)
 static gs4_real gs4i_shape_distance(const gs4_shape *s, gs4_vec3 p)
 {
     switch (s->kind) {
-    case GS4_SHAPE_BOX:      return gs4i_box_distance(s, p);
-    case GS4_SHAPE_SPHERE:   return gs4i_length(gs4i_sub(p, s->a)) - s->radius;
+    case GS4_SHAPE_BOX: return gs4i_box_distance(s, p);
+    case GS4_SHAPE_SPHERE: return gs4i_length(gs4i_sub(p, s->a)) - s->radius;
     case GS4_SHAPE_CYLINDER: return gs4i_cylinder_distance(s, p);
-    case GS4_SHAPE_PLANE:    return gs4i_dot(gs4i_sub(p, s->a), s->b);     /* b is of unit length once checked */
-    case GS4_SHAPE_SDF:      return s->distance(p, s->user);
-    case GS4_SHAPE_NONE: case GS4_SHAPE_MESH: break;
+    /* b is of unit length once checked */
+    case GS4_SHAPE_PLANE: return gs4i_dot(gs4i_sub(p, s->a), s->b);
+    case GS4_SHAPE_SDF: return s->distance(p, s->user);
+    case GS4_SHAPE_NONE:
+    case GS4_SHAPE_MESH: break;
     }
     return GS4I_HUGE;
 }
 
-/* Is the shape nothing but a half space for all points within `reach` of p that are not deeper in it than `deep`? Then its outward unit
- * normal. Planes, faces of boxes and ends of cylinders are, where no edge is near and the far side is twice as deep. */
-static int gs4i_shape_is_flat(const gs4_shape *s, gs4_vec3 p, gs4_real reach, gs4_real deep, gs4_vec3 *normal)
+/* Is the shape nothing but a half space for all points within `reach` of p that are not deeper
+ * in it than `deep`? Then its outward unit normal. Planes, faces of boxes and ends of cylinders
+ * are, where no edge is near and the far side is twice as deep. */
+static int gs4i_shape_is_flat(const gs4_shape *s, gs4_vec3 p, gs4_real reach, gs4_real deep,
+                              gs4_vec3 *normal)
 {
     if (s->kind == GS4_SHAPE_BOX) {
         const gs4_vec3 r = gs4i_sub(p, gs4i_scale(gs4i_add(s->a, s->b), GS4I_C(0.5)));
-        const gs4_real at[3] = { r.x, r.y, r.z }, size[3] = { s->b.x - s->a.x, s->b.y - s->a.y, s->b.z - s->a.z };
+        const gs4_real at[3] = { r.x, r.y, r.z },
+                       size[3] = { s->b.x - s->a.x, s->b.y - s->a.y, s->b.z - s->a.z };
         gs4_real n[3] = { 0, 0, 0 };
         int a, face = 0;
-        for (a = 1; a < 3; a++) if (gs4i_abs(at[a]) - size[a] / 2 > gs4i_abs(at[face]) - size[face] / 2) face = a;
-        for (a = 0; a < 3; a++) if (a != face && gs4i_abs(at[a]) + reach + deep > size[a] / 2) return 0;
+        for (a = 1; a < 3; a++)
+            if (gs4i_abs(at[a]) - size[a] / 2 > gs4i_abs(at[face]) - size[face] / 2) face = a;
+        for (a = 0; a < 3; a++)
+            if (a != face && gs4i_abs(at[a]) + reach + deep > size[a] / 2) return 0;
         n[face] = at[face] < 0 ? GS4I_C(-1) : GS4I_C(1);
         *normal = gs4i_vec3(n[0], n[1], n[2]);
         return size[face] > 2 * deep;
     }
     if (s->kind == GS4_SHAPE_CYLINDER) {
-        const gs4_vec3 axis = gs4i_sub(s->b, s->a), r = gs4i_sub(p, gs4i_scale(gs4i_add(s->a, s->b), GS4I_C(0.5)));
+        const gs4_vec3 axis = gs4i_sub(s->b, s->a),
+                       r = gs4i_sub(p, gs4i_scale(gs4i_add(s->a, s->b), GS4I_C(0.5)));
         const gs4_real length = gs4i_length(axis), along = gs4i_dot(r, axis) / length;
         *normal = gs4i_scale(axis, (along < 0 ? GS4I_C(-1) : GS4I_C(1)) / length);
-        return gs4i_length(gs4i_sub(r, gs4i_scale(axis, along / length))) + reach + deep < s->radius && length > 2 * deep;
+        return gs4i_length(gs4i_sub(r, gs4i_scale(axis, along / length))) + reach + deep < s->radius
+               && length > 2 * deep;
     }
     *normal = s->b;
     return s->kind == GS4_SHAPE_PLANE;
@@ -935,98 +1190,136 @@ static void gs4i_shape_bounds(const gs4_shape *s, gs4_vec3 *low, gs4_vec3 *high)
 {
     int i;
     switch (s->kind) {
-    case GS4_SHAPE_BOX: case GS4_SHAPE_SDF: *low = s->a; *high = s->b; break;
+    case GS4_SHAPE_BOX:
+    case GS4_SHAPE_SDF:
+        *low = s->a;
+        *high = s->b;
+        break;
     case GS4_SHAPE_SPHERE:
-        *low  = gs4i_sub(s->a, gs4i_vec3(s->radius, s->radius, s->radius));
+        *low = gs4i_sub(s->a, gs4i_vec3(s->radius, s->radius, s->radius));
         *high = gs4i_add(s->a, gs4i_vec3(s->radius, s->radius, s->radius));
         break;
     case GS4_SHAPE_CYLINDER: {
         gs4_vec3 r = gs4i_vec3(s->radius, s->radius, s->radius);
-        *low  = gs4i_sub(gs4i_vec3(gs4i_min(s->a.x, s->b.x), gs4i_min(s->a.y, s->b.y), gs4i_min(s->a.z, s->b.z)), r);
-        *high = gs4i_add(gs4i_vec3(gs4i_max(s->a.x, s->b.x), gs4i_max(s->a.y, s->b.y), gs4i_max(s->a.z, s->b.z)), r);
+        *low = gs4i_sub(
+            gs4i_vec3(gs4i_min(s->a.x, s->b.x), gs4i_min(s->a.y, s->b.y), gs4i_min(s->a.z, s->b.z)),
+            r);
+        *high = gs4i_add(
+            gs4i_vec3(gs4i_max(s->a.x, s->b.x), gs4i_max(s->a.y, s->b.y), gs4i_max(s->a.z, s->b.z)),
+            r);
         break;
     }
     case GS4_SHAPE_MESH:
         *low = *high = gs4i_vec3(s->vertices[0], s->vertices[1], s->vertices[2]);
         for (i = 1; i < s->vertex_count; i++) {
             const gs4_real *v = s->vertices + 3 * (size_t)i;
-            *low  = gs4i_vec3(gs4i_min(low->x, v[0]), gs4i_min(low->y, v[1]), gs4i_min(low->z, v[2]));
-            *high = gs4i_vec3(gs4i_max(high->x, v[0]), gs4i_max(high->y, v[1]), gs4i_max(high->z, v[2]));
+            *low =
+                gs4i_vec3(gs4i_min(low->x, v[0]), gs4i_min(low->y, v[1]), gs4i_min(low->z, v[2]));
+            *high = gs4i_vec3(gs4i_max(high->x, v[0]), gs4i_max(high->y, v[1]),
+                              gs4i_max(high->z, v[2]));
         }
         break;
-    case GS4_SHAPE_NONE: case GS4_SHAPE_PLANE: break;
+    case GS4_SHAPE_NONE:
+    case GS4_SHAPE_PLANE: break;
     }
 }
 
-/* ==== [[poisson]] multigrid and conjugate gradients on a masked grid =============================== *
+/* ==== [[poisson]] multigrid and conjugate gradients on a masked grid =========================== *
  *
- * Solves  h^2 d_i x_i + sum_faces c_f (x_i - x_j) = h^2 b_i  in the liquid cells; x is given in the air, nothing flows into solids.
- * Level 0 is the grid, level 1 has blocks of 2 x 2 x 2 of its cells; both keep red cells (i + j + k even) and black ones apart, so
- * that every sweep is unit stride. Cell i of a row is number m = i / 2 of its colour:
+ * Solves  h^2 d_i x_i + sum_faces c_f (x_i - x_j) = h^2 b_i  in the liquid cells; x is given in
+ * the air, nothing flows into solids. Level 0 is the grid, level 1 has blocks of 2 x 2 x 2 of
+ * its cells; both keep red cells (i + j + k even) and black ones apart, so that every sweep is
+ * unit stride. Cell i of a row is number m = i / 2 of its colour:
  *
- *        red    | 0 |   | 1 |   | 2 |         neighbours of cell m of one colour, all of the other: in its row m - 1 + t and m + t,
- *        black      | 0 |   | 1 |   | 2 |     in the rows beside, above and below m; t = colour ^ (j + k) & 1; i = 2 m + t
- *        i        0   1   2   3   4   5       children of a coarse cell i: numbers m = i of both colours in four rows
+ *        red    | 0 |   | 1 |   | 2 |       neighbours of cell m of one colour, all of the other:
+ *        black      | 0 |   | 1 |   | 2 |   in its row m - 1 + t and m + t, in the rows beside,
+ *        i        0   1   2   3   4   5     above and below m; t = colour ^ (j + k) & 1
+ *                                           (i = 2 m + t); children of a coarse cell i:
+ *                                           numbers m = i of both colours in four rows
  *
- * From level 2 on an unknown is a group of strongly linked cells in a block, and a level is a graph. Restriction sums, prolongation
- * injects; a coarse face has half the sum of its fine ones, a face to the air 3/4, the diagonal 1: for faces the coefficient of the
- * wider stencil, measured best for the air; graphs differ where a wall or a door is near (gs4i_series, gs4i_air). A cycle is red-black
- * Gauss-Seidel, two sweeps down (R B R B) and two up (B R B R), which is symmetric, three on graphs beyond the first; it runs in float
- * and preconditions conjugate gradients in double, whose matrix is applied in difference form. */
+ * From level 2 on an unknown is a group of strongly linked cells in a block, and a level is a
+ * graph. Restriction sums, prolongation injects; a coarse face has half the sum of its fine
+ * ones, a face to the air 3/4, the diagonal 1: for faces the coefficient of the wider stencil,
+ * measured best for the air; graphs differ where a wall or a door is near (gs4i_series,
+ * gs4i_air). A cycle is red-black Gauss-Seidel, two sweeps down (R B R B) and two up (B R B R),
+ * which is symmetric, three on graphs beyond the first; it runs in float and preconditions
+ * conjugate gradients in double, whose matrix is applied in difference form. */
 
-#define GS4I_STRIP 16                   /* a kernel works on whole strips of a row of one colour; rows are padded to them */
+/* a kernel works on whole strips of a row of one colour; rows are padded to them */
+#define GS4I_STRIP 16
 #define GS4I_SLABS 64
 #define GS4I_GRAPHS 24
-#define GS4I_STRONG 0.36f               /* of the geometric mean of the strongest links of both ends: less does not join them */
-#define GS4I_DIRECT 200                 /* unknowns that are solved by Cholesky */
-#define GS4I_IS_LIQUID 2                /* bits of a kind: unknown; lets flow through */
+/* of the geometric mean of the strongest links of both ends: less does not join them */
+#define GS4I_STRONG 0.36f
+#define GS4I_DIRECT 200  /* unknowns that are solved by Cholesky */
+#define GS4I_IS_LIQUID 2 /* bits of a kind: unknown; lets flow through */
 #define GS4I_IS_OPEN 1
 
-/* One level on a grid. Rows, and planes at both ends, are guarded by zeros: row j of plane k begins at gs4i_row_of(g, j, k). */
+/* One level on a grid. Rows, and planes at both ends, are guarded by zeros: row j of plane k
+ * begins at gs4i_row_of(g, j, k). */
 typedef struct gs4i_masked {
-    int n[3], width;                    /* cells; cells of one colour in a row */
-    size_t stride, plane, count;        /* from row to row, from plane to plane, in all */
-    int32_t *span;                      /* per row: first and last strip with liquid, in cells */
-    float *z[2], *inverse[2];           /* correction; of the diagonal, 0 where there is no unknown */
-    float *w[3][2], *w_low[3][2];       /* coefficient of the face towards +x +y +z, and what float leaves of it; NULL: all equal */
-    float *mass[2], *mass_low[2];       /* h^2 d; level 1: with the faces to the air; level 0 where w: -1 without unknown */
-    float *degree[2];                   /* where w is NULL: faces that conduct; 0 where there is no unknown */
-    double *r[2];                       /* residual */
+    int n[3], width;             /* cells; cells of one colour in a row */
+    size_t stride, plane, count; /* from row to row, from plane to plane, in all */
+    int32_t *span;               /* per row: first and last strip with liquid, in cells */
+    /* correction; of the diagonal, 0 where there is no unknown */
+    float *z[2], *inverse[2];
+    /* coefficient of the face towards +x +y +z, and what float leaves of it; NULL: all equal */
+    float *w[3][2], *w_low[3][2];
+    /* h^2 d; level 1: with the faces to the air; level 0 where w: -1 without unknown */
+    float *mass[2], *mass_low[2];
+    /* where w is NULL: faces that conduct; 0 where there is no unknown */
+    float *degree[2];
+    double *r[2]; /* residual */
 } gs4i_masked;
 
 typedef struct gs4i_graph {
-    int n, reds, mixed;                 /* nodes, red ones first; whether nodes of one colour are neighbours */
-    int32_t *start, *to; float *w;      /* edges of node i: start[i] to start[i + 1] */
+    /* nodes, red ones first; whether nodes of one colour are neighbours */
+    int n, reds, mixed;
+    int32_t *start, *to;
+    float *w; /* edges of node i: start[i] to start[i + 1] */
     float *inverse, *diagonal, *air, *mass, *b, *x;
-    int32_t *parent;                    /* in the next graph; -1: a node without edges */
-    uint64_t *block;                    /* its place, 21 bits an axis */
+    int32_t *parent; /* in the next graph; -1: a node without edges */
+    uint64_t *block; /* its place, 21 bits an axis */
     gs4i_scratch nodes, edges;
 } gs4i_graph;
 
-typedef struct gs4i_cells { int32_t row, begin, end, pocket; double sum; } gs4i_cells;     /* a run of liquid cells in a row */
+/* a run of liquid cells in a row */
+typedef struct gs4i_cells {
+    int32_t row, begin, end, pocket;
+    double sum;
+} gs4i_cells;
 
 typedef struct gs4i_solver {
-    gs4i_memory *memory; const gs4i_tasks *tasks;
+    gs4i_memory *memory;
+    const gs4i_tasks *tasks;
     gs4i_masked level[2];
-    double *x[2]; float *p[2];          /* solution, direction */
-    float *residual;                    /* of red cells of level 1 */
-    int32_t *parent[2];                 /* of cells of level 1 in graph 0, -1: none */
-    uint8_t *kind; size_t kind_row, kind_plane;     /* bits, one cell of zeros around */
-    gs4i_graph graph[GS4I_GRAPHS]; int graphs;
-    double *matrix;                     /* lower triangle of the last graph's */
-    gs4i_cells *runs; int run_count;    /* of closed pockets: neither air nor diagonal */
-    int pockets; double *pocket;        /* per pocket: sum, number of cells */
+    double *x[2];
+    float *p[2];        /* solution, direction */
+    float *residual;    /* of red cells of level 1 */
+    int32_t *parent[2]; /* of cells of level 1 in graph 0, -1: none */
+    uint8_t *kind;
+    size_t kind_row, kind_plane; /* bits, one cell of zeros around */
+    gs4i_graph graph[GS4I_GRAPHS];
+    int graphs;
+    double *matrix; /* lower triangle of the last graph's */
+    gs4i_cells *runs;
+    int run_count; /* of closed pockets: neither air nor diagonal */
+    int pockets;
+    double *pocket; /* per pocket: sum, number of cells */
     int slabs[2], cut[2][GS4I_SLABS + 1];
     int32_t *span[2];
-    int uniform, massive; int64_t unknowns;
-    double unit, mass_unit;             /* coefficients and diagonal are scaled by these, */
-    double rhs_unit, x_unit;            /* and right-hand side and x, so that all are about 1 */
-    double alpha; float beta;
-    double *sums, *given;               /* one and three per plane, added in order */
-    float *zeros;                       /* a row */
+    int uniform, massive;
+    int64_t unknowns;
+    double unit, mass_unit;  /* coefficients and diagonal are scaled by these, */
+    double rhs_unit, x_unit; /* and right-hand side and x, so that all are about 1 */
+    double alpha;
+    float beta;
+    double *sums, *given; /* one and three per plane, added in order */
+    float *zeros;         /* a row */
     gs4i_scratch grid, kinds, planes, cells, labels, square;
-    int shape[5];                       /* of `grid` */
-    const char *fault, *accepted; double fault_value;      /* what was wrong, in words */
+    int shape[5]; /* of `grid` */
+    const char *fault, *accepted;
+    double fault_value; /* what was wrong, in words */
 } gs4i_solver;
 
 GS4I_INLINE size_t gs4i_row_of(const gs4i_masked *g, int j, int k)
@@ -1034,18 +1327,26 @@ GS4I_INLINE size_t gs4i_row_of(const gs4i_masked *g, int j, int k)
     return ((size_t)(k + 1) * (size_t)(g->n[1] + 1) + (size_t)(j + 1)) * g->stride;
 }
 
-/* --- kernels: strips of one colour ---------------------------------------------------------------------- */
+/* --- kernels: strips of one colour ------------------------------------------------------------ */
 
-#define GS4I_NEIGHBOURS(type) const type *GS4I_RESTRICT left, const type *GS4I_RESTRICT right, const type *GS4I_RESTRICT south, \
-    const type *GS4I_RESTRICT north, const type *GS4I_RESTRICT below, const type *GS4I_RESTRICT above
-#define GS4I_AROUND(v, at, t, g) (v) + (at) + (t) - 1, (v) + (at) + (t), (v) + (at) - (g)->stride, (v) + (at) + (g)->stride, \
-    (v) + (at) - (g)->plane, (v) + (at) + (g)->plane
+#define GS4I_NEIGHBOURS(type)                                             \
+    const type *GS4I_RESTRICT left, const type *GS4I_RESTRICT right,      \
+        const type *GS4I_RESTRICT south, const type *GS4I_RESTRICT north, \
+        const type *GS4I_RESTRICT below, const type *GS4I_RESTRICT above
+#define GS4I_AROUND(v, at, t, g)                                                              \
+    (v) + (at) + (t)-1, (v) + (at) + (t), (v) + (at) - (g)->stride, (v) + (at) + (g)->stride, \
+        (v) + (at) - (g)->plane, (v) + (at) + (g)->plane
 /* faces of the cell itself towards +, of its neighbours towards it */
-#define GS4I_FACES const float *GS4I_RESTRICT wl, const float *GS4I_RESTRICT wr, const float *GS4I_RESTRICT ws, \
-    const float *GS4I_RESTRICT wn, const float *GS4I_RESTRICT wb, const float *GS4I_RESTRICT wa
-#define GS4I_FACES_OF(w, c, at, t, g) (w)[0][!(c)] + (at) + (t) - 1, (w)[0][c] + (at), (w)[1][!(c)] + (at) - (g)->stride, (w)[1][c] + (at), \
-    (w)[2][!(c)] + (at) - (g)->plane, (w)[2][c] + (at)
-#define GS4I_STRIPS(m, l, n) for (m = 0; m < (n); m += GS4I_STRIP) for (l = m; l < m + GS4I_STRIP; l++)
+#define GS4I_FACES                                                                               \
+    const float *GS4I_RESTRICT wl, const float *GS4I_RESTRICT wr, const float *GS4I_RESTRICT ws, \
+        const float *GS4I_RESTRICT wn, const float *GS4I_RESTRICT wb,                            \
+        const float *GS4I_RESTRICT wa
+#define GS4I_FACES_OF(w, c, at, t, g)                                                 \
+    (w)[0][!(c)] + (at) + (t)-1, (w)[0][c] + (at), (w)[1][!(c)] + (at) - (g)->stride, \
+        (w)[1][c] + (at), (w)[2][!(c)] + (at) - (g)->plane, (w)[2][c] + (at)
+#define GS4I_STRIPS(m, l, n)              \
+    for (m = 0; m < (n); m += GS4I_STRIP) \
+        for (l = m; l < m + GS4I_STRIP; l++)
 
 static double gs4i_sum_lanes(const double *v)
 {
@@ -1055,31 +1356,40 @@ static double gs4i_sum_lanes(const double *v)
     return ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
 }
 
-static void gs4i_start_row(float *GS4I_RESTRICT z, const double *GS4I_RESTRICT r, const float *GS4I_RESTRICT inverse, int n)
+static void gs4i_start_row(float *GS4I_RESTRICT z, const double *GS4I_RESTRICT r,
+                           const float *GS4I_RESTRICT inverse, int n)
 {
     int m, l;
     GS4I_STRIPS(m, l, n) z[l] = (float)r[l] * inverse[l];
 }
 
-static void gs4i_smooth_uniform(float *GS4I_RESTRICT z, GS4I_NEIGHBOURS(float), const double *GS4I_RESTRICT r,
-                                const float *GS4I_RESTRICT inverse, int n)
+static void gs4i_smooth_uniform(float *GS4I_RESTRICT z, GS4I_NEIGHBOURS(float),
+                                const double *GS4I_RESTRICT r, const float *GS4I_RESTRICT inverse,
+                                int n)
 {
     int m, l;
     GS4I_STRIPS(m, l, n)
-        z[l] = ((float)r[l] + ((left[l] + right[l]) + (south[l] + north[l]) + (below[l] + above[l]))) * inverse[l];
+        z[l] =
+            ((float)r[l] + ((left[l] + right[l]) + (south[l] + north[l]) + (below[l] + above[l])))
+            * inverse[l];
 }
 
-static void gs4i_smooth_weighted(float *GS4I_RESTRICT z, GS4I_NEIGHBOURS(float), GS4I_FACES, const double *GS4I_RESTRICT r,
-                                 const float *GS4I_RESTRICT inverse, int n)
+static void gs4i_smooth_weighted(float *GS4I_RESTRICT z, GS4I_NEIGHBOURS(float), GS4I_FACES,
+                                 const double *GS4I_RESTRICT r, const float *GS4I_RESTRICT inverse,
+                                 int n)
 {
     int m, l;
     GS4I_STRIPS(m, l, n)
-        z[l] = ((float)r[l] + ((wl[l] * left[l] + wr[l] * right[l]) + (ws[l] * south[l] + wn[l] * north[l])
-                               + (wb[l] * below[l] + wa[l] * above[l]))) * inverse[l];
+        z[l] = ((float)r[l]
+                + ((wl[l] * left[l] + wr[l] * right[l]) + (ws[l] * south[l] + wn[l] * north[l])
+                   + (wb[l] * below[l] + wa[l] * above[l])))
+               * inverse[l];
 }
 
-static void gs4i_residual_uniform(float *GS4I_RESTRICT out, const float *GS4I_RESTRICT z, GS4I_NEIGHBOURS(float), const double *GS4I_RESTRICT r,
-                                  const float *GS4I_RESTRICT degree, const float *GS4I_RESTRICT mass, int n)
+static void gs4i_residual_uniform(float *GS4I_RESTRICT out, const float *GS4I_RESTRICT z,
+                                  GS4I_NEIGHBOURS(float), const double *GS4I_RESTRICT r,
+                                  const float *GS4I_RESTRICT degree,
+                                  const float *GS4I_RESTRICT mass, int n)
 {
     int m, l;
     GS4I_STRIPS(m, l, n) {
@@ -1088,26 +1398,33 @@ static void gs4i_residual_uniform(float *GS4I_RESTRICT out, const float *GS4I_RE
     }
 }
 
-static void gs4i_residual_weighted(float *GS4I_RESTRICT out, const float *GS4I_RESTRICT z, GS4I_NEIGHBOURS(float), GS4I_FACES,
-                                   const double *GS4I_RESTRICT r, const float *GS4I_RESTRICT mass, int n)
+static void gs4i_residual_weighted(float *GS4I_RESTRICT out, const float *GS4I_RESTRICT z,
+                                   GS4I_NEIGHBOURS(float), GS4I_FACES,
+                                   const double *GS4I_RESTRICT r, const float *GS4I_RESTRICT mass,
+                                   int n)
 {
     int m, l;
     GS4I_STRIPS(m, l, n) {
-        const float c = z[l], flow = (wl[l] * (c - left[l]) + wr[l] * (c - right[l])) + (ws[l] * (c - south[l]) + wn[l] * (c - north[l]))
-                                   + (wb[l] * (c - below[l]) + wa[l] * (c - above[l]));
+        const float c = z[l], flow = (wl[l] * (c - left[l]) + wr[l] * (c - right[l]))
+                                     + (ws[l] * (c - south[l]) + wn[l] * (c - north[l]))
+                                     + (wb[l] * (c - below[l]) + wa[l] * (c - above[l]));
         out[l] = (float)(mass[l] >= 0) * ((float)r[l] - (mass[l] * c + flow));
     }
 }
 
-/* The matrix times v in double. In the double build faces are two floats. Without a diagonal `massive` is 0 where this is inlined. */
-#define GS4I_TIMES_UNIFORM(q, v) \
-    const double c = (double)(v)[l], around = ((double)left[l] + (double)right[l]) + ((double)south[l] + (double)north[l]) \
-                                            + ((double)below[l] + (double)above[l]); \
-    const double q = (massive ? ((double)mass[l] + (double)mass_low[l]) * c : 0) \
-                   + (double)(degree[l] > 0) * ((double)degree[l] * c - around)
+/* The matrix times v in double. In the double build faces are two floats. Without a diagonal
+ * `massive` is 0 where this is inlined. */
+#define GS4I_TIMES_UNIFORM(q, v)                                                       \
+    const double c = (double)(v)[l], around = ((double)left[l] + (double)right[l])     \
+                                              + ((double)south[l] + (double)north[l])  \
+                                              + ((double)below[l] + (double)above[l]); \
+    const double q = (massive ? ((double)mass[l] + (double)mass_low[l]) * c : 0)       \
+                     + (double)(degree[l] > 0) * ((double)degree[l] * c - around)
 #ifdef GS4_DOUBLE
-#define GS4I_LOW_FACES , const float *GS4I_RESTRICT ll, const float *GS4I_RESTRICT lr, const float *GS4I_RESTRICT ls, \
-    const float *GS4I_RESTRICT ln, const float *GS4I_RESTRICT lb, const float *GS4I_RESTRICT la
+#define GS4I_LOW_FACES                                                                             \
+    , const float *GS4I_RESTRICT ll, const float *GS4I_RESTRICT lr, const float *GS4I_RESTRICT ls, \
+        const float *GS4I_RESTRICT ln, const float *GS4I_RESTRICT lb,                              \
+        const float *GS4I_RESTRICT la
 #define GS4I_LOW_FACES_OF(w, c, at, t, g) , GS4I_FACES_OF(w, c, at, t, g)
 #define GS4I_FACE(w, low) ((double)(w) + (double)(low))
 #else
@@ -1115,43 +1432,55 @@ static void gs4i_residual_weighted(float *GS4I_RESTRICT out, const float *GS4I_R
 #define GS4I_LOW_FACES_OF(w, c, at, t, g)
 #define GS4I_FACE(w, low) ((double)(w))
 #endif
-#define GS4I_TIMES_WEIGHTED(q, v) \
-    const double c = (double)(v)[l], flow = \
-        (GS4I_FACE(wl[l], ll[l]) * (c - (double)left[l]) + GS4I_FACE(wr[l], lr[l]) * (c - (double)right[l])) \
-      + (GS4I_FACE(ws[l], ls[l]) * (c - (double)south[l]) + GS4I_FACE(wn[l], ln[l]) * (c - (double)north[l])) \
-      + (GS4I_FACE(wb[l], lb[l]) * (c - (double)below[l]) + GS4I_FACE(wa[l], la[l]) * (c - (double)above[l])); \
+#define GS4I_TIMES_WEIGHTED(q, v)                                               \
+    const double c = (double)(v)[l],                                            \
+                 flow = (GS4I_FACE(wl[l], ll[l]) * (c - (double)left[l])        \
+                         + GS4I_FACE(wr[l], lr[l]) * (c - (double)right[l]))    \
+                        + (GS4I_FACE(ws[l], ls[l]) * (c - (double)south[l])     \
+                           + GS4I_FACE(wn[l], ln[l]) * (c - (double)north[l]))  \
+                        + (GS4I_FACE(wb[l], lb[l]) * (c - (double)below[l])     \
+                           + GS4I_FACE(wa[l], la[l]) * (c - (double)above[l])); \
     const double q = (double)(mass[l] >= 0) * (((double)mass[l] + (double)mass_low[l]) * c + flow)
-#define GS4I_UNIFORM_MATRIX const float *GS4I_RESTRICT degree, const float *GS4I_RESTRICT mass, const float *GS4I_RESTRICT mass_low, \
-    const int massive
-#define GS4I_WEIGHTED_MATRIX GS4I_FACES GS4I_LOW_FACES, const float *GS4I_RESTRICT mass, const float *GS4I_RESTRICT mass_low
+#define GS4I_UNIFORM_MATRIX                                             \
+    const float *GS4I_RESTRICT degree, const float *GS4I_RESTRICT mass, \
+        const float *GS4I_RESTRICT mass_low, const int massive
+#define GS4I_WEIGHTED_MATRIX \
+    GS4I_FACES GS4I_LOW_FACES, const float *GS4I_RESTRICT mass, const float *GS4I_RESTRICT mass_low
 
-/* p.Ap, from differences in float: it sets the length of a step alone. Faces that do not conduct have p = 0 behind them. */
-static double gs4i_curvature_uniform(const float *GS4I_RESTRICT p, GS4I_NEIGHBOURS(float), const float *GS4I_RESTRICT degree,
+/* p.Ap, from differences in float: it sets the length of a step alone. Faces that do not conduct
+ * have p = 0 behind them. */
+static double gs4i_curvature_uniform(const float *GS4I_RESTRICT p, GS4I_NEIGHBOURS(float),
+                                     const float *GS4I_RESTRICT degree,
                                      const float *GS4I_RESTRICT mass, int n)
 {
     double sum[GS4I_STRIP] = { 0 };
     int m, l;
     GS4I_STRIPS(m, l, n) {
-        const float c = p[l], flow = ((c - left[l]) + (c - right[l])) + ((c - south[l]) + (c - north[l])) + ((c - below[l]) + (c - above[l]));
+        const float c = p[l], flow = ((c - left[l]) + (c - right[l]))
+                                     + ((c - south[l]) + (c - north[l]))
+                                     + ((c - below[l]) + (c - above[l]));
         sum[l - m] += (double)c * (double)(flow + (mass[l] - (6 - degree[l])) * c);
     }
     return gs4i_sum_lanes(sum);
 }
 
-static double gs4i_curvature_weighted(const float *GS4I_RESTRICT p, GS4I_NEIGHBOURS(float), GS4I_FACES, const float *GS4I_RESTRICT mass, int n)
+static double gs4i_curvature_weighted(const float *GS4I_RESTRICT p, GS4I_NEIGHBOURS(float),
+                                      GS4I_FACES, const float *GS4I_RESTRICT mass, int n)
 {
     double sum[GS4I_STRIP] = { 0 };
     int m, l;
     GS4I_STRIPS(m, l, n) {
-        const float c = p[l], flow = (wl[l] * (c - left[l]) + wr[l] * (c - right[l])) + (ws[l] * (c - south[l]) + wn[l] * (c - north[l]))
-                                   + (wb[l] * (c - below[l]) + wa[l] * (c - above[l]));
+        const float c = p[l], flow = (wl[l] * (c - left[l]) + wr[l] * (c - right[l]))
+                                     + (ws[l] * (c - south[l]) + wn[l] * (c - north[l]))
+                                     + (wb[l] * (c - below[l]) + wa[l] * (c - above[l]));
         sum[l - m] += (double)c * (double)(mass[l] * c + flow);
     }
     return gs4i_sum_lanes(sum);
 }
 
 /* x += alpha p, r -= alpha Ap; gives r.r */
-GS4I_INLINE double gs4i_update_uniform(double *GS4I_RESTRICT x, double *GS4I_RESTRICT r, double alpha, const float *GS4I_RESTRICT p,
+GS4I_INLINE double gs4i_update_uniform(double *GS4I_RESTRICT x, double *GS4I_RESTRICT r,
+                                       double alpha, const float *GS4I_RESTRICT p,
                                        GS4I_NEIGHBOURS(float), GS4I_UNIFORM_MATRIX, int n)
 {
     double sum[GS4I_STRIP] = { 0 };
@@ -1159,38 +1488,53 @@ GS4I_INLINE double gs4i_update_uniform(double *GS4I_RESTRICT x, double *GS4I_RES
     GS4I_STRIPS(m, l, n) {
         GS4I_TIMES_UNIFORM(q, p);
         const double rest = r[l] - alpha * q;
-        x[l] += alpha * c; r[l] = rest; sum[l - m] += rest * rest;
+        x[l] += alpha * c;
+        r[l] = rest;
+        sum[l - m] += rest * rest;
     }
     return gs4i_sum_lanes(sum);
 }
 
-static double gs4i_update_weighted(double *GS4I_RESTRICT x, double *GS4I_RESTRICT r, double alpha, const float *GS4I_RESTRICT p,
-                                   GS4I_NEIGHBOURS(float), GS4I_WEIGHTED_MATRIX, int n)
+static double gs4i_update_weighted(double *GS4I_RESTRICT x, double *GS4I_RESTRICT r, double alpha,
+                                   const float *GS4I_RESTRICT p, GS4I_NEIGHBOURS(float),
+                                   GS4I_WEIGHTED_MATRIX, int n)
 {
     double sum[GS4I_STRIP] = { 0 };
     int m, l;
     GS4I_STRIPS(m, l, n) {
         GS4I_TIMES_WEIGHTED(q, p);
         const double rest = r[l] - alpha * q;
-        x[l] += alpha * c; r[l] = rest; sum[l - m] += rest * rest;
+        x[l] += alpha * c;
+        r[l] = rest;
+        sum[l - m] += rest * rest;
     }
     return gs4i_sum_lanes(sum);
 }
 
 /* r -= Ax; gives r.r */
-static double gs4i_defect_uniform(double *GS4I_RESTRICT r, const double *GS4I_RESTRICT x, GS4I_NEIGHBOURS(double), GS4I_UNIFORM_MATRIX, int n)
+static double gs4i_defect_uniform(double *GS4I_RESTRICT r, const double *GS4I_RESTRICT x,
+                                  GS4I_NEIGHBOURS(double), GS4I_UNIFORM_MATRIX, int n)
 {
     double sum[GS4I_STRIP] = { 0 };
     int m, l;
-    GS4I_STRIPS(m, l, n) { GS4I_TIMES_UNIFORM(q, x); r[l] -= q; sum[l - m] += r[l] * r[l]; }
+    GS4I_STRIPS(m, l, n) {
+        GS4I_TIMES_UNIFORM(q, x);
+        r[l] -= q;
+        sum[l - m] += r[l] * r[l];
+    }
     return gs4i_sum_lanes(sum);
 }
 
-static double gs4i_defect_weighted(double *GS4I_RESTRICT r, const double *GS4I_RESTRICT x, GS4I_NEIGHBOURS(double), GS4I_WEIGHTED_MATRIX, int n)
+static double gs4i_defect_weighted(double *GS4I_RESTRICT r, const double *GS4I_RESTRICT x,
+                                   GS4I_NEIGHBOURS(double), GS4I_WEIGHTED_MATRIX, int n)
 {
     double sum[GS4I_STRIP] = { 0 };
     int m, l;
-    GS4I_STRIPS(m, l, n) { GS4I_TIMES_WEIGHTED(q, x); r[l] -= q; sum[l - m] += r[l] * r[l]; }
+    GS4I_STRIPS(m, l, n) {
+        GS4I_TIMES_WEIGHTED(q, x);
+        r[l] -= q;
+        sum[l - m] += r[l] * r[l];
+    }
     return gs4i_sum_lanes(sum);
 }
 
@@ -1216,12 +1560,16 @@ static void gs4i_direct_row(float *GS4I_RESTRICT p, const float *GS4I_RESTRICT z
     GS4I_STRIPS(m, l, n) p[l] = z[l] + beta * p[l];
 }
 
-/* --- stages: a plane of a level ------------------------------------------------------------------------- */
+/* --- stages: a plane of a level --------------------------------------------------------------- */
 
 /* What all stages know of a row: where its liquid is. */
-#define GS4I_EACH_ROW(g, k, j, at, n) for (j = 0; j < (g)->n[1]; j++) \
-    if (at = gs4i_row_of(g, j, k) + (size_t)(g)->span[2 * ((size_t)(k) * (size_t)(g)->n[1] + (size_t)j)], \
-        n = (g)->span[2 * ((size_t)(k) * (size_t)(g)->n[1] + (size_t)j) + 1] - (g)->span[2 * ((size_t)(k) * (size_t)(g)->n[1] + (size_t)j)], n > 0)
+#define GS4I_EACH_ROW(g, k, j, at, n)                                                    \
+    for (j = 0; j < (g)->n[1]; j++)                                                      \
+        if (at = gs4i_row_of(g, j, k)                                                    \
+                 + (size_t)(g)->span[2 * ((size_t)(k) * (size_t)(g)->n[1] + (size_t)j)], \
+            n = (g)->span[2 * ((size_t)(k) * (size_t)(g)->n[1] + (size_t)j) + 1]         \
+                - (g)->span[2 * ((size_t)(k) * (size_t)(g)->n[1] + (size_t)j)],          \
+            n > 0)
 
 typedef void (*gs4i_stage_fn)(gs4i_solver *s, int level, int k);
 
@@ -1240,9 +1588,13 @@ static void gs4i_smooth(gs4i_solver *s, int level, int c, int k)
     int j, n;
     GS4I_EACH_ROW(g, k, j, at, n) {
         const int t = (c + j + k) & 1;
-        if (g->degree[0]) gs4i_smooth_uniform(g->z[c] + at, GS4I_AROUND(g->z[!c], at, t, g), g->r[c] + at, g->inverse[c] + at, n);
-        else gs4i_smooth_weighted(g->z[c] + at, GS4I_AROUND(g->z[!c], at, t, g), GS4I_FACES_OF(g->w, c, at, t, g), g->r[c] + at,
-                                  g->inverse[c] + at, n);
+        if (g->degree[0])
+            gs4i_smooth_uniform(g->z[c] + at, GS4I_AROUND(g->z[!c], at, t, g), g->r[c] + at,
+                                g->inverse[c] + at, n);
+        else
+            gs4i_smooth_weighted(g->z[c] + at, GS4I_AROUND(g->z[!c], at, t, g),
+                                 GS4I_FACES_OF(g->w, c, at, t, g), g->r[c] + at, g->inverse[c] + at,
+                                 n);
     }
 }
 
@@ -1250,13 +1602,16 @@ static void gs4i_stage_red(gs4i_solver *s, int level, int k) { gs4i_smooth(s, le
 static void gs4i_stage_black(gs4i_solver *s, int level, int k) { gs4i_smooth(s, level, 1, k); }
 
 /* Of red cells; that of black ones is zero after their sweep. */
-static void gs4i_residual_row(const gs4i_solver *s, const gs4i_masked *g, float *out, size_t at, int j, int k, int n)
+static void gs4i_residual_row(const gs4i_solver *s, const gs4i_masked *g, float *out, size_t at,
+                              int j, int k, int n)
 {
     const int t = (j + k) & 1;
-    if (g->degree[0]) gs4i_residual_uniform(out, g->z[0] + at, GS4I_AROUND(g->z[1], at, t, g), g->r[0] + at, g->degree[0] + at,
-                                            g->mass[0] ? g->mass[0] + at : s->zeros, n);
-    else gs4i_residual_weighted(out, g->z[0] + at, GS4I_AROUND(g->z[1], at, t, g), GS4I_FACES_OF(g->w, 0, at, t, g), g->r[0] + at,
-                                g->mass[0] + at, n);
+    if (g->degree[0])
+        gs4i_residual_uniform(out, g->z[0] + at, GS4I_AROUND(g->z[1], at, t, g), g->r[0] + at,
+                              g->degree[0] + at, g->mass[0] ? g->mass[0] + at : s->zeros, n);
+    else
+        gs4i_residual_weighted(out, g->z[0] + at, GS4I_AROUND(g->z[1], at, t, g),
+                               GS4I_FACES_OF(g->w, 0, at, t, g), g->r[0] + at, g->mass[0] + at, n);
 }
 
 static void gs4i_stage_residual(gs4i_solver *s, int level, int k)
@@ -1268,10 +1623,14 @@ static void gs4i_stage_residual(gs4i_solver *s, int level, int k)
 }
 
 /* Adds cell m of a fine row to coarse cell m, in two colours. */
-static void gs4i_add_parents(double *GS4I_RESTRICT even, double *GS4I_RESTRICT odd, const float *GS4I_RESTRICT fine, int n)
+static void gs4i_add_parents(double *GS4I_RESTRICT even, double *GS4I_RESTRICT odd,
+                             const float *GS4I_RESTRICT fine, int n)
 {
     int m;
-    for (m = 0; m < n / 2; m++) { even[m] += (double)fine[2 * m]; odd[m] += (double)fine[2 * m + 1]; }
+    for (m = 0; m < n / 2; m++) {
+        even[m] += (double)fine[2 * m];
+        odd[m] += (double)fine[2 * m + 1];
+    }
 }
 
 /* A plane of level 1 once both planes below are done. */
@@ -1301,8 +1660,9 @@ static void gs4i_stage_restrict(gs4i_solver *s, int level, int k)
     }
 }
 
-static void gs4i_add_children(float *GS4I_RESTRICT z, const float *GS4I_RESTRICT inverse, const float *GS4I_RESTRICT even,
-                              const float *GS4I_RESTRICT odd, int n)
+static void gs4i_add_children(float *GS4I_RESTRICT z, const float *GS4I_RESTRICT inverse,
+                              const float *GS4I_RESTRICT even, const float *GS4I_RESTRICT odd,
+                              int n)
 {
     int m;
     for (m = 0; m < n / 2; m++) {
@@ -1320,7 +1680,8 @@ static void gs4i_stage_prolong(gs4i_solver *s, int level, int k)
     GS4I_EACH_ROW(g, k, j, at, n) {
         const int even = (j / 2 + k / 2) & 1;
         const size_t from = gs4i_row_of(h, j / 2, k / 2) + (at - gs4i_row_of(g, j, k)) / 2;
-        gs4i_add_children(g->z[0] + at, g->inverse[0] + at, h->z[even] + from, h->z[!even] + from, n);
+        gs4i_add_children(g->z[0] + at, g->inverse[0] + at, h->z[even] + from, h->z[!even] + from,
+                          n);
     }
 }
 
@@ -1329,10 +1690,11 @@ static void gs4i_stage_collect(gs4i_solver *s, int level, int k)
     const gs4i_masked *g = &s->level[level];
     size_t at;
     int j, n, m;
-    GS4I_EACH_ROW(g, k, j, at, n) for (m = 0; m < n; m++) {
-        const int32_t parent = s->parent[0][at + (size_t)m];
-        if (parent >= 0) g->z[0][at + (size_t)m] += s->graph[0].x[parent];
-    }
+    GS4I_EACH_ROW(g, k, j, at, n)
+        for (m = 0; m < n; m++) {
+            const int32_t parent = s->parent[0][at + (size_t)m];
+            if (parent >= 0) g->z[0][at + (size_t)m] += s->graph[0].x[parent];
+        }
 }
 
 static void gs4i_stage_dot(gs4i_solver *s, int level, int k)
@@ -1341,7 +1703,8 @@ static void gs4i_stage_dot(gs4i_solver *s, int level, int k)
     double sum = 0;
     size_t at;
     int j, n, c;
-    GS4I_EACH_ROW(g, k, j, at, n) for (c = 0; c < 2; c++) sum += gs4i_dot_row(g->r[c] + at, g->z[c] + at, n);
+    GS4I_EACH_ROW(g, k, j, at, n)
+        for (c = 0; c < 2; c++) sum += gs4i_dot_row(g->r[c] + at, g->z[c] + at, n);
     s->sums[k] = sum;
 }
 
@@ -1350,12 +1713,17 @@ static void gs4i_stage_direct(gs4i_solver *s, int level, int k)
     const gs4i_masked *g = &s->level[level];
     size_t at;
     int j, n, c;
-    GS4I_EACH_ROW(g, k, j, at, n) for (c = 0; c < 2; c++) gs4i_direct_row(s->p[c] + at, g->z[c] + at, s->beta, n);
+    GS4I_EACH_ROW(g, k, j, at, n)
+        for (c = 0; c < 2; c++) gs4i_direct_row(s->p[c] + at, g->z[c] + at, s->beta, n);
 }
 
-#define GS4I_MASS(s, g, c, at) (g)->mass[c] ? (g)->mass[c] + (at) : (s)->zeros, (g)->mass_low[c] ? (g)->mass_low[c] + (at) : (s)->zeros
+#define GS4I_MASS(s, g, c, at)                       \
+    (g)->mass[c] ? (g)->mass[c] + (at) : (s)->zeros, \
+        (g)->mass_low[c] ? (g)->mass_low[c] + (at) : (s)->zeros
 #define GS4I_UNIFORM(s, g, c, at) (g)->degree[c] + (at), GS4I_MASS(s, g, c, at)
-#define GS4I_WEIGHTS(s, g, c, at, t) GS4I_FACES_OF((g)->w, c, at, t, g) GS4I_LOW_FACES_OF((g)->w_low, c, at, t, g), GS4I_MASS(s, g, c, at)
+#define GS4I_WEIGHTS(s, g, c, at, t)   \
+    GS4I_FACES_OF((g)->w, c, at, t, g) \
+    GS4I_LOW_FACES_OF((g)->w_low, c, at, t, g), GS4I_MASS(s, g, c, at)
 
 static void gs4i_stage_curvature(gs4i_solver *s, int level, int k)
 {
@@ -1363,12 +1731,18 @@ static void gs4i_stage_curvature(gs4i_solver *s, int level, int k)
     double sum = 0;
     size_t at;
     int j, n, c;
-    GS4I_EACH_ROW(g, k, j, at, n) for (c = 0; c < 2; c++) {
-        const int t = (c + j + k) & 1;
-        if (g->degree[0]) sum += gs4i_curvature_uniform(s->p[c] + at, GS4I_AROUND(s->p[!c], at, t, g), g->degree[c] + at,
-                                                        g->mass[c] ? g->mass[c] + at : s->zeros, n);
-        else sum += gs4i_curvature_weighted(s->p[c] + at, GS4I_AROUND(s->p[!c], at, t, g), GS4I_FACES_OF(g->w, c, at, t, g), g->mass[c] + at, n);
-    }
+    GS4I_EACH_ROW(g, k, j, at, n)
+        for (c = 0; c < 2; c++) {
+            const int t = (c + j + k) & 1;
+            if (g->degree[0])
+                sum += gs4i_curvature_uniform(s->p[c] + at, GS4I_AROUND(s->p[!c], at, t, g),
+                                              g->degree[c] + at,
+                                              g->mass[c] ? g->mass[c] + at : s->zeros, n);
+            else
+                sum +=
+                    gs4i_curvature_weighted(s->p[c] + at, GS4I_AROUND(s->p[!c], at, t, g),
+                                            GS4I_FACES_OF(g->w, c, at, t, g), g->mass[c] + at, n);
+        }
     s->sums[k] = sum;
 }
 
@@ -1378,15 +1752,22 @@ static void gs4i_stage_update(gs4i_solver *s, int level, int k)
     double sum = 0;
     size_t at;
     int j, n, c;
-    GS4I_EACH_ROW(g, k, j, at, n) for (c = 0; c < 2; c++) {
-        const int t = (c + j + k) & 1;
-        if (g->degree[0] && g->mass[0]) sum += gs4i_update_uniform(s->x[c] + at, g->r[c] + at, s->alpha, s->p[c] + at,
-                                                                   GS4I_AROUND(s->p[!c], at, t, g), GS4I_UNIFORM(s, g, c, at), 1, n);
-        else if (g->degree[0]) sum += gs4i_update_uniform(s->x[c] + at, g->r[c] + at, s->alpha, s->p[c] + at,
-                                                          GS4I_AROUND(s->p[!c], at, t, g), GS4I_UNIFORM(s, g, c, at), 0, n);
-        else sum += gs4i_update_weighted(s->x[c] + at, g->r[c] + at, s->alpha, s->p[c] + at, GS4I_AROUND(s->p[!c], at, t, g),
-                                         GS4I_WEIGHTS(s, g, c, at, t), n);
-    }
+    GS4I_EACH_ROW(g, k, j, at, n)
+        for (c = 0; c < 2; c++) {
+            const int t = (c + j + k) & 1;
+            if (g->degree[0] && g->mass[0])
+                sum += gs4i_update_uniform(s->x[c] + at, g->r[c] + at, s->alpha, s->p[c] + at,
+                                           GS4I_AROUND(s->p[!c], at, t, g),
+                                           GS4I_UNIFORM(s, g, c, at), 1, n);
+            else if (g->degree[0])
+                sum += gs4i_update_uniform(s->x[c] + at, g->r[c] + at, s->alpha, s->p[c] + at,
+                                           GS4I_AROUND(s->p[!c], at, t, g),
+                                           GS4I_UNIFORM(s, g, c, at), 0, n);
+            else
+                sum += gs4i_update_weighted(s->x[c] + at, g->r[c] + at, s->alpha, s->p[c] + at,
+                                            GS4I_AROUND(s->p[!c], at, t, g),
+                                            GS4I_WEIGHTS(s, g, c, at, t), n);
+        }
     s->sums[k] = sum;
 }
 
@@ -1396,11 +1777,18 @@ static void gs4i_stage_defect(gs4i_solver *s, int level, int k)
     double sum = 0;
     size_t at;
     int j, n, c;
-    GS4I_EACH_ROW(g, k, j, at, n) for (c = 0; c < 2; c++) {
-        const int t = (c + j + k) & 1;
-        if (g->degree[0]) sum += gs4i_defect_uniform(g->r[c] + at, s->x[c] + at, GS4I_AROUND(s->x[!c], at, t, g), GS4I_UNIFORM(s, g, c, at), 1, n);
-        else sum += gs4i_defect_weighted(g->r[c] + at, s->x[c] + at, GS4I_AROUND(s->x[!c], at, t, g), GS4I_WEIGHTS(s, g, c, at, t), n);
-    }
+    GS4I_EACH_ROW(g, k, j, at, n)
+        for (c = 0; c < 2; c++) {
+            const int t = (c + j + k) & 1;
+            if (g->degree[0])
+                sum +=
+                    gs4i_defect_uniform(g->r[c] + at, s->x[c] + at, GS4I_AROUND(s->x[!c], at, t, g),
+                                        GS4I_UNIFORM(s, g, c, at), 1, n);
+            else
+                sum += gs4i_defect_weighted(g->r[c] + at, s->x[c] + at,
+                                            GS4I_AROUND(s->x[!c], at, t, g),
+                                            GS4I_WEIGHTS(s, g, c, at, t), n);
+        }
     s->sums[k] = sum;
 }
 
@@ -1410,7 +1798,8 @@ static void gs4i_stage_size(gs4i_solver *s, int level, int k)
     double sum = 0;
     size_t at;
     int j, n, c;
-    GS4I_EACH_ROW(g, k, j, at, n) for (c = 0; c < 2; c++) sum += gs4i_square_row(g->r[c] + at, n);
+    GS4I_EACH_ROW(g, k, j, at, n)
+        for (c = 0; c < 2; c++) sum += gs4i_square_row(g->r[c] + at, n);
     s->sums[k] = sum;
 }
 
@@ -1419,33 +1808,47 @@ static void gs4i_stage_jacobi(gs4i_solver *s, int level, int k)
     const gs4i_masked *g = &s->level[level];
     size_t at;
     int j, n, c;
-    GS4I_EACH_ROW(g, k, j, at, n) for (c = 0; c < 2; c++) gs4i_start_row(g->z[c] + at, g->r[c] + at, g->inverse[c] + at, n);
+    GS4I_EACH_ROW(g, k, j, at, n)
+        for (c = 0; c < 2; c++) gs4i_start_row(g->z[c] + at, g->r[c] + at, g->inverse[c] + at, n);
 }
 
-/* --- sweeps: stages one behind the other through the planes ------------------------------------------------ *
+/* --- sweeps: stages one behind the other through the planes ------------------------------------ *
  *
- * Stage q needs stage q - 1 in planes k - 1, k, k + 1; the first needs nothing that a stage writes. So one pass does stage q in plane
- * step - q while that is in the cache. With slabs each task does first what needs nothing of another slab, then what is left at the cuts:
+ * Stage q needs stage q - 1 in planes k - 1, k, k + 1; the first needs nothing that a stage
+ * writes. So one pass does stage q in plane step - q while that is in the cache. With slabs each
+ * task does first what needs nothing of another slab, then what is left at the cuts:
  *
  *     stage 0   |--------------------||--------------------|
  *     stage 1   |-------------------\  /-------------------|        first pass \ cut / first pass
  *     stage 2   |------------------\ || /------------------|        second pass: between \ and /
  *
- * Every cell sees the same numbers whatever the slabs. The stage that restricts takes planes by two. */
+ * Every cell sees the same numbers whatever the slabs. The stage that restricts takes planes by
+ * two. */
 
-typedef struct gs4i_sweep { gs4i_solver *s; int level; const gs4i_stage_fn *stage; int count; } gs4i_sweep;
+typedef struct gs4i_sweep {
+    gs4i_solver *s;
+    int level;
+    const gs4i_stage_fn *stage;
+    int count;
+} gs4i_sweep;
 
-GS4I_INLINE int gs4i_even(const gs4i_sweep *w, int q, int k, int up) { return w->stage[q] != gs4i_stage_restrict ? k : up ? (k + 1) & ~1 : k & ~1; }
+GS4I_INLINE int gs4i_even(const gs4i_sweep *w, int q, int k, int up)
+{
+    return w->stage[q] != gs4i_stage_restrict ? k : up ? (k + 1) & ~1 : k & ~1;
+}
 
 static void gs4i_sweep_slab(int index, void *context)
 {
     const gs4i_sweep *w = (const gs4i_sweep *)context;
-    const int a = w->s->cut[w->level][index], b = w->s->cut[w->level][index + 1], first = index == 0, last = index == w->s->slabs[w->level] - 1;
+    const int a = w->s->cut[w->level][index], b = w->s->cut[w->level][index + 1],
+              first = index == 0, last = index == w->s->slabs[w->level] - 1;
     int step, q;
     for (step = a; step < b + w->count; step++)
         for (q = 0; q < w->count; q++) {
             const int k = step - q;
-            if (k >= (first ? a : gs4i_even(w, q, a + q, 1)) && k < (last ? b : gs4i_even(w, q, b - q, 0))) w->stage[q](w->s, w->level, k);
+            if (k >= (first ? a : gs4i_even(w, q, a + q, 1))
+                && k < (last ? b : gs4i_even(w, q, b - q, 0)))
+                w->stage[q](w->s, w->level, k);
         }
 }
 
@@ -1455,13 +1858,17 @@ static void gs4i_sweep_cut(int index, void *context)
     const int cut = w->s->cut[w->level][index + 1];
     int q, k;
     for (q = 1; q < w->count; q++)
-        for (k = gs4i_even(w, q, cut - q, 0); k < gs4i_even(w, q, cut + q, 1); k++) w->stage[q](w->s, w->level, k);
+        for (k = gs4i_even(w, q, cut - q, 0); k < gs4i_even(w, q, cut + q, 1); k++)
+            w->stage[q](w->s, w->level, k);
 }
 
 static void gs4i_sweep_run(gs4i_solver *s, int level, const gs4i_stage_fn *stage, int count)
 {
     gs4i_sweep w;
-    w.s = s; w.level = level; w.stage = stage; w.count = count;
+    w.s = s;
+    w.level = level;
+    w.stage = stage;
+    w.count = count;
     gs4i_parallel_for(s->tasks, s->slabs[level], gs4i_sweep_slab, &w);
     if (count > 1) gs4i_parallel_for(s->tasks, s->slabs[level] - 1, gs4i_sweep_cut, &w);
 }
@@ -1474,7 +1881,7 @@ static double gs4i_total(const gs4i_solver *s)
     return sum;
 }
 
-/* --- the cycle ---------------------------------------------------------------------------------------------- */
+/* --- the cycle -------------------------------------------------------------------------------- */
 
 GS4I_INLINE void gs4i_relax_node(gs4i_graph *g, int i)
 {
@@ -1487,16 +1894,19 @@ GS4I_INLINE void gs4i_relax_node(gs4i_graph *g, int i)
 static void gs4i_graph_forward(gs4i_graph *g, int sweeps)
 {
     int i, q;
-    for (q = 0; q < sweeps; q++) for (i = 0; i < g->n; i++) gs4i_relax_node(g, i);
+    for (q = 0; q < sweeps; q++)
+        for (i = 0; i < g->n; i++) gs4i_relax_node(g, i);
 }
 
 static void gs4i_graph_backward(gs4i_graph *g, int sweeps)
 {
     int i, q;
-    for (q = 0; q < sweeps; q++) for (i = g->n - 1; i >= 0; i--) gs4i_relax_node(g, i);
+    for (q = 0; q < sweeps; q++)
+        for (i = g->n - 1; i >= 0; i--) gs4i_relax_node(g, i);
 }
 
-/* Residual to the next graph, and what that makes of it back. Where only red and black nodes are neighbours, red ones do. */
+/* Residual to the next graph, and what that makes of it back. Where only red and black nodes are
+ * neighbours, red ones do. */
 static void gs4i_graph_restrict(const gs4i_graph *g, gs4i_graph *up)
 {
     int i, e;
@@ -1512,7 +1922,8 @@ static void gs4i_graph_restrict(const gs4i_graph *g, gs4i_graph *up)
 static void gs4i_graph_prolong(gs4i_graph *g, const gs4i_graph *up)
 {
     int i;
-    for (i = 0; i < (g->mixed ? g->n : g->reds); i++) if (g->parent[i] >= 0) g->x[i] += up->x[g->parent[i]];
+    for (i = 0; i < (g->mixed ? g->n : g->reds); i++)
+        if (g->parent[i] >= 0) g->x[i] += up->x[g->parent[i]];
 }
 
 /* L L^T x = b; rows whose pivot was skipped have a zero on the diagonal of L. */
@@ -1541,7 +1952,8 @@ static void gs4i_graph_cycles(gs4i_solver *s)
     for (q = 0; q < s->graphs - 1; q++) {
         gs4i_graph *g = &s->graph[q];
         memset(g->x, 0, (size_t)g->n * sizeof(float));
-        gs4i_graph_forward(g, q ? 3 : 2);                   /* beyond graph 0 a third sweep costs next to nothing */
+        /* beyond graph 0 a third sweep costs next to nothing */
+        gs4i_graph_forward(g, q ? 3 : 2);
         gs4i_graph_restrict(g, &s->graph[q + 1]);
     }
     gs4i_graph_direct(&s->graph[q], s->matrix);
@@ -1561,19 +1973,24 @@ static void gs4i_restrict_groups(int K, void *context)
     size_t at;
     int j, k, n, m;
     for (k = 2 * K; k < 2 * K + 2 && k < g->n[2]; k++)
-        GS4I_EACH_ROW(g, k, j, at, n) for (m = 0; m < n; m++) {
-            const int32_t parent = s->parent[0][at + (size_t)m];
-            if (parent >= 0) b[parent] += s->residual[at + (size_t)m];
-        }
+        GS4I_EACH_ROW(g, k, j, at, n)
+            for (m = 0; m < n; m++) {
+                const int32_t parent = s->parent[0][at + (size_t)m];
+                if (parent >= 0) b[parent] += s->residual[at + (size_t)m];
+            }
 }
 
 /* z = (about the inverse of A) r, symmetric and positive; gives r.z */
 static double gs4i_cycle(gs4i_solver *s)
 {
-    static const gs4i_stage_fn down[] = { gs4i_stage_start, gs4i_stage_black, gs4i_stage_red, gs4i_stage_black, gs4i_stage_restrict };
-    static const gs4i_stage_fn down1[] = { gs4i_stage_start, gs4i_stage_black, gs4i_stage_red, gs4i_stage_black, gs4i_stage_residual };
-    static const gs4i_stage_fn up1[] = { gs4i_stage_collect, gs4i_stage_black, gs4i_stage_red, gs4i_stage_black, gs4i_stage_red };
-    static const gs4i_stage_fn up[] = { gs4i_stage_prolong, gs4i_stage_black, gs4i_stage_red, gs4i_stage_black, gs4i_stage_red, gs4i_stage_dot };
+    static const gs4i_stage_fn down[] = { gs4i_stage_start, gs4i_stage_black, gs4i_stage_red,
+                                          gs4i_stage_black, gs4i_stage_restrict };
+    static const gs4i_stage_fn down1[] = { gs4i_stage_start, gs4i_stage_black, gs4i_stage_red,
+                                           gs4i_stage_black, gs4i_stage_residual };
+    static const gs4i_stage_fn up1[] = { gs4i_stage_collect, gs4i_stage_black, gs4i_stage_red,
+                                         gs4i_stage_black, gs4i_stage_red };
+    static const gs4i_stage_fn up[] = { gs4i_stage_prolong, gs4i_stage_black, gs4i_stage_red,
+                                        gs4i_stage_black,   gs4i_stage_red,   gs4i_stage_dot };
     gs4i_sweep_run(s, 0, down, 5);
     gs4i_sweep_run(s, 1, down1, 5);
     memset(s->graph[0].b, 0, (size_t)s->graph[0].n * sizeof(float));
@@ -1584,11 +2001,14 @@ static double gs4i_cycle(gs4i_solver *s)
     return gs4i_total(s);
 }
 
-/* --- setup: memory ------------------------------------------------------------------------------------------ */
+/* --- setup: memory ---------------------------------------------------------------------------- */
 
 #define GS4I_CHUNK ((size_t)1 << 20)
 
-typedef struct gs4i_clearing { char *at; size_t bytes; } gs4i_clearing;
+typedef struct gs4i_clearing {
+    char *at;
+    size_t bytes;
+} gs4i_clearing;
 
 static void gs4i_clear_chunk(int index, void *context)
 {
@@ -1601,17 +2021,20 @@ static void gs4i_clear_chunk(int index, void *context)
 static void gs4i_clear(gs4i_solver *s, void *at, size_t bytes)
 {
     gs4i_clearing c;
-    c.at = (char *)at; c.bytes = bytes;
+    c.at = (char *)at;
+    c.bytes = bytes;
     gs4i_parallel_for(s->tasks, (int)((bytes + GS4I_CHUNK - 1) / GS4I_CHUNK), gs4i_clear_chunk, &c);
 }
 
 static void gs4i_release(gs4i_memory *memory, gs4i_scratch *c)
 {
     gs4i_free(memory, c->data, c->bytes, 1);
-    c->data = NULL; c->bytes = 0;
+    c->data = NULL;
+    c->bytes = 0;
 }
 
-/* Exactly `bytes`, or what there is if that is more. What was there is lost, and zero if `fresh` or if it moved. */
+/* Exactly `bytes`, or what there is if that is more. What was there is lost, and zero if `fresh`
+ * or if it moved. */
 static int gs4i_reserve(gs4i_solver *s, gs4i_scratch *c, size_t bytes, int fresh)
 {
     if (!c->data || c->bytes < bytes) {
@@ -1660,18 +2083,24 @@ static size_t gs4i_lay_out(gs4i_solver *s, char *base)
         gs4i_masked *g = &s->level[l];
         gs4i_carve_two(base, &used, g->count, g->z);
         gs4i_carve_two(base, &used, g->count, g->inverse);
-        for (c = 0; c < 2; c++) g->r[c] = (double *)gs4i_carve(base, &used, g->count, sizeof(double));
-        if (l == 0 && s->uniform) gs4i_carve_two(base, &used, g->count, g->degree);
-        else for (a = 0; a < 3; a++) gs4i_carve_two(base, &used, g->count, g->w[a]);
-        if (l == 0 && !s->uniform && sizeof(gs4_real) == 8) for (a = 0; a < 3; a++) gs4i_carve_two(base, &used, g->count, g->w_low[a]);
+        for (c = 0; c < 2; c++)
+            g->r[c] = (double *)gs4i_carve(base, &used, g->count, sizeof(double));
+        if (l == 0 && s->uniform)
+            gs4i_carve_two(base, &used, g->count, g->degree);
+        else
+            for (a = 0; a < 3; a++) gs4i_carve_two(base, &used, g->count, g->w[a]);
+        if (l == 0 && !s->uniform && sizeof(gs4_real) == 8)
+            for (a = 0; a < 3; a++) gs4i_carve_two(base, &used, g->count, g->w_low[a]);
         if (l == 1 || !s->uniform || s->massive) gs4i_carve_two(base, &used, g->count, g->mass);
         if (l == 0 && s->massive) gs4i_carve_two(base, &used, g->count, g->mass_low);
     }
     gs4i_carve_two(base, &used, s->level[0].count, s->p);
-    for (c = 0; c < 2; c++) s->x[c] = (double *)gs4i_carve(base, &used, s->level[0].count, sizeof(double));
+    for (c = 0; c < 2; c++)
+        s->x[c] = (double *)gs4i_carve(base, &used, s->level[0].count, sizeof(double));
     s->residual = (float *)gs4i_carve(base, &used, s->level[1].count, sizeof(float));
     s->parent[0] = (int32_t *)gs4i_carve(base, &used, s->level[1].count, sizeof(int32_t));
-    s->parent[1] = (int32_t *)(void *)s->residual;          /* of black cells while setting up alone */
+    /* of black cells while setting up alone */
+    s->parent[1] = (int32_t *)(void *)s->residual;
     return used;
 }
 
@@ -1679,7 +2108,8 @@ static size_t gs4i_lay_out(gs4i_solver *s, char *base)
 static int gs4i_reserve_levels(gs4i_solver *s)
 {
     gs4i_masked *g = s->level;
-    const int shape[5] = { g->n[0], g->n[1], g->n[2], s->uniform, s->massive }, fresh = memcmp(shape, s->shape, sizeof shape) != 0;
+    const int shape[5] = { g->n[0], g->n[1], g->n[2], s->uniform, s->massive },
+              fresh = memcmp(shape, s->shape, sizeof shape) != 0;
     int n[3], a, c;
     for (a = 0; a < 3; a++) n[a] = (g->n[a] + 1) / 2;
     gs4i_shape_level(&g[1], n);
@@ -1697,7 +2127,7 @@ static int gs4i_reserve_levels(gs4i_solver *s)
     return GS4_OK;
 }
 
-/* --- setup: what is given ------------------------------------------------------------------------------------- */
+/* --- setup: what is given --------------------------------------------------------------------- */
 
 #ifdef GS4_DOUBLE
 typedef uint64_t gs4i_bits;
@@ -1705,10 +2135,20 @@ typedef uint64_t gs4i_bits;
 typedef uint32_t gs4i_bits;
 #endif
 
-typedef struct gs4i_range { double low, high, least /* above 0 */, mass; int64_t unknowns; const char *fault; double value; } gs4i_range;
-typedef struct gs4i_setup { gs4i_solver *s; const gs4_poisson_desc *d; gs4i_range *seen; int32_t *counts; } gs4i_setup;
+typedef struct gs4i_range {
+    double low, high, least /* above 0 */, mass;
+    int64_t unknowns;
+    const char *fault;
+    double value;
+} gs4i_range;
+typedef struct gs4i_setup {
+    gs4i_solver *s;
+    const gs4_poisson_desc *d;
+    gs4i_range *seen;
+    int32_t *counts;
+} gs4i_setup;
 
-#define GS4I_CONDUCTS(a, b) ((a) & (b) & GS4I_IS_OPEN && ((a) | (b)) & GS4I_IS_LIQUID)
+#define GS4I_CONDUCTS(a, b) ((a) & (b)&GS4I_IS_OPEN && ((a) | (b)) & GS4I_IS_LIQUID)
 
 GS4I_INLINE const uint8_t *gs4i_kinds_of(const gs4i_solver *s, int j, int k)
 {
@@ -1727,7 +2167,11 @@ static void gs4i_take_kinds(int k, void *context)
         const uint8_t *from = u->d->kind + ((size_t)k * (size_t)n[1] + (size_t)j) * (size_t)n[0];
         uint8_t *to = u->s->kind + (gs4i_kinds_of(u->s, j, k) - u->s->kind);
         for (i = 0; i < n[0]; i++) {
-            if (from[i] > GS4_CELL_SOLID) { seen->fault = "kind[] holds "; seen->value = from[i]; return; }
+            if (from[i] > GS4_CELL_SOLID) {
+                seen->fault = "kind[] holds ";
+                seen->value = from[i];
+                return;
+            }
             to[i] = bits[from[i]];
             unknowns += from[i] == GS4_CELL_LIQUID;
         }
@@ -1735,25 +2179,33 @@ static void gs4i_take_kinds(int k, void *context)
     seen->unknowns = unknowns;
 }
 
-/* Least, least above 0 and most of the coefficients of faces that conduct, as bits: a sign, or what is no number, is above all. */
-static void gs4i_range_of_bits(const gs4_real *GS4I_RESTRICT face, const uint8_t *GS4I_RESTRICT kind, const uint8_t *GS4I_RESTRICT other, int n,
+/* Least, least above 0 and most of the coefficients of faces that conduct, as bits: a sign, or
+ * what is no number, is above all. */
+static void gs4i_range_of_bits(const gs4_real *GS4I_RESTRICT face,
+                               const uint8_t *GS4I_RESTRICT kind,
+                               const uint8_t *GS4I_RESTRICT other, int n,
                                gs4i_bits *GS4I_RESTRICT range)
 {
     gs4i_bits low = range[0], least = range[1], high = range[2];
     int i;
     for (i = 0; i < n; i++) {
-        const gs4i_bits mask = (gs4i_bits)0 - (gs4i_bits)(kind[i] & other[i] & GS4I_IS_OPEN & (kind[i] | other[i]) / GS4I_IS_LIQUID);
-        const gs4_real c = face[i] + 0;                     /* no -0 */
+        const gs4i_bits mask = (gs4i_bits)0
+                               - (gs4i_bits)(kind[i] & other[i] & GS4I_IS_OPEN
+                                             & (kind[i] | other[i]) / GS4I_IS_LIQUID);
+        const gs4_real c = face[i] + 0; /* no -0 */
         gs4i_bits b;
         memcpy(&b, &c, sizeof b);
         low = (b | ~mask) < low ? b | ~mask : low;
         least = ((b - 1) | ~mask) < least ? (b - 1) | ~mask : least;
         high = (b & mask) > high ? b & mask : high;
     }
-    range[0] = low; range[1] = least; range[2] = high;
+    range[0] = low;
+    range[1] = least;
+    range[2] = high;
 }
 
-static void gs4i_see_coefficients(gs4i_range *seen, const gs4_real *face, const uint8_t *kind, const uint8_t *other, int n)
+static void gs4i_see_coefficients(gs4i_range *seen, const gs4_real *face, const uint8_t *kind,
+                                  const uint8_t *other, int n)
 {
     gs4i_bits range[3] = { ~(gs4i_bits)0, ~(gs4i_bits)0, 0 };
     gs4_real low, least, high;
@@ -1761,13 +2213,23 @@ static void gs4i_see_coefficients(gs4i_range *seen, const gs4_real *face, const 
     gs4i_range_of_bits(face, kind, other, n, range);
     memcpy(&high, &range[2], sizeof high);
     if (!(high >= 0 && high < GS4I_HUGE)) {
-        for (i = 0; GS4I_CONDUCTS(kind[i], other[i]) == 0 || (face[i] >= 0 && face[i] < GS4I_HUGE); i++) {}
-        seen->fault = "coefficient[] holds "; seen->value = (double)face[i];
+        for (i = 0; GS4I_CONDUCTS(kind[i], other[i]) == 0 || (face[i] >= 0 && face[i] < GS4I_HUGE);
+             i++) {
+        }
+        seen->fault = "coefficient[] holds ";
+        seen->value = (double)face[i];
         return;
     }
     if ((double)high > seen->high) seen->high = (double)high;
-    if (~range[0]) { memcpy(&low, &range[0], sizeof low); if ((double)low < seen->low) seen->low = (double)low; }
-    if (~range[1]) { range[1]++; memcpy(&least, &range[1], sizeof least); if ((double)least < seen->least) seen->least = (double)least; }
+    if (~range[0]) {
+        memcpy(&low, &range[0], sizeof low);
+        if ((double)low < seen->low) seen->low = (double)low;
+    }
+    if (~range[1]) {
+        range[1]++;
+        memcpy(&least, &range[1], sizeof least);
+        if ((double)least < seen->least) seen->least = (double)least;
+    }
 }
 
 /* Range of all coefficients and diagonals that matter; of faces those towards + */
@@ -1782,28 +2244,37 @@ static void gs4i_see_plane(int k, void *context)
     int a;
     for (j = 0; j < ny; j++) {
         const size_t row = (size_t)k * ny + j;
-        const size_t face[3] = { row * (nx + 1) + 1, ((size_t)k * (ny + 1) + j + 1) * nx, (row + ny) * nx };
+        const size_t face[3] = { row * (nx + 1) + 1, ((size_t)k * (ny + 1) + j + 1) * nx,
+                                 (row + ny) * nx };
         const uint8_t *kind = gs4i_kinds_of(u->s, (int)j, k);
         for (a = 0; a < 3; a++) {
             if (!d->coefficient[a]) continue;
             gs4i_see_coefficients(seen, d->coefficient[a] + face[a], kind, kind + step[a], (int)nx);
             if (seen->fault) return;
         }
-        for (i = 0; i < nx && d->diagonal; i++) if (kind[i] & GS4I_IS_LIQUID) {
-            const double m = (double)d->diagonal[row * nx + i];
-            if (!(m >= 0 && m < (double)GS4I_HUGE)) { seen->fault = "diagonal[] holds "; seen->value = m; return; }
-            if (m > seen->mass) seen->mass = m;
-        }
+        for (i = 0; i < nx && d->diagonal; i++)
+            if (kind[i] & GS4I_IS_LIQUID) {
+                const double m = (double)d->diagonal[row * nx + i];
+                if (!(m >= 0 && m < (double)GS4I_HUGE)) {
+                    seen->fault = "diagonal[] holds ";
+                    seen->value = m;
+                    return;
+                }
+                if (m > seen->mass) seen->mass = m;
+            }
     }
 }
 
 static int gs4i_fault(gs4i_solver *s, const char *what, double value, const char *accepted)
 {
-    s->fault = what; s->fault_value = value; s->accepted = accepted;
+    s->fault = what;
+    s->fault_value = value;
+    s->accepted = accepted;
     return GS4_ERROR_ARGUMENT;
 }
 
-/* Scales, and whether one coefficient serves all faces: it does for most uses, and takes half the memory. */
+/* Scales, and whether one coefficient serves all faces: it does for most uses, and takes half
+ * the memory. */
 static int gs4i_choose_units(gs4i_solver *s, const gs4_poisson_desc *d, const gs4i_range *seen)
 {
     const double h2 = (double)d->cell_size * (double)d->cell_size;
@@ -1811,11 +2282,13 @@ static int gs4i_choose_units(gs4i_solver *s, const gs4_poisson_desc *d, const gs
     int k, exponent = 0;
     memset(&all, 0, sizeof all);
     all.low = all.least = DBL_MAX;
-    if (!d->coefficient[0] || !d->coefficient[1] || !d->coefficient[2]) all.low = all.high = all.least = 1;
+    if (!d->coefficient[0] || !d->coefficient[1] || !d->coefficient[2])
+        all.low = all.high = all.least = 1;
     s->unknowns = 0;
     for (k = 0; k < d->cells[2]; k++) {
         if (seen[k].fault)
-            return gs4i_fault(s, seen[k].fault, seen[k].value, "; it must be 0 or a finite number above that is not absurdly large");
+            return gs4i_fault(s, seen[k].fault, seen[k].value,
+                              "; it must be 0 or a finite number above that is not absurdly large");
         if (seen[k].low < all.low) all.low = seen[k].low;
         if (seen[k].high > all.high) all.high = seen[k].high;
         if (seen[k].least < all.least) all.least = seen[k].least;
@@ -1826,7 +2299,8 @@ static int gs4i_choose_units(gs4i_solver *s, const gs4_poisson_desc *d, const gs
     s->massive = all.mass > 0;
     s->uniform = all.high > 0 && all.low == all.high && all.mass < 1e9 * all.high;
     if (all.high > 0 && all.least < 1e-30 * all.high)
-        return gs4i_fault(s, "the smallest coefficient above 0, over the largest, is ", all.least / all.high,
+        return gs4i_fault(s, "the smallest coefficient above 0, over the largest, is ",
+                          all.least / all.high,
                           "; it must be at least 1e-30, use 0 for what does not conduct");
     frexp(all.high > all.mass ? all.high : all.mass, &exponent);
     s->unit = s->uniform ? 1 / all.high : ldexp(1, -exponent);
@@ -1843,8 +2317,10 @@ static int gs4i_take(gs4i_setup *u)
     char *base = NULL;
     int k, l, pass;
     gs4i_shape_level(&s->level[0], n);
-    s->kind_row = (size_t)n[0] + 2; s->kind_plane = s->kind_row * (size_t)(n[1] + 2);
-    if (gs4i_reserve(s, &s->kinds, s->kind_plane * (size_t)(n[2] + 2), 1) != GS4_OK) return GS4_ERROR_MEMORY;
+    s->kind_row = (size_t)n[0] + 2;
+    s->kind_plane = s->kind_row * (size_t)(n[1] + 2);
+    if (gs4i_reserve(s, &s->kinds, s->kind_plane * (size_t)(n[2] + 2), 1) != GS4_OK)
+        return GS4_ERROR_MEMORY;
     s->kind = (uint8_t *)s->kinds.data;
     for (pass = 0; pass < 2; pass++) {
         used = 0;
@@ -1862,7 +2338,9 @@ static int gs4i_take(gs4i_setup *u)
     }
     for (k = 0; k < n[2]; k++) u->seen[k].low = u->seen[k].least = DBL_MAX;
     gs4i_parallel_for(s->tasks, n[2], gs4i_take_kinds, u);
-    for (k = 0; k < n[2]; k++) if (u->seen[k].fault) return gs4i_fault(s, u->seen[k].fault, u->seen[k].value, ", which is none of gs4_cell");
+    for (k = 0; k < n[2]; k++)
+        if (u->seen[k].fault)
+            return gs4i_fault(s, u->seen[k].fault, u->seen[k].value, ", which is none of gs4_cell");
     gs4i_parallel_for(s->tasks, n[2], gs4i_see_plane, u);
     if (gs4i_choose_units(s, u->d, u->seen) != GS4_OK) return GS4_ERROR_ARGUMENT;
     if (gs4i_reserve_levels(s) != GS4_OK) return GS4_ERROR_MEMORY;
@@ -1870,24 +2348,36 @@ static int gs4i_take(gs4i_setup *u)
     return GS4_OK;
 }
 
-/* --- setup: both levels on grids ------------------------------------------------------------------------------- */
+/* --- setup: both levels on grids -------------------------------------------------------------- */
 
-/* Faces of cell i of a row: -x +x -y +y -z +z, 0 where they do not conduct; gives the kinds on their other sides. */
-typedef struct gs4i_rows { const uint8_t *kind; const gs4_real *face[6], *diagonal; ptrdiff_t beside[6]; double unit, mass_unit; } gs4i_rows;
+/* Faces of cell i of a row: -x +x -y +y -z +z, 0 where they do not conduct; gives the kinds on
+ * their other sides. */
+typedef struct gs4i_rows {
+    const uint8_t *kind;
+    const gs4_real *face[6], *diagonal;
+    ptrdiff_t beside[6];
+    double unit, mass_unit;
+} gs4i_rows;
 
-static void gs4i_open_row(gs4i_rows *q, const gs4i_solver *s, const gs4_poisson_desc *d, int j, int k)
+static void gs4i_open_row(gs4i_rows *q, const gs4i_solver *s, const gs4_poisson_desc *d, int j,
+                          int k)
 {
-    const size_t nx = (size_t)d->cells[0], ny = (size_t)d->cells[1], row = (size_t)k * ny + (size_t)j;
-    const size_t low[3] = { row * (nx + 1), ((size_t)k * (ny + 1) + (size_t)j) * nx, row * nx }, high[3] = { 1, nx, nx * ny };
+    const size_t nx = (size_t)d->cells[0], ny = (size_t)d->cells[1],
+                 row = (size_t)k * ny + (size_t)j;
+    const size_t low[3] = { row * (nx + 1), ((size_t)k * (ny + 1) + (size_t)j) * nx, row * nx },
+                 high[3] = { 1, nx, nx * ny };
     const ptrdiff_t step[3] = { 1, (ptrdiff_t)s->kind_row, (ptrdiff_t)s->kind_plane };
     int a;
     q->kind = gs4i_kinds_of(s, j, k);
     q->diagonal = d->diagonal ? d->diagonal + row * nx : NULL;
-    q->unit = s->unit; q->mass_unit = s->mass_unit;
+    q->unit = s->unit;
+    q->mass_unit = s->mass_unit;
     for (a = 0; a < 3; a++) {
         const gs4_real *c = d->coefficient[a];
-        q->face[2 * a] = c ? c + low[a] : NULL; q->face[2 * a + 1] = c ? c + low[a] + high[a] : NULL;
-        q->beside[2 * a] = -step[a]; q->beside[2 * a + 1] = step[a];
+        q->face[2 * a] = c ? c + low[a] : NULL;
+        q->face[2 * a + 1] = c ? c + low[a] + high[a] : NULL;
+        q->beside[2 * a] = -step[a];
+        q->beside[2 * a + 1] = step[a];
     }
 }
 
@@ -1898,11 +2388,15 @@ GS4I_INLINE double gs4i_face_of(const gs4i_rows *q, int i, int f)
 }
 
 /* A strip of both colours with coefficients, in the order of its cells. */
-enum { GS4I_BOTH = 2 * GS4I_STRIP };
+enum {
+    GS4I_BOTH = 2 * GS4I_STRIP
+};
 typedef struct gs4i_built {
     double w[6][GS4I_BOTH], mass[GS4I_BOTH];
-    float face[3][GS4I_BOTH], low[3][GS4I_BOTH], inverse[GS4I_BOTH], diagonal[GS4I_BOTH], diagonal_low[GS4I_BOTH];
-    float link[3][GS4I_BOTH], air[GS4I_BOTH];       /* what level 1 gets: of faces towards + between liquid cells, of those to the air */
+    float face[3][GS4I_BOTH], low[3][GS4I_BOTH], inverse[GS4I_BOTH], diagonal[GS4I_BOTH],
+        diagonal_low[GS4I_BOTH];
+    /* what level 1 gets: of faces towards + between liquid cells, of those to the air */
+    float link[3][GS4I_BOTH], air[GS4I_BOTH];
 } gs4i_built;
 
 /* Whether any of n cells or their neighbours towards + is liquid. */
@@ -1916,7 +2410,8 @@ static int gs4i_is_strip_wet(const gs4i_rows *q, int i, int n)
 
 static void gs4i_build_faces(gs4i_built *b, const gs4i_rows *q, int i, int n, int f)
 {
-    const uint8_t *GS4I_RESTRICT kind = q->kind + i, *GS4I_RESTRICT other = q->kind + i + q->beside[f];
+    const uint8_t *GS4I_RESTRICT kind = q->kind + i, *GS4I_RESTRICT other =
+                                                         q->kind + i + q->beside[f];
     const gs4_real *GS4I_RESTRICT face = q->face[f] ? q->face[f] + i : NULL;
     double *GS4I_RESTRICT w = b->w[f];
     float *GS4I_RESTRICT link = b->link[f >> 1], *GS4I_RESTRICT air = b->air;
@@ -1925,9 +2420,11 @@ static void gs4i_build_faces(gs4i_built *b, const gs4i_rows *q, int i, int n, in
         const double all = face ? (double)face[l] * q->unit : q->unit;
         w[l] = kind[l] & other[l] & GS4I_IS_OPEN && (kind[l] | other[l]) & GS4I_IS_LIQUID ? all : 0;
     }
-    for (l = 0; l < n; l++) air[l] += (float)(0.75 * w[l]) * (float)((kind[l] & ~other[l]) / GS4I_IS_LIQUID & 1);
+    for (l = 0; l < n; l++)
+        air[l] += (float)(0.75 * w[l]) * (float)((kind[l] & ~other[l]) / GS4I_IS_LIQUID & 1);
     if (!(f & 1)) return;
-    for (l = 0; l < n; l++) link[l] = (float)(0.5 * w[l]) * (float)((kind[l] & other[l]) / GS4I_IS_LIQUID);
+    for (l = 0; l < n; l++)
+        link[l] = (float)(0.5 * w[l]) * (float)((kind[l] & other[l]) / GS4I_IS_LIQUID);
 }
 
 static void gs4i_build_cells(gs4i_built *GS4I_RESTRICT b, const gs4i_rows *q, int i, int n)
@@ -1936,25 +2433,34 @@ static void gs4i_build_cells(gs4i_built *GS4I_RESTRICT b, const gs4i_rows *q, in
     int l, f;
     memset(b->air, 0, sizeof b->air);
     for (f = 0; f < 6; f++) gs4i_build_faces(b, q, i, n, f);
-    for (l = 0; l < n; l++) b->mass[l] = q->diagonal && kind[l] & GS4I_IS_LIQUID ? (double)q->diagonal[i + l] * q->mass_unit : 0;
+    for (l = 0; l < n; l++)
+        b->mass[l] =
+            q->diagonal && kind[l] & GS4I_IS_LIQUID ? (double)q->diagonal[i + l] * q->mass_unit : 0;
     for (l = 0; l < n; l++) {
-        const double sum = b->mass[l] + (((b->w[0][l] + b->w[1][l]) + (b->w[2][l] + b->w[3][l])) + (b->w[4][l] + b->w[5][l]));
+        const double sum =
+            b->mass[l]
+            + (((b->w[0][l] + b->w[1][l]) + (b->w[2][l] + b->w[3][l])) + (b->w[4][l] + b->w[5][l]));
         const double unknown = (double)(kind[l] / GS4I_IS_LIQUID) * (sum > 0 ? 1.0 : 0.0);
         b->inverse[l] = (float)(unknown / (sum + (1 - unknown)));
         b->diagonal[l] = (float)(unknown * b->mass[l] - (1 - unknown));
         b->diagonal_low[l] = (float)(b->mass[l] - (double)(float)b->mass[l]);
     }
-    for (f = 0; f < 3; f++) for (l = 0; l < n; l++) {
-        b->face[f][l] = (float)b->w[2 * f + 1][l];
-        b->low[f][l] = (float)(b->w[2 * f + 1][l] - (double)b->face[f][l]);
-    }
+    for (f = 0; f < 3; f++)
+        for (l = 0; l < n; l++) {
+            b->face[f][l] = (float)b->w[2 * f + 1][l];
+            b->low[f][l] = (float)(b->w[2 * f + 1][l] - (double)b->face[f][l]);
+        }
 }
 
 /* n cells of a row, the first an even one, to two colours. */
-static void gs4i_part(float *GS4I_RESTRICT even, float *GS4I_RESTRICT odd, const float *GS4I_RESTRICT from, int n)
+static void gs4i_part(float *GS4I_RESTRICT even, float *GS4I_RESTRICT odd,
+                      const float *GS4I_RESTRICT from, int n)
 {
     int m;
-    for (m = 0; m < n / 2; m++) { even[m] = from[2 * m]; odd[m] = from[2 * m + 1]; }
+    for (m = 0; m < n / 2; m++) {
+        even[m] = from[2 * m];
+        odd[m] = from[2 * m + 1];
+    }
     if (n & 1) even[m] = from[2 * m];
 }
 
@@ -1971,9 +2477,14 @@ static void gs4i_build_row(gs4i_solver *s, const gs4_poisson_desc *d, int j, int
     memset(&b, 0, sizeof b);
     for (i = 0; i < g->n[0]; i += GS4I_BOTH) {
         const size_t at = row + (size_t)(i / 2);
-        const int wet = gs4i_is_strip_wet(&q, i, n = g->n[0] - i < GS4I_BOTH ? g->n[0] - i : GS4I_BOTH);
-        if (wet) gs4i_build_cells(&b, &q, i, n);
-        else { memset(&b, 0, sizeof b); for (l = 0; l < n; l++) b.diagonal[l] = -1; }
+        const int wet =
+            gs4i_is_strip_wet(&q, i, n = g->n[0] - i < GS4I_BOTH ? g->n[0] - i : GS4I_BOTH);
+        if (wet)
+            gs4i_build_cells(&b, &q, i, n);
+        else {
+            memset(&b, 0, sizeof b);
+            for (l = 0; l < n; l++) b.diagonal[l] = -1;
+        }
         gs4i_part(g->inverse[c] + at, g->inverse[!c] + at, b.inverse, n);
         gs4i_part(g->mass[c] + at, g->mass[!c] + at, b.diagonal, n);
         if (g->mass_low[0]) gs4i_part(g->mass_low[c] + at, g->mass_low[!c] + at, b.diagonal_low, n);
@@ -1987,7 +2498,9 @@ static void gs4i_build_row(gs4i_solver *s, const gs4_poisson_desc *d, int j, int
             if (l & 1) h->w[0][up][to] += b.link[0][l];
             if (j & 1) h->w[1][up][to] += b.link[1][l];
             if (k & 1) h->w[2][up][to] += b.link[2][l];
-            h->mass[up][to] += b.air[l] + (float)b.mass[l]; h->z[up][to] += b.air[l];         /* z: to the air alone, while setting up */
+            /* z: to the air alone, while setting up */
+            h->mass[up][to] += b.air[l] + (float)b.mass[l];
+            h->z[up][to] += b.air[l];
         }
     }
 }
@@ -2005,25 +2518,33 @@ GS4I_INLINE int gs4i_is_deep(const uint8_t *v, ptrdiff_t ny, ptrdiff_t nz)
     const uint8_t *const around[7] = { v, v - 1, v + 1, v - ny, v + ny, v - nz, v + nz };
     uint64_t all = ~(uint64_t)0, eight;
     int a;
-    for (a = 0; a < 7; a++) { memcpy(&eight, around[a], 8); all &= eight; }
+    for (a = 0; a < 7; a++) {
+        memcpy(&eight, around[a], 8);
+        all &= eight;
+    }
     return all == 0x0303030303030303u;
 }
 
 /* What the diagonal of a cell with `degree` faces of coefficient 1 makes of it. */
-GS4I_INLINE void gs4i_build_mass(const gs4i_solver *s, const gs4i_rows *q, int j, int k, int i, int degree)
+GS4I_INLINE void gs4i_build_mass(const gs4i_solver *s, const gs4i_rows *q, int j, int k, int i,
+                                 int degree)
 {
     const gs4i_masked *g = &s->level[0], *h = &s->level[1];
     const size_t at = gs4i_row_of(g, j, k) + (size_t)(i / 2);
     const int c = (i + j + k) & 1;
     const double mass = (double)q->diagonal[i] * q->mass_unit;
     if (!(mass > 0)) return;
-    g->mass[c][at] = (float)mass; g->mass_low[c][at] = (float)(mass - (double)(float)mass);
+    g->mass[c][at] = (float)mass;
+    g->mass_low[c][at] = (float)(mass - (double)(float)mass);
     g->inverse[c][at] = (float)(1 / (degree + mass));
-    h->mass[(i / 2 + j / 2 + k / 2) & 1][gs4i_row_of(h, j / 2, k / 2) + (size_t)(i / 4)] += (float)mass;
+    h->mass[(i / 2 + j / 2 + k / 2) & 1][gs4i_row_of(h, j / 2, k / 2) + (size_t)(i / 4)] +=
+        (float)mass;
 }
 
-/* The same where one coefficient serves all faces, for cells `begin` to `end`, which hold all liquid of the row. */
-static void gs4i_build_uniform_row(gs4i_solver *s, const gs4_poisson_desc *d, int j, int k, int begin, int end)
+/* The same where one coefficient serves all faces, for cells `begin` to `end`, which hold all
+ * liquid of the row. */
+static void gs4i_build_uniform_row(gs4i_solver *s, const gs4_poisson_desc *d, int j, int k,
+                                   int begin, int end)
 {
     const gs4i_masked *g = &s->level[0], *h = &s->level[1];
     const size_t row = gs4i_row_of(g, j, k), coarse = gs4i_row_of(h, j / 2, k / 2);
@@ -2034,17 +2555,23 @@ static void gs4i_build_uniform_row(gs4i_solver *s, const gs4_poisson_desc *d, in
     int i, c;
     gs4i_open_row(&q, s, d, j, k);
     for (c = 0; c < 2; c++) {
-        memset(g->inverse[c] + row, 0, (size_t)g->width * sizeof(float)); memset(g->degree[c] + row, 0, (size_t)g->width * sizeof(float));
+        memset(g->inverse[c] + row, 0, (size_t)g->width * sizeof(float));
+        memset(g->degree[c] + row, 0, (size_t)g->width * sizeof(float));
         if (!g->mass[c]) continue;
-        memset(g->mass[c] + row, 0, (size_t)g->width * sizeof(float)); memset(g->mass_low[c] + row, 0, (size_t)g->width * sizeof(float));
+        memset(g->mass[c] + row, 0, (size_t)g->width * sizeof(float));
+        memset(g->mass_low[c] + row, 0, (size_t)g->width * sizeof(float));
     }
     for (i = begin; i < end; i++) {
         const uint8_t *v = q.kind + i;
         const size_t at = row + (size_t)(i / 2), to = coarse + (size_t)(i / 4);
         const int up = (i / 2 + j / 2 + k / 2) & 1;
         int open, wet;
-        if (!(i & 7) && i + 8 <= end && gs4i_is_deep(v, ny, nz)) {       /* eight at once */
-            for (c = 0; c < 2; c++) for (m = 0; m < 4; m++) { g->degree[c][at + m] = 6; g->inverse[c][at + m] = inverse[6]; }
+        if (!(i & 7) && i + 8 <= end && gs4i_is_deep(v, ny, nz)) { /* eight at once */
+            for (c = 0; c < 2; c++)
+                for (m = 0; m < 4; m++) {
+                    g->degree[c][at + m] = 6;
+                    g->inverse[c][at + m] = inverse[6];
+                }
             for (m = 0; m < 8 && q.diagonal; m++) gs4i_build_mass(s, &q, j, k, i + (int)m, 6);
             for (m = 0; m < 4; m++) {
                 const int up_m = (up + (int)m) & 1;
@@ -2058,14 +2585,18 @@ static void gs4i_build_uniform_row(gs4i_solver *s, const gs4_poisson_desc *d, in
         if (!(*v & GS4I_IS_LIQUID)) continue;
         c = (i + j + k) & 1;
         open = (v[-1] & 1) + (v[1] & 1) + (v[-ny] & 1) + (v[ny] & 1) + (v[-nz] & 1) + (v[nz] & 1);
-        wet = (v[-1] >> 1) + (v[1] >> 1) + (v[-ny] >> 1) + (v[ny] >> 1) + (v[-nz] >> 1) + (v[nz] >> 1);
+        wet = (v[-1] >> 1) + (v[1] >> 1) + (v[-ny] >> 1) + (v[ny] >> 1) + (v[-nz] >> 1)
+              + (v[nz] >> 1);
         g->degree[c][at] = (float)open;
         g->inverse[c][at] = inverse[open];
         if (q.diagonal) gs4i_build_mass(s, &q, j, k, i, open);
         if (i & 1) h->w[0][up][to] += 0.5f * (float)(v[1] >> 1);
         if (j & 1) h->w[1][up][to] += 0.5f * (float)(v[ny] >> 1);
         if (k & 1) h->w[2][up][to] += 0.5f * (float)(v[nz] >> 1);
-        if (open != wet) { h->mass[up][to] += 0.75f * (float)(open - wet); h->z[up][to] += 0.75f * (float)(open - wet); }
+        if (open != wet) {
+            h->mass[up][to] += 0.75f * (float)(open - wet);
+            h->z[up][to] += 0.75f * (float)(open - wet);
+        }
     }
 }
 
@@ -2088,41 +2619,52 @@ static void gs4i_build_planes(int K, void *context)
     const gs4i_masked *g = &s->level[0], *h = &s->level[1];
     int32_t first, last;
     int j, k;
-    for (j = 0; j < h->n[1]; j++) { h->span[2 * (K * h->n[1] + j)] = INT32_MAX; h->span[2 * (K * h->n[1] + j) + 1] = 0; }
+    for (j = 0; j < h->n[1]; j++) {
+        h->span[2 * (K * h->n[1] + j)] = INT32_MAX;
+        h->span[2 * (K * h->n[1] + j) + 1] = 0;
+    }
     for (k = 2 * K; k < 2 * K + 2 && k < g->n[2]; k++)
         for (j = 0; j < g->n[1]; j++) {
             int32_t *span = g->span + 2 * ((size_t)k * (size_t)g->n[1] + (size_t)j);
             int32_t *wide = h->span + 2 * ((size_t)K * (size_t)h->n[1] + (size_t)(j / 2));
             gs4i_build_span(s, j, k, span);
-            if (s->uniform) gs4i_build_uniform_row(s, u->d, j, k, 2 * span[0], 2 * span[1] < g->n[0] ? 2 * span[1] : g->n[0]);
-            else gs4i_build_row(s, u->d, j, k);
+            if (s->uniform)
+                gs4i_build_uniform_row(s, u->d, j, k, 2 * span[0],
+                                       2 * span[1] < g->n[0] ? 2 * span[1] : g->n[0]);
+            else
+                gs4i_build_row(s, u->d, j, k);
             if (span[0] >= span[1]) continue;
-            first = span[0] / 2 / GS4I_STRIP * GS4I_STRIP; last = (span[1] / 2 + GS4I_STRIP - 1) / GS4I_STRIP * GS4I_STRIP;
+            first = span[0] / 2 / GS4I_STRIP * GS4I_STRIP;
+            last = (span[1] / 2 + GS4I_STRIP - 1) / GS4I_STRIP * GS4I_STRIP;
             if (first < wide[0]) wide[0] = first;
             if (last > wide[1]) wide[1] = last;
         }
-    for (j = 0; j < h->n[1]; j++) if (!h->span[2 * (K * h->n[1] + j) + 1]) h->span[2 * (K * h->n[1] + j)] = 0;
+    for (j = 0; j < h->n[1]; j++)
+        if (!h->span[2 * (K * h->n[1] + j) + 1]) h->span[2 * (K * h->n[1] + j)] = 0;
 }
 
 /* Sum of the faces of a cell of level 1. */
 static float gs4i_faces(const gs4i_masked *g, int c, size_t at, int t)
 {
-    return ((g->w[0][!c][at + (size_t)t - 1] + g->w[0][c][at]) + (g->w[1][!c][at - g->stride] + g->w[1][c][at]))
-         + (g->w[2][!c][at - g->plane] + g->w[2][c][at]);
+    return ((g->w[0][!c][at + (size_t)t - 1] + g->w[0][c][at])
+            + (g->w[1][!c][at - g->stride] + g->w[1][c][at]))
+           + (g->w[2][!c][at - g->plane] + g->w[2][c][at]);
 }
 
 static void gs4i_build_inverse(int k, void *context)
 {
     const gs4i_masked *g = &((const gs4i_setup *)context)->s->level[1];
     int j, c, m;
-    for (j = 0; j < g->n[1]; j++) for (c = 0; c < 2; c++) {
-        const size_t row = gs4i_row_of(g, j, k);
-        const int t = (c + j + k) & 1;
-        for (m = 0; m < g->width; m++) {
-            const float sum = g->mass[c][row + (size_t)m] + gs4i_faces(g, c, row + (size_t)m, t);
-            g->inverse[c][row + (size_t)m] = sum > 0 ? 1 / sum : 0;
+    for (j = 0; j < g->n[1]; j++)
+        for (c = 0; c < 2; c++) {
+            const size_t row = gs4i_row_of(g, j, k);
+            const int t = (c + j + k) & 1;
+            for (m = 0; m < g->width; m++) {
+                const float sum =
+                    g->mass[c][row + (size_t)m] + gs4i_faces(g, c, row + (size_t)m, t);
+                g->inverse[c][row + (size_t)m] = sum > 0 ? 1 / sum : 0;
+            }
         }
-    }
 }
 
 /* Slabs of equal work for the tasks of a sweep: thick enough for its stages, at even planes. */
@@ -2138,14 +2680,16 @@ static void gs4i_cut(gs4i_solver *s, int level, int slabs)
     s->cut[level][0] = 0;
     for (k = 0; k < g->n[2]; k++) {
         const int thick = k - s->cut[level][count - 1] >= 16 && g->n[2] - k >= 16;
-        if (count < slabs && thick && !(k & 1) && done >= all * count / slabs) s->cut[level][count++] = k;
-        for (j = (size_t)k * rows; j < (size_t)(k + 1) * rows; j++) done += g->span[2 * j + 1] - g->span[2 * j] + 1;
+        if (count < slabs && thick && !(k & 1) && done >= all * count / slabs)
+            s->cut[level][count++] = k;
+        for (j = (size_t)k * rows; j < (size_t)(k + 1) * rows; j++)
+            done += g->span[2 * j + 1] - g->span[2 * j] + 1;
     }
     s->cut[level][count] = g->n[2];
     s->slabs[level] = count;
 }
 
-/* --- setup: connected groups ------------------------------------------------------------------------------------ */
+/* --- setup: connected groups ------------------------------------------------------------------ */
 
 /* Colours and places of the eight cells of level 1 in a block; number x + 2 y + 4 z. */
 GS4I_INLINE int gs4i_child_colour(int q) { return (q ^ (q >> 1) ^ (q >> 2)) & 1; }
@@ -2153,21 +2697,29 @@ GS4I_INLINE size_t gs4i_child(const gs4i_masked *g, size_t block, int q)
 {
     return block + (size_t)(q >> 1 & 1) * g->stride + (size_t)(q >> 2) * g->plane;
 }
-GS4I_INLINE size_t gs4i_block_of(const gs4i_masked *g, int I, int J, int K) { return gs4i_row_of(g, 2 * J, 2 * K) + (size_t)I; }
+GS4I_INLINE size_t gs4i_block_of(const gs4i_masked *g, int I, int J, int K)
+{
+    return gs4i_row_of(g, 2 * J, 2 * K) + (size_t)I;
+}
 
 static float gs4i_strongest(const gs4i_masked *g, int c, size_t at, int t)
 {
-    const float w[6] = { g->w[0][!c][at + (size_t)t - 1], g->w[0][c][at], g->w[1][!c][at - g->stride], g->w[1][c][at],
-                         g->w[2][!c][at - g->plane], g->w[2][c][at] };
+    const float w[6] = { g->w[0][!c][at + (size_t)t - 1], g->w[0][c][at],
+                         g->w[1][!c][at - g->stride],     g->w[1][c][at],
+                         g->w[2][!c][at - g->plane],      g->w[2][c][at] };
     float most = 0;
     int f;
-    for (f = 0; f < 6; f++) if (w[f] > most) most = w[f];
+    for (f = 0; f < 6; f++)
+        if (w[f] > most) most = w[f];
     return most;
 }
 
-/* Whether a link joins two cells: not if they have much stronger ones. The two sides of a door must not become one unknown, nor a
- * room and what a block holds of the next one. */
-GS4I_INLINE int gs4i_is_strong(float w, float most, float other, float strong) { return w > 0 && w * w >= strong * strong * most * other; }
+/* Whether a link joins two cells: not if they have much stronger ones. The two sides of a door
+ * must not become one unknown, nor a room and what a block holds of the next one. */
+GS4I_INLINE int gs4i_is_strong(float w, float most, float other, float strong)
+{
+    return w > 0 && w * w >= strong * strong * most * other;
+}
 
 /* Groups of a block: of each cell the first cell of its group, -1 without edges. */
 static void gs4i_group_block(const gs4i_masked *g, size_t block, int group[8])
@@ -2178,27 +2730,40 @@ static void gs4i_group_block(const gs4i_masked *g, size_t block, int group[8])
         most[q] = gs4i_strongest(g, gs4i_child_colour(q), gs4i_child(g, block, q), q & 1);
         group[q] = most[q] > 0 ? q : -1;
     }
-    for (q = 0; q < 8; q++) for (a = 0; a < 3; a++) {
-        const int other = q | 1 << a;
-        int from, into;
-        if (other == q || !gs4i_is_strong(g->w[a][gs4i_child_colour(q)][gs4i_child(g, block, q)], most[q], most[other], GS4I_STRONG)) continue;
-        from = group[q] > group[other] ? group[q] : group[other]; into = group[q] + group[other] - from;
-        for (i = 0; i < 8; i++) if (group[i] == from) group[i] = into;
-    }
+    for (q = 0; q < 8; q++)
+        for (a = 0; a < 3; a++) {
+            const int other = q | 1 << a;
+            int from, into;
+            if (other == q
+                || !gs4i_is_strong(g->w[a][gs4i_child_colour(q)][gs4i_child(g, block, q)], most[q],
+                                   most[other], GS4I_STRONG))
+                continue;
+            from = group[q] > group[other] ? group[q] : group[other];
+            into = group[q] + group[other] - from;
+            for (i = 0; i < 8; i++)
+                if (group[i] == from) group[i] = into;
+        }
 }
 
-/* Blocks in the bulk, where all links of all eight cells are equal: that link, 0 for other blocks. Most blocks are in the bulk, and what
- * follows is quick there. In x, which is larger: a float for 64 cells. */
+/* Blocks in the bulk, where all links of all eight cells are equal: that link, 0 for other
+ * blocks. Most blocks are in the bulk, and what follows is quick there. In x, which is larger: a
+ * float for 64 cells. */
 GS4I_INLINE float *gs4i_bulk(const gs4i_solver *s, int I, int J, int K)
 {
     const int *n = s->level[1].n;
-    return (float *)(void *)s->x[0] + ((size_t)K * (size_t)((n[1] + 1) / 2) + (size_t)J) * (size_t)((n[0] + 1) / 2) + (size_t)I;
+    return (float *)(void *)s->x[0]
+           + ((size_t)K * (size_t)((n[1] + 1) / 2) + (size_t)J) * (size_t)((n[0] + 1) / 2)
+           + (size_t)I;
 }
 
-static void gs4i_see_link(float *GS4I_RESTRICT least, float *GS4I_RESTRICT most, const float *GS4I_RESTRICT w)
+static void gs4i_see_link(float *GS4I_RESTRICT least, float *GS4I_RESTRICT most,
+                          const float *GS4I_RESTRICT w)
 {
     int l;
-    for (l = 0; l < GS4I_STRIP; l++) { least[l] = w[l] < least[l] ? w[l] : least[l]; most[l] = w[l] > most[l] ? w[l] : most[l]; }
+    for (l = 0; l < GS4I_STRIP; l++) {
+        least[l] = w[l] < least[l] ? w[l] : least[l];
+        most[l] = w[l] > most[l] ? w[l] : most[l];
+    }
 }
 
 static void gs4i_find_bulk(const gs4i_solver *s, int J, int K)
@@ -2208,14 +2773,22 @@ static void gs4i_find_bulk(const gs4i_solver *s, int J, int K)
     int I, l, q, a;
     for (I = 0; I < (g->n[0] + 1) / 2; I += GS4I_STRIP) {
         const size_t block = gs4i_block_of(g, I, J, K);
-        memcpy(least, g->w[0][0] + block, sizeof least); memcpy(most, least, sizeof most);
-        for (q = 0; q < 8; q++) for (a = 0; a < 3; a++) {
-            const int c = gs4i_child_colour(q);
-            const size_t at = gs4i_child(g, block, q);
-            gs4i_see_link(least, most, g->w[a][c] + at);
-            if (!(q >> a & 1)) gs4i_see_link(least, most, g->w[a][!c] + at - (a == 0 ? 1 : a == 1 ? g->stride : g->plane));
-        }
-        for (l = 0; l < GS4I_STRIP && I + l < (g->n[0] + 1) / 2; l++) *gs4i_bulk(s, I + l, J, K) = least[l] == most[l] ? most[l] : 0;
+        memcpy(least, g->w[0][0] + block, sizeof least);
+        memcpy(most, least, sizeof most);
+        for (q = 0; q < 8; q++)
+            for (a = 0; a < 3; a++) {
+                const int c = gs4i_child_colour(q);
+                const size_t at = gs4i_child(g, block, q);
+                gs4i_see_link(least, most, g->w[a][c] + at);
+                if (!(q >> a & 1))
+                    gs4i_see_link(least, most,
+                                  g->w[a][!c] + at
+                                      - (a == 0   ? 1
+                                         : a == 1 ? g->stride
+                                                  : g->plane));
+            }
+        for (l = 0; l < GS4I_STRIP && I + l < (g->n[0] + 1) / 2; l++)
+            *gs4i_bulk(s, I + l, J, K) = least[l] == most[l] ? most[l] : 0;
     }
 }
 
@@ -2227,22 +2800,27 @@ static void gs4i_number_groups(int K, void *context)
     int32_t *count = u->counts + 2 * K, number[8];
     int group[8], I, J, q;
     count[0] = count[1] = 0;
-    for (J = 2 * K * g->n[1]; J < 2 * (K + 1) * g->n[1] && J < g->n[1] * g->n[2]; J++)        /* no parent behind the end of a row either */
-        memset(s->parent[0] + gs4i_row_of(g, J % g->n[1], J / g->n[1]), 0xff, g->stride * sizeof(int32_t));
-    for (J = 0; J < (g->n[1] + 1) / 2; J++) for (gs4i_find_bulk(s, J, K), I = 0; I < (g->n[0] + 1) / 2; I++) {
-        const size_t block = gs4i_block_of(g, I, J, K);
-        if (*gs4i_bulk(s, I, J, K) > 0) {
-            const int32_t one = count[(I + J + K) & 1]++;
-            for (q = 0; q < 8; q++) s->parent[gs4i_child_colour(q)][gs4i_child(g, block, q)] = one;
-            continue;
+    /* no parent behind the end of a row either */
+    for (J = 2 * K * g->n[1]; J < 2 * (K + 1) * g->n[1] && J < g->n[1] * g->n[2]; J++)
+        memset(s->parent[0] + gs4i_row_of(g, J % g->n[1], J / g->n[1]), 0xff,
+               g->stride * sizeof(int32_t));
+    for (J = 0; J < (g->n[1] + 1) / 2; J++)
+        for (gs4i_find_bulk(s, J, K), I = 0; I < (g->n[0] + 1) / 2; I++) {
+            const size_t block = gs4i_block_of(g, I, J, K);
+            if (*gs4i_bulk(s, I, J, K) > 0) {
+                const int32_t one = count[(I + J + K) & 1]++;
+                for (q = 0; q < 8; q++)
+                    s->parent[gs4i_child_colour(q)][gs4i_child(g, block, q)] = one;
+                continue;
+            }
+            gs4i_group_block(g, block, group);
+            for (q = 0; q < 8; q++) {
+                if (group[q] == q) number[q] = count[(I + J + K) & 1]++;
+                if (2 * J + (q >> 1 & 1) < g->n[1] && 2 * K + (q >> 2) < g->n[2])
+                    s->parent[gs4i_child_colour(q)][gs4i_child(g, block, q)] =
+                        group[q] < 0 ? -1 : number[group[q]];
+            }
         }
-        gs4i_group_block(g, block, group);
-        for (q = 0; q < 8; q++) {
-            if (group[q] == q) number[q] = count[(I + J + K) & 1]++;
-            if (2 * J + (q >> 1 & 1) < g->n[1] && 2 * K + (q >> 2) < g->n[2])
-                s->parent[gs4i_child_colour(q)][gs4i_child(g, block, q)] = group[q] < 0 ? -1 : number[group[q]];
-        }
-    }
 }
 
 /* Of a face in series with the ways to it on either side, at least `least` of the face's own. */
@@ -2252,25 +2830,28 @@ GS4I_INLINE float gs4i_conductance(float w, float way, float other, float least)
     return series > least * w ? series : least * w;
 }
 
-/* What a face adds to that between two groups: the face in series with half of the link that either cell has along the same axis within
- * its group, which is the conductance between their centres. Half the face in the midst of things, more of it where a wall has left
- * one layer, and at a door in a wall it stays what it is however coarse the graph: halved as on the grids, doors all but close, and
- * rooms behind them take 48 iterations instead of 19. */
+/* What a face adds to that between two groups: the face in series with half of the link that
+ * either cell has along the same axis within its group, which is the conductance between their
+ * centres. Half the face in the midst of things, more of it where a wall has left one layer, and
+ * at a door in a wall it stays what it is however coarse the graph: halved as on the grids,
+ * doors all but close, and rooms behind them take 48 iterations instead of 19. */
 GS4I_INLINE float gs4i_series(float w, float link, float other)
 {
-    if (link == w && other == w) return 0.5f * w;           /* no division in the midst of things */
+    if (link == w && other == w) return 0.5f * w; /* no division in the midst of things */
     return gs4i_conductance(w, link > 0 ? 0.5f / link : 0, other > 0 ? 0.5f / other : 0, 0.35f);
 }
 
-/* The same within a block of blocks, where groups are chains and heaps without an axis: from the end of a chain of n it is (n-1)/2 links
- * to its middle, in heaps less. 0.12 to 0.18 are alike; without it a serpentine of plates takes 29 iterations instead of 20. */
+/* The same within a block of blocks, where groups are chains and heaps without an axis: from the
+ * end of a chain of n it is (n-1)/2 links to its middle, in heaps less. 0.12 to 0.18 are alike;
+ * without it a serpentine of plates takes 29 iterations instead of 20. */
 GS4I_INLINE float gs4i_chain(float w, float links, int n, float other_links, int other_n)
 {
-    return gs4i_conductance(w, n > 1 ? 0.15f * (float)(n - 1) / links : 0, other_n > 1 ? 0.15f * (float)(other_n - 1) / other_links : 0, 0.1f);
+    return gs4i_conductance(w, n > 1 ? 0.15f * (float)(n - 1) / links : 0,
+                            other_n > 1 ? 0.15f * (float)(other_n - 1) / other_links : 0, 0.1f);
 }
 
-/* What the air next to a cell is to the coarse cell: 3/4 at a surface, measured best; all of it where it is small beside the cell's links,
- * as a bubble of one cell is on coarse levels. */
+/* What the air next to a cell is to the coarse cell: 3/4 at a surface, measured best; all of it
+ * where it is small beside the cell's links, as a bubble of one cell is on coarse levels. */
 GS4I_INLINE float gs4i_air(float air, float link)
 {
     const float part = air > 0 ? link / (link + 0.5f * air) : 0;
@@ -2285,48 +2866,58 @@ static void gs4i_fill_groups(int K, void *context)
     const gs4i_masked *g = &s->level[1];
     gs4i_graph *up = &s->graph[0];
     int I, J, q;
-    for (J = 0; J < (g->n[1] + 1) / 2; J++) for (I = 0; I < (g->n[0] + 1) / 2; I++)
-        for (q = 0; q < 8; q++) {
-            const size_t block = gs4i_block_of(g, I, J, K);
-            const int c = gs4i_child_colour(q);
-            const size_t at = gs4i_child(g, block, q);
-            int32_t *parent = &s->parent[c][at];
-            float mass;
-            if (2 * J + (q >> 1 & 1) >= g->n[1] || 2 * K + (q >> 2) >= g->n[2] || *parent < 0) continue;
-            *parent += u->counts[2 * K + ((I + J + K) & 1)];
-            mass = g->mass[c][at] - g->z[c][at];
-            if (g->z[c][at] > 0) up->air[*parent] += gs4i_air(g->z[c][at], gs4i_strongest(g, c, at, q & 1));
-            up->mass[*parent] += mass > 0 ? mass : 0;
-            up->block[*parent] = (uint64_t)I | (uint64_t)J << 21 | (uint64_t)K << 42;
-        }
+    for (J = 0; J < (g->n[1] + 1) / 2; J++)
+        for (I = 0; I < (g->n[0] + 1) / 2; I++)
+            for (q = 0; q < 8; q++) {
+                const size_t block = gs4i_block_of(g, I, J, K);
+                const int c = gs4i_child_colour(q);
+                const size_t at = gs4i_child(g, block, q);
+                int32_t *parent = &s->parent[c][at];
+                float mass;
+                if (2 * J + (q >> 1 & 1) >= g->n[1] || 2 * K + (q >> 2) >= g->n[2] || *parent < 0)
+                    continue;
+                *parent += u->counts[2 * K + ((I + J + K) & 1)];
+                mass = g->mass[c][at] - g->z[c][at];
+                if (g->z[c][at] > 0)
+                    up->air[*parent] += gs4i_air(g->z[c][at], gs4i_strongest(g, c, at, q & 1));
+                up->mass[*parent] += mass > 0 ? mass : 0;
+                up->block[*parent] = (uint64_t)I | (uint64_t)J << 21 | (uint64_t)K << 42;
+            }
 }
 
-typedef struct gs4i_edge { int32_t from, to; float w; } gs4i_edge;
+typedef struct gs4i_edge {
+    int32_t from, to;
+    float w;
+} gs4i_edge;
 
 /* Link of cell `bits` of a block to the other one along axis a in it. */
 GS4I_INLINE float gs4i_link(const gs4i_masked *g, int c, size_t at, int bits, int a)
 {
-    return !(bits >> a & 1) ? g->w[a][c][at] : g->w[a][!c][a == 0 ? at : at - (a == 1 ? g->stride : g->plane)];
+    return !(bits >> a & 1) ? g->w[a][c][at]
+                            : g->w[a][!c][a == 0 ? at : at - (a == 1 ? g->stride : g->plane)];
 }
 
 /* Edges of a block in the bulk among others there; 0 if it is not. */
 GS4I_INLINE int gs4i_bulk_edges(const gs4i_solver *s, int I, int J, int K, gs4i_edge *edge)
 {
-    static const int beside[6][3] = { { -1, 0, 0 }, { 1, 0, 0 }, { 0, -1, 0 }, { 0, 1, 0 }, { 0, 0, -1 }, { 0, 0, 1 } };
+    static const int beside[6][3] = { { -1, 0, 0 }, { 1, 0, 0 },  { 0, -1, 0 },
+                                      { 0, 1, 0 },  { 0, 0, -1 }, { 0, 0, 1 } };
     const gs4i_masked *g = &s->level[1];
     const float w = *gs4i_bulk(s, I, J, K);
     int f;
-    for (f = 0; f < 6 && w > 0; f++) {                      /* around the bulk there are blocks */
+    for (f = 0; f < 6 && w > 0; f++) { /* around the bulk there are blocks */
         const int i = I + beside[f][0], j = J + beside[f][1], k = K + beside[f][2];
         if (!(*gs4i_bulk(s, i, j, k) > 0)) return 0;
-        edge[f].from = s->parent[0][gs4i_block_of(g, I, J, K)]; edge[f].to = s->parent[0][gs4i_block_of(g, i, j, k)];
+        edge[f].from = s->parent[0][gs4i_block_of(g, I, J, K)];
+        edge[f].to = s->parent[0][gs4i_block_of(g, i, j, k)];
         edge[f].w = 4 * (0.5f * w);
     }
     return f;
 }
 
 /* Edges from the groups of a block to groups around, each once; their w where `weigh`. */
-GS4I_INLINE int gs4i_block_edges(const gs4i_solver *s, int I, int J, int K, gs4i_edge *edge, int weigh)
+GS4I_INLINE int gs4i_block_edges(const gs4i_solver *s, int I, int J, int K, gs4i_edge *edge,
+                                 int weigh)
 {
     const gs4i_masked *g = &s->level[1];
     const size_t block = gs4i_block_of(g, I, J, K);
@@ -2335,17 +2926,34 @@ GS4I_INLINE int gs4i_block_edges(const gs4i_solver *s, int I, int J, int K, gs4i
     for (q = 0; q < 8; q++) {
         const int c = gs4i_child_colour(q);
         const size_t at = gs4i_child(g, block, q);
-        if (2 * J + (q >> 1 & 1) >= g->n[1] || 2 * K + (q >> 2) >= g->n[2] || s->parent[c][at] < 0) continue;
+        if (2 * J + (q >> 1 & 1) >= g->n[1] || 2 * K + (q >> 2) >= g->n[2] || s->parent[c][at] < 0)
+            continue;
         for (f = 0; f < 6; f++) {
             const int a = f >> 1, high = f & 1, x = q & 1;
-            const size_t step = a == 1 ? g->stride : g->plane, beside = a ? (high ? at + step : at - step) : high ? at + (size_t)x : at + (size_t)x - 1;
+            const size_t step = a == 1 ? g->stride : g->plane,
+                         beside = a      ? (high ? at + step : at - step)
+                                  : high ? at + (size_t)x
+                                         : at + (size_t)x - 1;
             const float w = high ? g->w[a][c][at] : g->w[a][!c][beside];
             if (!(w > 0) || s->parent[!c][beside] == s->parent[c][at]) continue;
-            for (e = count - 1; e >= 0 && !(edge[e].from == s->parent[c][at] && edge[e].to == s->parent[!c][beside]); e--) {}
-            if (e < 0) { e = count; edge[e].from = s->parent[c][at]; edge[e].to = s->parent[!c][beside]; edge[e].w = 0; count++; }
+            for (e = count - 1;
+                 e >= 0
+                 && !(edge[e].from == s->parent[c][at] && edge[e].to == s->parent[!c][beside]);
+                 e--) {
+            }
+            if (e < 0) {
+                e = count;
+                edge[e].from = s->parent[c][at];
+                edge[e].to = s->parent[!c][beside];
+                edge[e].w = 0;
+                count++;
+            }
             if (!weigh) continue;
-            if ((q >> a & 1) != high) edge[e].w += w;       /* a weak link within the block */
-            else edge[e].w += gs4i_series(w, gs4i_link(g, c, at, q, a), gs4i_link(g, !c, beside, q ^ 1 << a, a));
+            if ((q >> a & 1) != high)
+                edge[e].w += w; /* a weak link within the block */
+            else
+                edge[e].w += gs4i_series(w, gs4i_link(g, c, at, q, a),
+                                         gs4i_link(g, !c, beside, q ^ 1 << a, a));
         }
     }
     return count;
@@ -2357,8 +2965,10 @@ static void gs4i_count_edges(int K, void *context)
     const gs4i_masked *g = &u->s->level[1];
     gs4i_edge edge[48];
     int I, J, e;
-    for (J = 0; J < (g->n[1] + 1) / 2; J++) for (I = 0; I < (g->n[0] + 1) / 2; I++)
-        for (e = gs4i_block_edges(u->s, I, J, K, edge, 0) - 1; e >= 0; e--) u->s->graph[0].start[edge[e].from + 1]++;
+    for (J = 0; J < (g->n[1] + 1) / 2; J++)
+        for (I = 0; I < (g->n[0] + 1) / 2; I++)
+            for (e = gs4i_block_edges(u->s, I, J, K, edge, 0) - 1; e >= 0; e--)
+                u->s->graph[0].start[edge[e].from + 1]++;
 }
 
 static void gs4i_fill_edges(int K, void *context)
@@ -2368,14 +2978,16 @@ static void gs4i_fill_edges(int K, void *context)
     gs4i_graph *up = &u->s->graph[0];
     gs4i_edge edge[48];
     int I, J, e, f, count;
-    for (J = 0; J < (g->n[1] + 1) / 2; J++) for (I = 0; I < (g->n[0] + 1) / 2; I++) {
-        count = gs4i_block_edges(u->s, I, J, K, edge, 1);
-        for (e = 0; e < count; e++) {
-            int32_t place = up->start[edge[e].from];
-            for (f = 0; f < e; f++) place += edge[f].from == edge[e].from;
-            up->to[place] = edge[e].to; up->w[place] = edge[e].w;
+    for (J = 0; J < (g->n[1] + 1) / 2; J++)
+        for (I = 0; I < (g->n[0] + 1) / 2; I++) {
+            count = gs4i_block_edges(u->s, I, J, K, edge, 1);
+            for (e = 0; e < count; e++) {
+                int32_t place = up->start[edge[e].from];
+                for (f = 0; f < e; f++) place += edge[f].from == edge[e].from;
+                up->to[place] = edge[e].to;
+                up->w[place] = edge[e].w;
+            }
         }
-    }
 }
 
 static int gs4i_reserve_nodes(gs4i_solver *s, gs4i_graph *g, int n, int reds)
@@ -2383,12 +2995,15 @@ static int gs4i_reserve_nodes(gs4i_solver *s, gs4i_graph *g, int n, int reds)
     char *base = NULL;
     size_t used;
     int pass;
-    g->n = n; g->reds = reds; g->mixed = 0;
+    g->n = n;
+    g->reds = reds;
+    g->mixed = 0;
     for (pass = 0; pass < 2; pass++) {
         float **const numbers[6] = { &g->inverse, &g->diagonal, &g->air, &g->mass, &g->b, &g->x };
         int i;
         used = 0;
-        for (i = 0; i < 6; i++) *numbers[i] = (float *)gs4i_carve(base, &used, (size_t)n, sizeof(float));
+        for (i = 0; i < 6; i++)
+            *numbers[i] = (float *)gs4i_carve(base, &used, (size_t)n, sizeof(float));
         g->start = (int32_t *)gs4i_carve(base, &used, (size_t)n + 1, sizeof(int32_t));
         g->parent = (int32_t *)gs4i_carve(base, &used, (size_t)n, sizeof(int32_t));
         g->block = (uint64_t *)gs4i_carve(base, &used, (size_t)n, sizeof(uint64_t));
@@ -2405,7 +3020,8 @@ static int gs4i_reserve_edges(gs4i_solver *s, gs4i_graph *g)
     int i;
     for (i = 0; i < g->n; i++) g->start[i + 1] += g->start[i];
     count = (size_t)g->start[g->n];
-    if (gs4i_reserve(s, &g->edges, 2 * count * sizeof(float) + 128, 0) != GS4_OK) return GS4_ERROR_MEMORY;
+    if (gs4i_reserve(s, &g->edges, 2 * count * sizeof(float) + 128, 0) != GS4_OK)
+        return GS4_ERROR_MEMORY;
     g->to = (int32_t *)gs4i_carve((char *)g->edges.data, &used, count, sizeof(int32_t));
     g->w = (float *)gs4i_carve((char *)g->edges.data, &used, count, sizeof(float));
     return GS4_OK;
@@ -2416,8 +3032,12 @@ static void gs4i_finish_graph(gs4i_graph *g)
     int i, e;
     for (i = 0; i < g->n; i++) {
         float sum = g->air[i] + g->mass[i];
-        for (e = g->start[i]; e < g->start[i + 1]; e++) { sum += g->w[e]; g->mixed |= (i < g->reds) == (g->to[e] < g->reds); }
-        g->diagonal[i] = sum; g->inverse[i] = sum > 0 ? 1 / sum : 0;
+        for (e = g->start[i]; e < g->start[i + 1]; e++) {
+            sum += g->w[e];
+            g->mixed |= (i < g->reds) == (g->to[e] < g->reds);
+        }
+        g->diagonal[i] = sum;
+        g->inverse[i] = sum > 0 ? 1 / sum : 0;
     }
 }
 
@@ -2430,7 +3050,11 @@ static int gs4i_build_groups(gs4i_setup *u)
     int k, c;
     gs4i_parallel_for(s->tasks, planes, gs4i_number_groups, u);
     for (c = 0; c < 2; c++) {
-        for (k = 0; k < planes; k++) { count = u->counts[2 * k + c]; u->counts[2 * k + c] = nodes; nodes += count; }
+        for (k = 0; k < planes; k++) {
+            count = u->counts[2 * k + c];
+            u->counts[2 * k + c] = nodes;
+            nodes += count;
+        }
         if (c == 0) reds = nodes;
     }
     if (gs4i_reserve_nodes(s, &s->graph[0], nodes, reds) != GS4_OK) return GS4_ERROR_MEMORY;
@@ -2446,93 +3070,138 @@ static int gs4i_build_groups(gs4i_setup *u)
 
 #define GS4I_LOWEST_BITS ((uint64_t)1 | (uint64_t)1 << 21 | (uint64_t)1 << 42)
 
-/* Nodes of a graph joined by edges within a block of blocks, at most `most` of them, the stronger edges first; g->parent becomes a node
- * of the next graph. */
-static void gs4i_join_nodes(gs4i_graph *g, float strong, int most, int32_t *number, int *reds, int *blacks)
+/* Nodes of a graph joined by edges within a block of blocks, at most `most` of them, the
+ * stronger edges first; g->parent becomes a node of the next graph. */
+static void gs4i_join_nodes(gs4i_graph *g, float strong, int most, int32_t *number, int *reds,
+                            int *blacks)
 {
     int32_t *root = g->parent;
     int i, e, pass;
     *reds = *blacks = 0;
-    for (i = 0; i < g->n; i++) {                            /* x: the strongest edge, while setting up */
+    /* x: the strongest edge, while setting up */
+    for (i = 0; i < g->n; i++) {
         g->x[i] = 0;
-        for (e = g->start[i]; e < g->start[i + 1]; e++) if (g->w[e] > g->x[i]) g->x[i] = g->w[e];
+        for (e = g->start[i]; e < g->start[i + 1]; e++)
+            if (g->w[e] > g->x[i]) g->x[i] = g->w[e];
     }
-    for (i = 0; i < g->n; i++) { root[i] = g->start[i] < g->start[i + 1] ? i : -1; number[i] = 1; }
-    for (pass = 2; pass > 0; pass--) for (i = 0; i < g->n; i++) for (e = g->start[i]; e < g->start[i + 1]; e++) {
-        int32_t a = i, b = g->to[e];
-        if ((g->block[a] ^ g->block[b]) & ~GS4I_LOWEST_BITS || !gs4i_is_strong(g->w[e], g->x[a], g->x[b], (float)pass * strong)) continue;
-        while (root[a] != a) a = root[a] = root[root[a]];
-        while (root[b] != b) b = root[b] = root[root[b]];
-        if (a == b || number[a] + number[b] > most) continue;
-        if (a > b) { const int32_t m = a; a = b; b = m; }
-        root[b] = a; number[a] += number[b];
+    for (i = 0; i < g->n; i++) {
+        root[i] = g->start[i] < g->start[i + 1] ? i : -1;
+        number[i] = 1;
     }
+    for (pass = 2; pass > 0; pass--)
+        for (i = 0; i < g->n; i++)
+            for (e = g->start[i]; e < g->start[i + 1]; e++) {
+                int32_t a = i, b = g->to[e];
+                if ((g->block[a] ^ g->block[b]) & ~GS4I_LOWEST_BITS
+                    || !gs4i_is_strong(g->w[e], g->x[a], g->x[b], (float)pass * strong))
+                    continue;
+                while (root[a] != a) a = root[a] = root[root[a]];
+                while (root[b] != b) b = root[b] = root[root[b]];
+                if (a == b || number[a] + number[b] > most) continue;
+                if (a > b) {
+                    const int32_t m = a;
+                    a = b;
+                    b = m;
+                }
+                root[b] = a;
+                number[a] += number[b];
+            }
     for (i = 0; i < g->n; i++) {
         const uint64_t block = g->block[i] >> 1;
         if (root[i] < 0) continue;
-        if (root[i] == i) number[i] = (block ^ block >> 21 ^ block >> 42) & 1 ? -1 - (*blacks)++ : (*reds)++;
-        else root[i] = root[root[i]];                       /* a root is before all that it holds */
+        if (root[i] == i)
+            number[i] = (block ^ block >> 21 ^ block >> 42) & 1 ? -1 - (*blacks)++ : (*reds)++;
+        else
+            root[i] = root[root[i]]; /* a root is before all that it holds */
     }
-    for (i = 0; i < g->n; i++) if (root[i] >= 0) { const int32_t m = number[root[i]]; root[i] = m < 0 ? *reds - 1 - m : m; }
+    for (i = 0; i < g->n; i++)
+        if (root[i] >= 0) {
+            const int32_t m = number[root[i]];
+            root[i] = m < 0 ? *reds - 1 - m : m;
+        }
 }
 
 /* Axis along which the blocks of two joined nodes are neighbours. */
-GS4I_INLINE int gs4i_axis(uint64_t a, uint64_t b) { return (a ^ b) >> 42 ? 2 : (a ^ b) >> 21 ? 1 : 0; }
+GS4I_INLINE int gs4i_axis(uint64_t a, uint64_t b)
+{
+    return (a ^ b) >> 42 ? 2 : (a ^ b) >> 21 ? 1 : 0;
+}
 
 /* Links of each node within its group: along each axis, and all. */
 static void gs4i_find_links(const gs4i_graph *g, float (*link)[4])
 {
     int i, e;
     memset(link, 0, (size_t)g->n * sizeof *link);
-    for (i = 0; i < g->n; i++) for (e = g->start[i]; e < g->start[i + 1]; e++) {
-        if (g->parent[g->to[e]] != g->parent[i]) continue;
-        if (g->block[g->to[e]] != g->block[i]) link[i][gs4i_axis(g->block[i], g->block[g->to[e]])] += g->w[e];
-        link[i][3] += g->w[e];
-    }
+    for (i = 0; i < g->n; i++)
+        for (e = g->start[i]; e < g->start[i + 1]; e++) {
+            if (g->parent[g->to[e]] != g->parent[i]) continue;
+            if (g->block[g->to[e]] != g->block[i])
+                link[i][gs4i_axis(g->block[i], g->block[g->to[e]])] += g->w[e];
+            link[i][3] += g->w[e];
+        }
 }
 
-/* The next graph from the last. Its tables are in x, which is larger: 28 bytes a node, at most a node for eight cells. */
+/* The next graph from the last. Its tables are in x, which is larger: 28 bytes a node, at most a
+ * node for eight cells. */
 static int gs4i_coarsen_graph(gs4i_solver *s)
 {
     gs4i_graph *g = &s->graph[s->graphs - 1], *up = &s->graph[s->graphs];
     int32_t *first, *child, *place;
-    float (*link)[4];
-    const int all = s->graphs > GS4I_GRAPHS / 2;            /* blocks grow, so graphs end */
-    const int bulk = (int)(3 * (int64_t)g->start[g->n] / g->n) - 4;         /* blocks in the bulk, four of a chain */
+    float(*link)[4];
+    const int all = s->graphs > GS4I_GRAPHS / 2; /* blocks grow, so graphs end */
+    /* blocks in the bulk, four of a chain */
+    const int bulk = (int)(3 * (int64_t)g->start[g->n] / g->n) - 4;
     float strong = all ? 0 : GS4I_STRONG;
     int most = all ? g->n : bulk > 4 ? bulk : 4, reds, blacks, i, j, e, pass;
-    first = (int32_t *)(void *)s->x[0]; child = first + g->n + 2; place = child + g->n;
+    first = (int32_t *)(void *)s->x[0];
+    child = first + g->n + 2;
+    place = child + g->n;
     for (;;) {
         gs4i_join_nodes(g, strong, most, first, &reds, &blacks);
         if (5 * (int64_t)(reds + blacks) <= 4 * (int64_t)g->n || strong < 1e-3f) break;
-        strong *= 0.25f; most = most < g->n / 4 ? 4 * most : g->n;
+        strong *= 0.25f;
+        most = most < g->n / 4 ? 4 * most : g->n;
     }
-    link = (float (*)[4])(void *)(place + g->n);
+    link = (float(*)[4])(void *)(place + g->n);
     gs4i_find_links(g, link);
     if (gs4i_reserve_nodes(s, up, reds + blacks, reds) != GS4_OK) return GS4_ERROR_MEMORY;
     memset(first, 0, ((size_t)up->n + 2) * sizeof *first);
-    for (i = 0; i < g->n; i++) if (g->parent[i] >= 0) {
-        up->air[g->parent[i]] += gs4i_air(g->air[i], g->x[i]); up->mass[g->parent[i]] += g->mass[i];
-        up->block[g->parent[i]] = (g->block[i] & ~GS4I_LOWEST_BITS) >> 1;
-        first[g->parent[i] + 2]++;
-    }
+    for (i = 0; i < g->n; i++)
+        if (g->parent[i] >= 0) {
+            up->air[g->parent[i]] += gs4i_air(g->air[i], g->x[i]);
+            up->mass[g->parent[i]] += g->mass[i];
+            up->block[g->parent[i]] = (g->block[i] & ~GS4I_LOWEST_BITS) >> 1;
+            first[g->parent[i] + 2]++;
+        }
     for (i = 0; i < up->n; i++) first[i + 2] += first[i + 1];
-    for (i = 0; i < g->n; i++) if (g->parent[i] >= 0) child[first[g->parent[i] + 1]++] = i;
-    for (pass = 0; pass < 2; pass++) {                      /* count edges, then fill them in */
+    for (i = 0; i < g->n; i++)
+        if (g->parent[i] >= 0) child[first[g->parent[i] + 1]++] = i;
+    for (pass = 0; pass < 2; pass++) { /* count edges, then fill them in */
         int32_t next = 0;
         for (i = 0; i < up->n; i++) place[i] = -1;
         for (i = 0; i < up->n; i++) {
             const int32_t begin = next;
-            for (j = first[i]; j < first[i + 1]; j++) for (e = g->start[child[j]]; e < g->start[child[j] + 1]; e++) {
-                const int32_t to = g->parent[g->to[e]];
-                const uint64_t from = g->block[child[j]], into = g->block[g->to[e]];
-                const int inside = !((from ^ into) & ~GS4I_LOWEST_BITS), axis = inside ? 3 : gs4i_axis(from, into);
-                const float one = link[child[j]][axis], other = link[g->to[e]][axis];
-                if (to == i) continue;
-                if (place[to] < begin) { place[to] = next++; if (pass) { up->to[place[to]] = to; up->w[place[to]] = 0; } }
-                if (pass) up->w[place[to]] += inside ? gs4i_chain(g->w[e], one, first[i + 1] - first[i], other, first[to + 1] - first[to])
-                                                     : gs4i_series(g->w[e], one, other);
-            }
+            for (j = first[i]; j < first[i + 1]; j++)
+                for (e = g->start[child[j]]; e < g->start[child[j] + 1]; e++) {
+                    const int32_t to = g->parent[g->to[e]];
+                    const uint64_t from = g->block[child[j]], into = g->block[g->to[e]];
+                    const int inside = !((from ^ into) & ~GS4I_LOWEST_BITS),
+                              axis = inside ? 3 : gs4i_axis(from, into);
+                    const float one = link[child[j]][axis], other = link[g->to[e]][axis];
+                    if (to == i) continue;
+                    if (place[to] < begin) {
+                        place[to] = next++;
+                        if (pass) {
+                            up->to[place[to]] = to;
+                            up->w[place[to]] = 0;
+                        }
+                    }
+                    if (pass)
+                        up->w[place[to]] += inside
+                                                ? gs4i_chain(g->w[e], one, first[i + 1] - first[i],
+                                                             other, first[to + 1] - first[to])
+                                                : gs4i_series(g->w[e], one, other);
+                }
             if (!pass) up->start[i + 1] = next - begin;
         }
         if (!pass && gs4i_reserve_edges(s, up) != GS4_OK) return GS4_ERROR_MEMORY;
@@ -2542,7 +3211,8 @@ static int gs4i_coarsen_graph(gs4i_solver *s)
     return GS4_OK;
 }
 
-/* Cholesky of the last graph; a pivot below 1e-6 of its diagonal belongs to a pocket without anything to hold it, and is skipped. */
+/* Cholesky of the last graph; a pivot below 1e-6 of its diagonal belongs to a pocket without
+ * anything to hold it, and is skipped. */
 static int gs4i_factor(gs4i_solver *s)
 {
     const gs4i_graph *g = &s->graph[s->graphs - 1];
@@ -2554,35 +3224,44 @@ static int gs4i_factor(gs4i_solver *s)
     s->matrix = L = (double *)s->square.data;
     for (i = 0; i < n; i++) {
         L[i * n + i] = (double)g->diagonal[i];
-        for (e = g->start[i]; e < g->start[i + 1]; e++) if ((size_t)g->to[e] < i) L[i * n + (size_t)g->to[e]] = -(double)g->w[e];
+        for (e = g->start[i]; e < g->start[i + 1]; e++)
+            if ((size_t)g->to[e] < i) L[i * n + (size_t)g->to[e]] = -(double)g->w[e];
     }
     for (i = 0; i < n; i++) {
         for (j = 0; j <= i; j++) {
             double sum = L[i * n + j];
             for (k = 0; k < j; k++) sum -= L[i * n + k] * L[j * n + k];
-            if (j < i) L[i * n + j] = L[j * n + j] > 0 ? sum / L[j * n + j] : 0;
-            else L[i * n + i] = sum > 1e-6 * (double)g->diagonal[i] ? sqrt(sum) : 0;
+            if (j < i)
+                L[i * n + j] = L[j * n + j] > 0 ? sum / L[j * n + j] : 0;
+            else
+                L[i * n + i] = sum > 1e-6 * (double)g->diagonal[i] ? sqrt(sum) : 0;
         }
     }
     return GS4_OK;
 }
 
-/* --- setup: closed pockets ----------------------------------------------------------------------------------------- */
+/* --- setup: closed pockets -------------------------------------------------------------------- */
 
 /* Whether air or a diagonal holds one of the cells begin to end of a row. */
 static int gs4i_is_held(const gs4i_rows *q, int uniform, int begin, int end)
 {
     int i, f, held = 0;
     for (i = begin; i < end && !held; i++) {
-        if (uniform && !q->diagonal && i + 8 <= end && gs4i_is_deep(q->kind + i, q->beside[3], q->beside[5])) { i += 7; continue; }
-        for (f = 0; f < 6; f++) held |= q->kind[i + q->beside[f]] == GS4I_IS_OPEN && (uniform || gs4i_face_of(q, i, f) > 0);
+        if (uniform && !q->diagonal && i + 8 <= end
+            && gs4i_is_deep(q->kind + i, q->beside[3], q->beside[5])) {
+            i += 7;
+            continue;
+        }
+        for (f = 0; f < 6; f++)
+            held |=
+                q->kind[i + q->beside[f]] == GS4I_IS_OPEN && (uniform || gs4i_face_of(q, i, f) > 0);
         if (q->diagonal) held |= q->diagonal[i] > 0;
     }
     return held;
 }
 
-/* Runs of liquid cells of a plane that faces join, from u->counts[k] on: `pocket` is the place in the list, `sum` above 0 where the
- * run is held. Without a list they are counted. */
+/* Runs of liquid cells of a plane that faces join, from u->counts[k] on: `pocket` is the place
+ * in the list, `sum` above 0 where the run is held. Without a list they are counted. */
 static void gs4i_list_runs(int k, void *context)
 {
     const gs4i_setup *u = (const gs4i_setup *)context;
@@ -2597,10 +3276,14 @@ static void gs4i_list_runs(int k, void *context)
         for (i = 0; i < n; i = end) {
             end = i + 1;
             if (!(q.kind[i] & GS4I_IS_LIQUID)) continue;
-            while (q.kind[end] & GS4I_IS_LIQUID && (s->uniform || gs4i_face_of(&q, end, 0) > 0)) end += s->uniform && end + 8 <= n && gs4i_is_wet(q.kind + end) ? 8 : 1;
+            while (q.kind[end] & GS4I_IS_LIQUID && (s->uniform || gs4i_face_of(&q, end, 0) > 0))
+                end += s->uniform && end + 8 <= n && gs4i_is_wet(q.kind + end) ? 8 : 1;
             if (run) {
-                run[count].row = k * s->level[0].n[1] + j; run[count].begin = i; run[count].end = end;
-                run[count].pocket = count; run[count].sum = gs4i_is_held(&q, s->uniform, i, end);
+                run[count].row = k * s->level[0].n[1] + j;
+                run[count].begin = i;
+                run[count].end = end;
+                run[count].pocket = count;
+                run[count].sum = gs4i_is_held(&q, s->uniform, i, end);
             }
             count++;
         }
@@ -2614,27 +3297,33 @@ static int32_t gs4i_root(gs4i_cells *run, int32_t a)
     return a;
 }
 
-/* Joins run a with those of the row before it along axis f / 2; `b` is the first that may touch it, and moves on. */
+/* Joins run a with those of the row before it along axis f / 2; `b` is the first that may touch
+ * it, and moves on. */
 static void gs4i_join_runs(gs4i_setup *u, gs4i_cells *run, int32_t a, int32_t *b, int row, int f)
 {
     const int ny = u->s->level[0].n[1];
     gs4i_rows q;
     int32_t o;
     int i;
-    while (*b < a && (run[*b].row < row || (run[*b].row == row && run[*b].end <= run[a].begin))) (*b)++;
+    while (*b < a && (run[*b].row < row || (run[*b].row == row && run[*b].end <= run[a].begin)))
+        (*b)++;
     gs4i_open_row(&q, u->s, u->d, run[a].row % ny, run[a].row / ny);
     for (o = *b; o < a && run[o].row == row && run[o].begin < run[a].end; o++) {
-        const int begin = run[o].begin > run[a].begin ? run[o].begin : run[a].begin, end = run[o].end < run[a].end ? run[o].end : run[a].end;
-        for (i = begin; i < end && !(gs4i_face_of(&q, i, f) > 0); i++) {}
+        const int begin = run[o].begin > run[a].begin ? run[o].begin : run[a].begin,
+                  end = run[o].end < run[a].end ? run[o].end : run[a].end;
+        for (i = begin; i < end && !(gs4i_face_of(&q, i, f) > 0); i++) {
+        }
         if (i < end) {
-            const int32_t r = gs4i_root(run, a), t = gs4i_root(run, o), low = r < t ? r : t, high = r < t ? t : r;
+            const int32_t r = gs4i_root(run, a), t = gs4i_root(run, o), low = r < t ? r : t,
+                          high = r < t ? t : r;
             run[high].pocket = low;
             if (run[high].sum > 0) run[low].sum = 1;
         }
     }
 }
 
-/* Which runs are in pockets that nothing holds: there the mean of x is free, and that of the right-hand side must vanish. */
+/* Which runs are in pockets that nothing holds: there the mean of x is free, and that of the
+ * right-hand side must vanish. */
 static int gs4i_find_pockets(gs4i_setup *u)
 {
     gs4i_solver *s = u->s;
@@ -2645,8 +3334,13 @@ static int gs4i_find_pockets(gs4i_setup *u)
     int k;
     s->runs = NULL;
     gs4i_parallel_for(s->tasks, nz, gs4i_list_runs, u);
-    for (k = 0; k < nz; k++) { const int32_t here = u->counts[k]; u->counts[k] = (int32_t)all; all += here; }
-    if (all > INT32_MAX || gs4i_reserve(s, &s->cells, (size_t)all * sizeof *run, 0) != GS4_OK) return GS4_ERROR_MEMORY;
+    for (k = 0; k < nz; k++) {
+        const int32_t here = u->counts[k];
+        u->counts[k] = (int32_t)all;
+        all += here;
+    }
+    if (all > INT32_MAX || gs4i_reserve(s, &s->cells, (size_t)all * sizeof *run, 0) != GS4_OK)
+        return GS4_ERROR_MEMORY;
     count = (int32_t)all;
     s->runs = run = (gs4i_cells *)s->cells.data;
     gs4i_parallel_for(s->tasks, nz, gs4i_list_runs, u);
@@ -2654,37 +3348,47 @@ static int gs4i_find_pockets(gs4i_setup *u)
         if (run[a].row % ny) gs4i_join_runs(u, run, a, &y, run[a].row - 1, 2);
         if (run[a].row >= ny) gs4i_join_runs(u, run, a, &z, run[a].row - ny, 4);
     }
-    for (s->pockets = 0, a = 0; a < count; a++) {           /* a root comes before all of its runs; sum: 1 held, -1 - p in pocket p */
+    /* a root comes before all of its runs; sum: 1 held, -1 - p in pocket p */
+    for (s->pockets = 0, a = 0; a < count; a++) {
         run[a].pocket = gs4i_root(run, a);
-        if (run[a].pocket != a) run[a].sum = run[run[a].pocket].sum;
-        else if (!(run[a].sum > 0)) run[a].sum = -1 - s->pockets++;
+        if (run[a].pocket != a)
+            run[a].sum = run[run[a].pocket].sum;
+        else if (!(run[a].sum > 0))
+            run[a].sum = -1 - s->pockets++;
     }
-    if (gs4i_reserve(s, &s->labels, 2 * (size_t)s->pockets * sizeof(double), 1) != GS4_OK) return GS4_ERROR_MEMORY;
+    if (gs4i_reserve(s, &s->labels, 2 * (size_t)s->pockets * sizeof(double), 1) != GS4_OK)
+        return GS4_ERROR_MEMORY;
     s->pocket = (double *)s->labels.data;
-    for (a = 0; a < count; a++) if (run[a].sum < 0) {
-        run[kept] = run[a]; run[kept].pocket = (int32_t)(-1 - run[a].sum);
-        s->pocket[2 * run[kept].pocket + 1] += run[kept].end - run[kept].begin;
-        kept++;
-    }
+    for (a = 0; a < count; a++)
+        if (run[a].sum < 0) {
+            run[kept] = run[a];
+            run[kept].pocket = (int32_t)(-1 - run[a].sum);
+            s->pocket[2 * run[kept].pocket + 1] += run[kept].end - run[kept].begin;
+            kept++;
+        }
     s->run_count = kept;
     return GS4_OK;
 }
 
-/* Everything that depends on the matrix. The solver keeps nothing of `d`, and its memory from setup to setup. */
+/* Everything that depends on the matrix. The solver keeps nothing of `d`, and its memory from
+ * setup to setup. */
 static int gs4i_solver_setup(gs4i_solver *s, const gs4_poisson_desc *d)
 {
     const int slabs = d->threads > 1 ? 2 * d->threads : d->parallel_for ? 8 : 1;
     gs4i_setup u;
     int l;
     memset(&u, 0, sizeof u);
-    u.s = s; u.d = d;
-    s->graphs = 0; s->fault = NULL;
+    u.s = s;
+    u.d = d;
+    s->graphs = 0;
+    s->fault = NULL;
     if (gs4i_take(&u) != GS4_OK) return s->fault ? GS4_ERROR_ARGUMENT : GS4_ERROR_MEMORY;
     gs4i_parallel_for(s->tasks, s->level[1].n[2], gs4i_build_planes, &u);
     gs4i_parallel_for(s->tasks, s->level[1].n[2], gs4i_build_inverse, &u);
     for (l = 0; l < 2; l++) gs4i_cut(s, l, slabs > GS4I_SLABS ? GS4I_SLABS : slabs);
     if (gs4i_build_groups(&u) != GS4_OK) return GS4_ERROR_MEMORY;
-    while (s->graph[s->graphs - 1].n > GS4I_DIRECT) if (gs4i_coarsen_graph(s) != GS4_OK) return GS4_ERROR_MEMORY;
+    while (s->graph[s->graphs - 1].n > GS4I_DIRECT)
+        if (gs4i_coarsen_graph(s) != GS4_OK) return GS4_ERROR_MEMORY;
     gs4i_clear(s, s->x[0], s->level[0].count * sizeof(double));
     if (gs4i_factor(s) != GS4_OK) return GS4_ERROR_MEMORY;
     return gs4i_find_pockets(&u);
@@ -2692,33 +3396,48 @@ static int gs4i_solver_setup(gs4i_solver *s, const gs4_poisson_desc *d)
 
 static void gs4i_solver_free(gs4i_solver *s)
 {
-    gs4i_scratch *const parts[6] = { &s->grid, &s->kinds, &s->planes, &s->cells, &s->labels, &s->square };
+    gs4i_scratch *const parts[6] = { &s->grid,  &s->kinds,  &s->planes,
+                                     &s->cells, &s->labels, &s->square };
     int i;
     for (i = 0; i < 6; i++) gs4i_release(s->memory, parts[i]);
-    for (i = 0; i < GS4I_GRAPHS; i++) { gs4i_release(s->memory, &s->graph[i].nodes); gs4i_release(s->memory, &s->graph[i].edges); }
+    for (i = 0; i < GS4I_GRAPHS; i++) {
+        gs4i_release(s->memory, &s->graph[i].nodes);
+        gs4i_release(s->memory, &s->graph[i].edges);
+    }
 }
 
-/* --- solving ------------------------------------------------------------------------------------------------------------- */
+/* --- solving ---------------------------------------------------------------------------------- */
 
-typedef struct gs4i_given { gs4i_solver *s; const gs4_real *rhs; gs4_real *x; int guess, air /* whether x is given there */; } gs4i_given;
+typedef struct gs4i_given {
+    gs4i_solver *s;
+    const gs4_real *rhs;
+    gs4_real *x;
+    int guess, air /* whether x is given there */;
+} gs4i_given;
 
-/* Largest |rhs| in liquid, |x| in air and |x| in liquid, as bits: these are in the order of the numbers, infinity and what is no number
- * above all. */
-static void gs4i_largest_bits(const gs4_real *GS4I_RESTRICT rhs, const gs4_real *GS4I_RESTRICT x, const uint8_t *GS4I_RESTRICT kind, int n,
+/* Largest |rhs| in liquid, |x| in air and |x| in liquid, as bits: these are in the order of the
+ * numbers, infinity and what is no number above all. */
+static void gs4i_largest_bits(const gs4_real *GS4I_RESTRICT rhs, const gs4_real *GS4I_RESTRICT x,
+                              const uint8_t *GS4I_RESTRICT kind, int n,
                               gs4i_bits *GS4I_RESTRICT most)
 {
     gs4i_bits of_rhs = most[0], of_air = most[1], of_x = most[2];
     int i;
     for (i = 0; i < n; i++) {
-        const gs4i_bits liquid = (gs4i_bits)0 - (gs4i_bits)(kind[i] / GS4I_IS_LIQUID), open = (gs4i_bits)0 - (gs4i_bits)(kind[i] & GS4I_IS_OPEN);
+        const gs4i_bits liquid = (gs4i_bits)0 - (gs4i_bits)(kind[i] / GS4I_IS_LIQUID),
+                        open = (gs4i_bits)0 - (gs4i_bits)(kind[i] & GS4I_IS_OPEN);
         gs4i_bits b, v;
-        memcpy(&b, rhs + i, sizeof b); memcpy(&v, x + i, sizeof v);
-        b = b & ~(gs4i_bits)0 >> 1 & liquid; v &= ~(gs4i_bits)0 >> 1;
+        memcpy(&b, rhs + i, sizeof b);
+        memcpy(&v, x + i, sizeof v);
+        b = b & ~(gs4i_bits)0 >> 1 & liquid;
+        v &= ~(gs4i_bits)0 >> 1;
         of_rhs = b > of_rhs ? b : of_rhs;
         of_air = (v & open & ~liquid) > of_air ? v & open & ~liquid : of_air;
         of_x = (v & liquid) > of_x ? v & liquid : of_x;
     }
-    most[0] = of_rhs; most[1] = of_air; most[2] = of_x;
+    most[0] = of_rhs;
+    most[1] = of_air;
+    most[2] = of_x;
 }
 
 /* Largest right-hand side in liquid, x in air and x in liquid; infinity where one is not finite. */
@@ -2740,7 +3459,8 @@ static void gs4i_see_given(int k, void *context)
     }
 }
 
-/* Right-hand side into r where there is liquid, x into x: given values and, where `guess`, the guess; the rest 0. */
+/* Right-hand side into r where there is liquid, x into x: given values and, where `guess`, the
+ * guess; the rest 0. */
 static void gs4i_load_plane(int k, void *context)
 {
     const gs4i_given *v = (const gs4i_given *)context;
@@ -2748,18 +3468,28 @@ static void gs4i_load_plane(int k, void *context)
     const gs4i_masked *g = &s->level[0];
     const double b = s->rhs_unit, unit = s->x_unit;
     int i, j, odd;
-    for (j = 0; j < g->n[1]; j++) for (odd = 0; odd < 2; odd++) {
-        const int c = (odd + j + k) & 1;
-        const size_t row = ((size_t)k * (size_t)g->n[1] + (size_t)j) * (size_t)g->n[0], at = gs4i_row_of(g, j, k);
-        const uint8_t *kind = gs4i_kinds_of(s, j, k), wanted = v->guess ? GS4I_IS_OPEN | GS4I_IS_LIQUID : GS4I_IS_OPEN;
-        const int32_t *span = g->span + 2 * ((size_t)k * (size_t)g->n[1] + (size_t)j);
-        const int end = 2 * span[1] < g->n[0] ? 2 * span[1] : g->n[0];
-        double *r = g->r[c] + at, *x = s->x[c] + at;
-        for (i = 2 * span[0] + odd; i < end; i += 2) r[i / 2] = kind[i] & GS4I_IS_LIQUID ? (double)v->rhs[row + (size_t)i] * b : 0;
-        if (v->guess < 0) continue;
-        if (!v->guess && !v->air) { memset(x, 0, (size_t)g->width * sizeof *x); continue; }
-        for (i = odd; i < g->n[0]; i += 2) x[i / 2] = kind[i] && (kind[i] & wanted) == kind[i] ? (double)v->x[row + (size_t)i] * unit : 0;
-    }
+    for (j = 0; j < g->n[1]; j++)
+        for (odd = 0; odd < 2; odd++) {
+            const int c = (odd + j + k) & 1;
+            const size_t row = ((size_t)k * (size_t)g->n[1] + (size_t)j) * (size_t)g->n[0],
+                         at = gs4i_row_of(g, j, k);
+            const uint8_t *kind = gs4i_kinds_of(s, j, k),
+                          wanted = v->guess ? GS4I_IS_OPEN | GS4I_IS_LIQUID : GS4I_IS_OPEN;
+            const int32_t *span = g->span + 2 * ((size_t)k * (size_t)g->n[1] + (size_t)j);
+            const int end = 2 * span[1] < g->n[0] ? 2 * span[1] : g->n[0];
+            double *r = g->r[c] + at, *x = s->x[c] + at;
+            for (i = 2 * span[0] + odd; i < end; i += 2)
+                r[i / 2] = kind[i] & GS4I_IS_LIQUID ? (double)v->rhs[row + (size_t)i] * b : 0;
+            if (v->guess < 0) continue;
+            if (!v->guess && !v->air) {
+                memset(x, 0, (size_t)g->width * sizeof *x);
+                continue;
+            }
+            for (i = odd; i < g->n[0]; i += 2)
+                x[i / 2] = kind[i] && (kind[i] & wanted) == kind[i]
+                               ? (double)v->x[row + (size_t)i] * unit
+                               : 0;
+        }
 }
 
 static void gs4i_store_plane(int k, void *context)
@@ -2769,22 +3499,31 @@ static void gs4i_store_plane(int k, void *context)
     const gs4i_masked *g = &s->level[0];
     const double unit = 1 / s->x_unit;
     int i, j, odd;
-    for (j = 0; j < g->n[1]; j++) for (odd = 0; odd < 2; odd++) {
-        const uint8_t *kind = gs4i_kinds_of(s, j, k);
-        const double *from = s->x[(odd + j + k) & 1] + gs4i_row_of(g, j, k);
-        gs4_real *x = v->x + ((size_t)k * (size_t)g->n[1] + (size_t)j) * (size_t)g->n[0];
-        for (i = odd; i < g->n[0]; i += 2) if (kind[i] & GS4I_IS_LIQUID) x[i] = (gs4_real)(from[i / 2] * unit);
-    }
+    for (j = 0; j < g->n[1]; j++)
+        for (odd = 0; odd < 2; odd++) {
+            const uint8_t *kind = gs4i_kinds_of(s, j, k);
+            const double *from = s->x[(odd + j + k) & 1] + gs4i_row_of(g, j, k);
+            gs4_real *x = v->x + ((size_t)k * (size_t)g->n[1] + (size_t)j) * (size_t)g->n[0];
+            for (i = odd; i < g->n[0]; i += 2)
+                if (kind[i] & GS4I_IS_LIQUID) x[i] = (gs4_real)(from[i / 2] * unit);
+        }
 }
 
-enum { GS4I_RUNS = 64 };                /* of pockets, a task */
-typedef struct gs4i_means { gs4i_solver *s; double **v; int found; } gs4i_means;
+enum {
+    GS4I_RUNS = 64
+}; /* of pockets, a task */
+typedef struct gs4i_means {
+    gs4i_solver *s;
+    double **v;
+    int found;
+} gs4i_means;
 
 static double gs4i_sum_range(const double *v, int n)
 {
     double sum[GS4I_STRIP] = { 0 };
     int m, l;
-    for (m = 0; m + GS4I_STRIP <= n; m += GS4I_STRIP) for (l = 0; l < GS4I_STRIP; l++) sum[l] += v[m + l];
+    for (m = 0; m + GS4I_STRIP <= n; m += GS4I_STRIP)
+        for (l = 0; l < GS4I_STRIP; l++) sum[l] += v[m + l];
     for (l = 0; m + l < n; l++) sum[l] += v[m + l];
     return gs4i_sum_lanes(sum);
 }
@@ -2801,10 +3540,14 @@ static void gs4i_means_of_runs(int index, void *context)
         const double mean = w->s->pocket[2 * run->pocket];
         if (!w->found) run->sum = 0;
         for (c = 0; c < 2; c++) {
-            const int t = (c + j + k) & 1, first = (run->begin + !t) / 2, n = (run->end + !t) / 2 - first;      /* cells i = 2 m + t */
+            /* cells i = 2 m + t */
+            const int t = (c + j + k) & 1, first = (run->begin + !t) / 2,
+                      n = (run->end + !t) / 2 - first;
             double *v = w->v[c] + gs4i_row_of(g, j, k) + first;
-            if (!w->found) run->sum += gs4i_sum_range(v, n);
-            else for (m = 0; m < n; m++) v[m] -= mean;
+            if (!w->found)
+                run->sum += gs4i_sum_range(v, n);
+            else
+                for (m = 0; m < n; m++) v[m] -= mean;
         }
     }
 }
@@ -2816,7 +3559,9 @@ static double gs4i_take_means(gs4i_solver *s, double **v)
     gs4i_means w;
     double largest = 0;
     int a, p;
-    w.s = s; w.v = v; w.found = 0;
+    w.s = s;
+    w.v = v;
+    w.found = 0;
     gs4i_parallel_for(s->tasks, tasks, gs4i_means_of_runs, &w);
     for (p = 0; p < s->pockets; p++) s->pocket[2 * p] = 0;
     for (a = 0; a < s->run_count; a++) s->pocket[2 * s->runs[a].pocket] += s->runs[a].sum;
@@ -2839,25 +3584,40 @@ static double gs4i_true_residual(gs4i_solver *s, gs4i_given *v, int guess, doubl
     if (guess > 0) gs4i_take_means(s, s->x);
     mean = gs4i_take_means(s, s->level[0].r);
     if (removed) *removed = mean / s->rhs_unit;
-    gs4i_sweep_run(s, 0, guess || v->air ? defect : size, 1);       /* A 0 = 0 */
+    gs4i_sweep_run(s, 0, guess || v->air ? defect : size, 1); /* A 0 = 0 */
     return sqrt(gs4i_total(s));
 }
 
-typedef enum gs4i_end { GS4I_CONVERGED, GS4I_LIMIT, GS4I_STAGNATED, GS4I_BROKE_DOWN } gs4i_end;
+typedef enum gs4i_end {
+    GS4I_CONVERGED,
+    GS4I_LIMIT,
+    GS4I_STAGNATED,
+    GS4I_BROKE_DOWN
+} gs4i_end;
 
 /* Conjugate gradients from r as it is until |r| <= goal; `norm` is |r| before and after. */
-static gs4i_end gs4i_iterate(gs4i_solver *s, double goal, int limit, int diagonal, double *norm, int *iterations)
+static gs4i_end gs4i_iterate(gs4i_solver *s, double goal, int limit, int diagonal, double *norm,
+                             int *iterations)
 {
-    static const gs4i_stage_fn jacobi[] = { gs4i_stage_jacobi, gs4i_stage_dot }, direct[] = { gs4i_stage_direct, gs4i_stage_curvature };
+    static const gs4i_stage_fn jacobi[] = { gs4i_stage_jacobi, gs4i_stage_dot },
+                               direct[] = { gs4i_stage_direct, gs4i_stage_curvature };
     static const gs4i_stage_fn update[] = { gs4i_stage_update };
-    const int patience = diagonal ? 200 : 30;               /* |r| need not fall in each: over 30 it does where anything does */
+    /* |r| need not fall in each: over 30 it does where anything does */
+    const int patience = diagonal ? 200 : 30;
     double last = 0, least = *norm, look = *norm;
     int i;
     for (i = 0; *norm > goal; i++) {
         double rz, curvature;
         if (*iterations >= limit) return GS4I_LIMIT;
-        if (i && i % patience == 0) { if (least > 0.9 * look) return GS4I_STAGNATED; look = least; }
-        if (diagonal) { gs4i_sweep_run(s, 0, jacobi, 2); rz = gs4i_total(s); } else rz = gs4i_cycle(s);
+        if (i && i % patience == 0) {
+            if (least > 0.9 * look) return GS4I_STAGNATED;
+            look = least;
+        }
+        if (diagonal) {
+            gs4i_sweep_run(s, 0, jacobi, 2);
+            rz = gs4i_total(s);
+        } else
+            rz = gs4i_cycle(s);
         if (!(rz > 0 && rz <= DBL_MAX)) return GS4I_BROKE_DOWN;
         s->beta = i ? (float)(rz / last) : 0;
         last = rz;
@@ -2880,16 +3640,22 @@ static int gs4i_begin(gs4i_solver *s, gs4i_given *v, double *norm, int *guess, d
     double most[3] = { 0, 0, 0 }, b;
     int k, i, exponent = 0;
     gs4i_parallel_for(s->tasks, s->level[0].n[2], gs4i_see_given, v);
-    for (k = 0; k < s->level[0].n[2]; k++) for (i = 0; i < 3; i++) if (s->given[3 * k + i] > most[i]) most[i] = s->given[3 * k + i];
+    for (k = 0; k < s->level[0].n[2]; k++)
+        for (i = 0; i < 3; i++)
+            if (s->given[3 * k + i] > most[i]) most[i] = s->given[3 * k + i];
     if (!(most[0] < (double)GS4I_HUGE))
-        return gs4i_fault(s, "the largest |rhs[]| in the liquid is ", most[0], "; all must be finite and not absurdly large");
+        return gs4i_fault(s, "the largest |rhs[]| in the liquid is ", most[0],
+                          "; all must be finite and not absurdly large");
     if (!(most[1] < (double)GS4I_HUGE && most[2] < (double)GS4I_HUGE))
-        return gs4i_fault(s, "the largest |x[]| in liquid and air is ", most[1] > most[2] ? most[1] : most[2],
+        return gs4i_fault(s, "the largest |x[]| in liquid and air is ",
+                          most[1] > most[2] ? most[1] : most[2],
                           "; all must be finite and not absurdly large");
     b = most[0] * s->mass_unit > most[1] ? most[0] * s->mass_unit : most[1];
     frexp(b, &exponent);
-    s->x_unit = ldexp(1, -exponent); s->rhs_unit = s->mass_unit * s->x_unit;
-    *guess = most[2] > 0; v->air = most[1] > 0;
+    s->x_unit = ldexp(1, -exponent);
+    s->rhs_unit = s->mass_unit * s->x_unit;
+    *guess = most[2] > 0;
+    v->air = most[1] > 0;
     *norm = gs4i_true_residual(s, v, 0, removed);
     if (*norm <= 1e-13 * most[0] * s->rhs_unit * sqrt((double)s->unknowns)) *norm = 0;
     return GS4_OK;
@@ -2906,33 +3672,54 @@ static void gs4i_clear_directions(gs4i_solver *s)
     }
 }
 
-/* x: guess in the liquid and values in the air; out: the solution in the liquid, of mean 0 in closed pockets. */
-static int gs4i_solver_solve(gs4i_solver *s, const gs4_real *rhs, gs4_real *x, double tolerance, int limit, gs4_solve_stats *stats)
+/* x: guess in the liquid and values in the air; out: the solution in the liquid, of mean 0 in
+ * closed pockets. */
+static int gs4i_solver_solve(gs4i_solver *s, const gs4_real *rhs, gs4_real *x, double tolerance,
+                             int limit, gs4_solve_stats *stats)
 {
     gs4i_given v;
     static const char *const sentence[4][2] = {
-        { "", "" }, { "the residual is ", " of the right-hand side after max_iterations; more of them, or a larger tolerance, would do" },
+        { "", "" },
+        { "the residual is ", " of the right-hand side after max_iterations; more of them, or a "
+                              "larger tolerance, would do" },
         { "the residual stays at ", " of the right-hand side; a larger tolerance would do" },
-        { "the iteration broke down, twice; the residual is ", " of the right-hand side; less contrast of coefficient and diagonal would do" } };
+        { "the iteration broke down, twice; the residual is ",
+          " of the right-hand side; less contrast of coefficient and diagonal would do" }
+    };
     gs4i_end end = GS4I_CONVERGED;
     double size, norm, before = HUGE_VAL;
     int guess, diagonal = 0, iterations = 0;
     s->fault = NULL;
-    v.s = s; v.rhs = rhs; v.x = x; v.guess = v.air = 0;
+    v.s = s;
+    v.rhs = rhs;
+    v.x = x;
+    v.guess = v.air = 0;
     if (gs4i_begin(s, &v, &size, &guess, &stats->removed_mean) != GS4_OK) return GS4_ERROR_ARGUMENT;
     stats->pockets = s->pockets;
     norm = size;
     if (guess && size > 0) norm = gs4i_true_residual(s, &v, 1, NULL);
-    if (!(norm <= size)) { norm = gs4i_true_residual(s, &v, 0, NULL); guess = 0; }      /* a guess worse than none is not taken */
-    while (norm > tolerance * size) {                       /* until the true residual agrees */
-        if (norm > 0.9 * before) { end = GS4I_STAGNATED; break; }
+    /* a guess worse than none is not taken */
+    if (!(norm <= size)) {
+        norm = gs4i_true_residual(s, &v, 0, NULL);
+        guess = 0;
+    }
+    while (norm > tolerance * size) { /* until the true residual agrees */
+        if (norm > 0.9 * before) {
+            end = GS4I_STAGNATED;
+            break;
+        }
         before = norm;
         end = gs4i_iterate(s, tolerance * size, limit, diagonal, &norm, &iterations);
         norm = gs4i_true_residual(s, &v, -1, NULL);
-        if (end == GS4I_BROKE_DOWN) {                       /* once more, without the cycle, from where it was last sound */
+        /* once more, without the cycle, from where it was last sound */
+        if (end == GS4I_BROKE_DOWN) {
             gs4i_clear_directions(s);
             if (!(norm <= DBL_MAX)) norm = gs4i_true_residual(s, &v, guess, NULL);
-            if (!diagonal) { diagonal = 1; before = HUGE_VAL; continue; }
+            if (!diagonal) {
+                diagonal = 1;
+                before = HUGE_VAL;
+                continue;
+            }
         }
         if (end != GS4I_CONVERGED) break;
     }
@@ -2941,30 +3728,40 @@ static int gs4i_solver_solve(gs4i_solver *s, const gs4_real *rhs, gs4_real *x, d
     stats->iterations = iterations;
     stats->residual = size > 0 ? norm / size : 0;
     if (norm <= tolerance * size) return GS4_OK;
-    s->fault = sentence[end][0]; s->accepted = sentence[end][1];
+    s->fault = sentence[end][0];
+    s->accepted = sentence[end][1];
     return GS4_ERROR_NOT_CONVERGED;
 }
 
-/* ==== [[kernel]] quadratic B-splines on 27 nodes =================================================== *
+/* ==== [[kernel]] quadratic B-splines on 27 nodes =============================================== *
  *
- * Nodes are cell centres. A particle in cell c sees nodes c-1, c, c+1 along each axis; with its offset
- * xi in [-1/2, 1/2) from the centre of c, in cells:
+ * Nodes are cell centres. A particle in cell c sees nodes c-1, c, c+1 along each axis; with its
+ * offset xi in [-1/2, 1/2) from the centre of c, in cells:
  *
- *        node c-1         node c        node c+1            w  = (1/2 - xi)^2 / 2,  3/4 - xi^2,  (1/2 + xi)^2 / 2
- *     ------o-------|-------o---x---|-------o------         w' = -(1/2 - xi),       -2 xi,        1/2 + xi
- *                   |<--- cell c -->|                       sum w = 1, sum w (x_i - x) = 0, sum w (x_i - x)^2 = h^2/4
+ *        node c-1         node c        node c+1
+ *     ------o-------|-------o---x---|-------o------
+ *                   |<--- cell c -->|
  *
- * A block is 4 x 4 x 4 nodes, its particles are neighbours in memory. Transfers work on a tile of 8 x 8 x 8 nodes,
- * which is a block with two nodes around it, so that a particle may stray one cell from its block before it must be
- * sorted anew. A node is four numbers, and three nodes of a row are twelve contiguous ones: the `row` below. */
+ *     w  = (1/2 - xi)^2 / 2,  3/4 - xi^2,  (1/2 + xi)^2 / 2
+ *     w' = -(1/2 - xi),       -2 xi,        1/2 + xi
+ *     sum w = 1,   sum w (x_i - x) = 0,   sum w (x_i - x)^2 = h^2/4
+ *
+ * A block is 4 x 4 x 4 nodes, its particles are neighbours in memory. Transfers work on a tile
+ * of 8 x 8 x 8 nodes, which is a block with two nodes around it, so that a particle may stray
+ * one cell from its block before it must be sorted anew. A node is four numbers, and three nodes
+ * of a row are twelve contiguous ones: the `row` below. */
 
 #define GS4I_BLOCK_NODES 64
-#define GS4I_TILE 8                     /* nodes along the edge of a tile */
-#define GS4I_TILE_REALS (4 * GS4I_TILE * GS4I_TILE * GS4I_TILE + 16)   /* a row read may run 4 numbers over the end */
+#define GS4I_TILE 8 /* nodes along the edge of a tile */
+/* a row read may run 4 numbers over the end */
+#define GS4I_TILE_REALS (4 * GS4I_TILE * GS4I_TILE * GS4I_TILE + 16)
 
-/* Four and sixteen numbers at a time: compiler vectors where there are any, arrays elsewhere; the same arithmetic in the
- * same order, so the same bits. Lane 3 of a quad is often without meaning. */
-#if defined(__has_builtin) && !defined(GS4_NO_VECTORS) && (!defined(GS4_DOUBLE) || defined(__AVX__) || defined(__clang__))    /* gcc breaks up long vectors badly */
+/* Four and sixteen numbers at a time: compiler vectors where there are any, arrays elsewhere;
+ * the same arithmetic in the same order, so the same bits. Lane 3 of a quad is often without
+ * meaning. */
+/* gcc breaks up long vectors badly */
+#if defined(__has_builtin) && !defined(GS4_NO_VECTORS) \
+    && (!defined(GS4_DOUBLE) || defined(__AVX__) || defined(__clang__))
 #if __has_builtin(__builtin_shufflevector) && __has_builtin(__builtin_convertvector)
 #define GS4I_VECTORS 1
 #endif
@@ -2972,47 +3769,64 @@ static int gs4i_solver_solve(gs4i_solver *s, const gs4_real *rhs, gs4_real *x, d
 #ifdef GS4I_VECTORS
 typedef gs4_real gs4i_quad __attribute__((vector_size(4 * sizeof(gs4_real))));
 #ifdef GS4_DOUBLE
-typedef int64_t  gs4i_mask __attribute__((vector_size(32)));
+typedef int64_t gs4i_mask __attribute__((vector_size(32)));
 #else
-typedef int32_t  gs4i_mask __attribute__((vector_size(16)));
+typedef int32_t gs4i_mask __attribute__((vector_size(16)));
 #endif
 #define GS4I_LANE(v, i) ((v)[i])
 #define GS4I_LANES(...) __VA_ARGS__
-#define GS4I_MUL(r, a, b) ((r) = (a) * (b))                  /* r = a b   lane by lane */
-#define GS4I_MAD(r, a, b) ((r) += (a) * (b))                 /* r += a b  lane by lane */
-#define GS4I_SPLAT_MUL(r, s, a) ((r) = (a) * (s))            /* r = s a   for a number s */
-#define GS4I_SPLAT_MAD(r, s, a) ((r) += (a) * (s))           /* r += s a */
+#define GS4I_MUL(r, a, b) ((r) = (a) * (b))        /* r = a b   lane by lane */
+#define GS4I_MAD(r, a, b) ((r) += (a) * (b))       /* r += a b  lane by lane */
+#define GS4I_SPLAT_MUL(r, s, a) ((r) = (a) * (s))  /* r = s a   for a number s */
+#define GS4I_SPLAT_MAD(r, s, a) ((r) += (a) * (s)) /* r += s a */
 #define GS4I_SUM(r, a, b) ((r) = (a) + (b))
 #define GS4I_DIFFERENCE(r, a, b) ((r) = (a) - (b))
-#define GS4I_GREATER(r, a, b) do { const gs4i_mask gs4i_m = (a) > (b); \
-    (r) = (gs4i_quad)(((gs4i_mask)(a) & gs4i_m) | ((gs4i_mask)(b) & ~gs4i_m)); } while (0)
+#define GS4I_GREATER(r, a, b)                                                    \
+    do {                                                                         \
+        const gs4i_mask gs4i_m = (a) > (b);                                      \
+        (r) = (gs4i_quad)(((gs4i_mask)(a)&gs4i_m) | ((gs4i_mask)(b) & ~gs4i_m)); \
+    } while (0)
 #else
-typedef struct gs4i_quad { gs4_real lane[4]; } gs4i_quad;
+typedef struct gs4i_quad {
+    gs4_real lane[4];
+} gs4i_quad;
 #define GS4I_LANE(v, i) ((v).lane[i])
-#define GS4I_LANES(...) { __VA_ARGS__ }
-#define GS4I_EACH(r, expression) do { int gs4i_l; \
-    for (gs4i_l = 0; gs4i_l < (int)(sizeof(r) / sizeof(gs4_real)); gs4i_l++) { expression; } } while (0)
+#define GS4I_LANES(...) \
+    {                   \
+        __VA_ARGS__     \
+    }
+#define GS4I_EACH(r, expression)                                                   \
+    do {                                                                           \
+        int gs4i_l;                                                                \
+        for (gs4i_l = 0; gs4i_l < (int)(sizeof(r) / sizeof(gs4_real)); gs4i_l++) { \
+            expression;                                                            \
+        }                                                                          \
+    } while (0)
 #define GS4I_MUL(r, a, b) GS4I_EACH(r, (r).lane[gs4i_l] = (a).lane[gs4i_l] * (b).lane[gs4i_l])
 #define GS4I_MAD(r, a, b) GS4I_EACH(r, (r).lane[gs4i_l] += (a).lane[gs4i_l] * (b).lane[gs4i_l])
 #define GS4I_SPLAT_MUL(r, s, a) GS4I_EACH(r, (r).lane[gs4i_l] = (a).lane[gs4i_l] * (s))
 #define GS4I_SPLAT_MAD(r, s, a) GS4I_EACH(r, (r).lane[gs4i_l] += (a).lane[gs4i_l] * (s))
 #define GS4I_SUM(r, a, b) GS4I_EACH(r, (r).lane[gs4i_l] = (a).lane[gs4i_l] + (b).lane[gs4i_l])
-#define GS4I_DIFFERENCE(r, a, b) GS4I_EACH(r, (r).lane[gs4i_l] = (a).lane[gs4i_l] - (b).lane[gs4i_l])
-#define GS4I_GREATER(r, a, b) GS4I_EACH(r, (r).lane[gs4i_l] = (a).lane[gs4i_l] > (b).lane[gs4i_l] ? (a).lane[gs4i_l] : (b).lane[gs4i_l])
+#define GS4I_DIFFERENCE(r, a, b) \
+    GS4I_EACH(r, (r).lane[gs4i_l] = (a).lane[gs4i_l] - (b).lane[gs4i_l])
+#define GS4I_GREATER(r, a, b)       \
+    GS4I_EACH(r, (r).lane[gs4i_l] = \
+                     (a).lane[gs4i_l] > (b).lane[gs4i_l] ? (a).lane[gs4i_l] : (b).lane[gs4i_l])
 #endif
 
 #define GS4I_LOAD(v, p) memcpy(&(v), (p), sizeof(v))
 #define GS4I_STORE(p, v) memcpy((p), &(v), sizeof(v))
 
-/* A row is one vector of sixteen where the machine has such, two of eight where it has those, three quads elsewhere: it is not left to
- * the compiler to break up long vectors, which costs gcc a factor of four. */
+/* A row is one vector of sixteen where the machine has such, two of eight where it has those,
+ * three quads elsewhere: it is not left to the compiler to break up long vectors, which costs
+ * gcc a factor of four. */
 #if defined(GS4I_VECTORS) && defined(__AVX__) && !defined(GS4_DOUBLE)
 typedef gs4_real gs4i_pair __attribute__((vector_size(8 * sizeof(gs4_real))));
 #define GS4I_PAIRS 1
 #endif
 #if defined(GS4I_VECTORS) && defined(__AVX512F__) && !defined(GS4_DOUBLE)
 #define GS4I_LONG_ROWS 1
-typedef gs4_real gs4i_row  __attribute__((vector_size(16 * sizeof(gs4_real))));
+typedef gs4_real gs4i_row __attribute__((vector_size(16 * sizeof(gs4_real))));
 #define GS4I_ROW_LOAD GS4I_LOAD
 #define GS4I_ROW_STORE GS4I_STORE
 #define GS4I_ROW_MUL GS4I_MUL
@@ -3022,26 +3836,107 @@ typedef gs4_real gs4i_row  __attribute__((vector_size(16 * sizeof(gs4_real))));
 #define GS4I_ROW_SUM GS4I_SUM
 #define GS4I_ROW_DIFFERENCE GS4I_DIFFERENCE
 #elif defined(GS4I_PAIRS)
-typedef struct gs4i_row { gs4i_pair ab, cd; } gs4i_row;
-#define GS4I_SPREAD(s) const gs4_real gs4i_n = (s); const gs4i_pair gs4i_s = { gs4i_n, gs4i_n, gs4i_n, gs4i_n, gs4i_n, gs4i_n, gs4i_n, gs4i_n }    /* once for both */
-#define GS4I_ROW_LOAD(v, p) do { GS4I_LOAD((v).ab, p); GS4I_LOAD((v).cd, (p) + 8); } while (0)
-#define GS4I_ROW_STORE(p, v) do { GS4I_STORE(p, (v).ab); GS4I_STORE((p) + 8, (v).cd); } while (0)
-#define GS4I_ROW_MUL(r, x, y) do { GS4I_MUL((r).ab, (x).ab, (y).ab); GS4I_MUL((r).cd, (x).cd, (y).cd); } while (0)
-#define GS4I_ROW_MAD(r, x, y) do { GS4I_MAD((r).ab, (x).ab, (y).ab); GS4I_MAD((r).cd, (x).cd, (y).cd); } while (0)
-#define GS4I_ROW_SPLAT_MUL(r, s, x) do { GS4I_SPREAD(s); GS4I_MUL((r).ab, gs4i_s, (x).ab); GS4I_MUL((r).cd, gs4i_s, (x).cd); } while (0)
-#define GS4I_ROW_SPLAT_MAD(r, s, x) do { GS4I_SPREAD(s); GS4I_MAD((r).ab, gs4i_s, (x).ab); GS4I_MAD((r).cd, gs4i_s, (x).cd); } while (0)
-#define GS4I_ROW_SUM(r, x, y) do { GS4I_SUM((r).ab, (x).ab, (y).ab); GS4I_SUM((r).cd, (x).cd, (y).cd); } while (0)
-#define GS4I_ROW_DIFFERENCE(r, x, y) do { GS4I_DIFFERENCE((r).ab, (x).ab, (y).ab); GS4I_DIFFERENCE((r).cd, (x).cd, (y).cd); } while (0)
+typedef struct gs4i_row {
+    gs4i_pair ab, cd;
+} gs4i_row;
+/* once for both */
+#define GS4I_SPREAD(s)           \
+    const gs4_real gs4i_n = (s); \
+    const gs4i_pair gs4i_s = { gs4i_n, gs4i_n, gs4i_n, gs4i_n, gs4i_n, gs4i_n, gs4i_n, gs4i_n }
+#define GS4I_ROW_LOAD(v, p)         \
+    do {                            \
+        GS4I_LOAD((v).ab, p);       \
+        GS4I_LOAD((v).cd, (p) + 8); \
+    } while (0)
+#define GS4I_ROW_STORE(p, v)         \
+    do {                             \
+        GS4I_STORE(p, (v).ab);       \
+        GS4I_STORE((p) + 8, (v).cd); \
+    } while (0)
+#define GS4I_ROW_MUL(r, x, y)             \
+    do {                                  \
+        GS4I_MUL((r).ab, (x).ab, (y).ab); \
+        GS4I_MUL((r).cd, (x).cd, (y).cd); \
+    } while (0)
+#define GS4I_ROW_MAD(r, x, y)             \
+    do {                                  \
+        GS4I_MAD((r).ab, (x).ab, (y).ab); \
+        GS4I_MAD((r).cd, (x).cd, (y).cd); \
+    } while (0)
+#define GS4I_ROW_SPLAT_MUL(r, s, x)       \
+    do {                                  \
+        GS4I_SPREAD(s);                   \
+        GS4I_MUL((r).ab, gs4i_s, (x).ab); \
+        GS4I_MUL((r).cd, gs4i_s, (x).cd); \
+    } while (0)
+#define GS4I_ROW_SPLAT_MAD(r, s, x)       \
+    do {                                  \
+        GS4I_SPREAD(s);                   \
+        GS4I_MAD((r).ab, gs4i_s, (x).ab); \
+        GS4I_MAD((r).cd, gs4i_s, (x).cd); \
+    } while (0)
+#define GS4I_ROW_SUM(r, x, y)             \
+    do {                                  \
+        GS4I_SUM((r).ab, (x).ab, (y).ab); \
+        GS4I_SUM((r).cd, (x).cd, (y).cd); \
+    } while (0)
+#define GS4I_ROW_DIFFERENCE(r, x, y)             \
+    do {                                         \
+        GS4I_DIFFERENCE((r).ab, (x).ab, (y).ab); \
+        GS4I_DIFFERENCE((r).cd, (x).cd, (y).cd); \
+    } while (0)
 #else
-typedef struct gs4i_row { gs4i_quad a, b, c; } gs4i_row;                /* one quad a node */
-#define GS4I_ROW_LOAD(v, p) do { GS4I_LOAD((v).a, p); GS4I_LOAD((v).b, (p) + 4); GS4I_LOAD((v).c, (p) + 8); } while (0)
-#define GS4I_ROW_STORE(p, v) do { GS4I_STORE(p, (v).a); GS4I_STORE((p) + 4, (v).b); GS4I_STORE((p) + 8, (v).c); } while (0)
-#define GS4I_ROW_MUL(r, x, y) do { GS4I_MUL((r).a, (x).a, (y).a); GS4I_MUL((r).b, (x).b, (y).b); GS4I_MUL((r).c, (x).c, (y).c); } while (0)
-#define GS4I_ROW_MAD(r, x, y) do { GS4I_MAD((r).a, (x).a, (y).a); GS4I_MAD((r).b, (x).b, (y).b); GS4I_MAD((r).c, (x).c, (y).c); } while (0)
-#define GS4I_ROW_SPLAT_MUL(r, s, x) do { GS4I_SPLAT_MUL((r).a, s, (x).a); GS4I_SPLAT_MUL((r).b, s, (x).b); GS4I_SPLAT_MUL((r).c, s, (x).c); } while (0)
-#define GS4I_ROW_SPLAT_MAD(r, s, x) do { GS4I_SPLAT_MAD((r).a, s, (x).a); GS4I_SPLAT_MAD((r).b, s, (x).b); GS4I_SPLAT_MAD((r).c, s, (x).c); } while (0)
-#define GS4I_ROW_SUM(r, x, y) do { GS4I_SUM((r).a, (x).a, (y).a); GS4I_SUM((r).b, (x).b, (y).b); GS4I_SUM((r).c, (x).c, (y).c); } while (0)
-#define GS4I_ROW_DIFFERENCE(r, x, y) do { GS4I_DIFFERENCE((r).a, (x).a, (y).a); GS4I_DIFFERENCE((r).b, (x).b, (y).b); GS4I_DIFFERENCE((r).c, (x).c, (y).c); } while (0)
+typedef struct gs4i_row {
+    gs4i_quad a, b, c;
+} gs4i_row; /* one quad a node */
+#define GS4I_ROW_LOAD(v, p)        \
+    do {                           \
+        GS4I_LOAD((v).a, p);       \
+        GS4I_LOAD((v).b, (p) + 4); \
+        GS4I_LOAD((v).c, (p) + 8); \
+    } while (0)
+#define GS4I_ROW_STORE(p, v)        \
+    do {                            \
+        GS4I_STORE(p, (v).a);       \
+        GS4I_STORE((p) + 4, (v).b); \
+        GS4I_STORE((p) + 8, (v).c); \
+    } while (0)
+#define GS4I_ROW_MUL(r, x, y)          \
+    do {                               \
+        GS4I_MUL((r).a, (x).a, (y).a); \
+        GS4I_MUL((r).b, (x).b, (y).b); \
+        GS4I_MUL((r).c, (x).c, (y).c); \
+    } while (0)
+#define GS4I_ROW_MAD(r, x, y)          \
+    do {                               \
+        GS4I_MAD((r).a, (x).a, (y).a); \
+        GS4I_MAD((r).b, (x).b, (y).b); \
+        GS4I_MAD((r).c, (x).c, (y).c); \
+    } while (0)
+#define GS4I_ROW_SPLAT_MUL(r, s, x)      \
+    do {                                 \
+        GS4I_SPLAT_MUL((r).a, s, (x).a); \
+        GS4I_SPLAT_MUL((r).b, s, (x).b); \
+        GS4I_SPLAT_MUL((r).c, s, (x).c); \
+    } while (0)
+#define GS4I_ROW_SPLAT_MAD(r, s, x)      \
+    do {                                 \
+        GS4I_SPLAT_MAD((r).a, s, (x).a); \
+        GS4I_SPLAT_MAD((r).b, s, (x).b); \
+        GS4I_SPLAT_MAD((r).c, s, (x).c); \
+    } while (0)
+#define GS4I_ROW_SUM(r, x, y)          \
+    do {                               \
+        GS4I_SUM((r).a, (x).a, (y).a); \
+        GS4I_SUM((r).b, (x).b, (y).b); \
+        GS4I_SUM((r).c, (x).c, (y).c); \
+    } while (0)
+#define GS4I_ROW_DIFFERENCE(r, x, y)          \
+    do {                                      \
+        GS4I_DIFFERENCE((r).a, (x).a, (y).a); \
+        GS4I_DIFFERENCE((r).b, (x).b, (y).b); \
+        GS4I_DIFFERENCE((r).c, (x).c, (y).c); \
+    } while (0)
 #endif
 
 /* (a a a a  b b b b  c c c c): one number a node, spread over its four lanes */
@@ -3052,7 +3947,9 @@ GS4I_INLINE void gs4i_row_of_nodes(gs4i_row *r, gs4_real a, gs4_real b, gs4_real
 #elif defined(GS4I_PAIRS)
     const gs4i_row all = { { a, a, a, a, b, b, b, b }, { c, c, c, c, 0, 0, 0, 0 } };
 #else
-    const gs4i_row all = { { GS4I_LANES(a, a, a, a) }, { GS4I_LANES(b, b, b, b) }, { GS4I_LANES(c, c, c, c) } };
+    const gs4i_row all = { { GS4I_LANES(a, a, a, a) },
+                           { GS4I_LANES(b, b, b, b) },
+                           { GS4I_LANES(c, c, c, c) } };
 #endif
     *r = all;
 }
@@ -3061,12 +3958,15 @@ GS4I_INLINE void gs4i_row_of_nodes(gs4i_row *r, gs4_real a, gs4_real b, gs4_real
 GS4I_INLINE void gs4i_row_of_quad(gs4i_row *r, const gs4i_quad *q)
 {
 #ifdef GS4I_LONG_ROWS
-    const gs4i_pair p = __builtin_shufflevector(*q, *q, 0, 1, 2, 3, 0, 1, 2, 3);    /* doubled twice: in one go gcc goes through memory */
+    /* doubled twice: in one go gcc goes through memory */
+    const gs4i_pair p = __builtin_shufflevector(*q, *q, 0, 1, 2, 3, 0, 1, 2, 3);
     *r = __builtin_shufflevector(p, p, 0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7);
 #elif defined(GS4I_PAIRS)
     r->ab = r->cd = __builtin_shufflevector(*q, *q, 0, 1, 2, 3, 0, 1, 2, 3);
 #else
-    r->a = *q; r->b = *q; r->c = *q;
+    r->a = *q;
+    r->b = *q;
+    r->c = *q;
 #endif
 }
 
@@ -3075,11 +3975,18 @@ GS4I_INLINE void gs4i_row_of_quad(gs4i_row *r, const gs4i_quad *q)
 GS4I_INLINE void gs4i_transpose(const gs4_real *from, int apart, gs4i_quad r[4])
 {
     gs4i_quad a, b, c, d, low, high, Low, High;
-    GS4I_LOAD(a, from); GS4I_LOAD(b, from + apart); GS4I_LOAD(c, from + 2 * apart); GS4I_LOAD(d, from + 3 * apart);
-    low = __builtin_shufflevector(a, b, 0, 4, 1, 5); high = __builtin_shufflevector(a, b, 2, 6, 3, 7);
-    Low = __builtin_shufflevector(c, d, 0, 4, 1, 5); High = __builtin_shufflevector(c, d, 2, 6, 3, 7);
-    r[0] = __builtin_shufflevector(low, Low, 0, 1, 4, 5); r[1] = __builtin_shufflevector(low, Low, 2, 3, 6, 7);
-    r[2] = __builtin_shufflevector(high, High, 0, 1, 4, 5); r[3] = __builtin_shufflevector(high, High, 2, 3, 6, 7);
+    GS4I_LOAD(a, from);
+    GS4I_LOAD(b, from + apart);
+    GS4I_LOAD(c, from + 2 * apart);
+    GS4I_LOAD(d, from + 3 * apart);
+    low = __builtin_shufflevector(a, b, 0, 4, 1, 5);
+    high = __builtin_shufflevector(a, b, 2, 6, 3, 7);
+    Low = __builtin_shufflevector(c, d, 0, 4, 1, 5);
+    High = __builtin_shufflevector(c, d, 2, 6, 3, 7);
+    r[0] = __builtin_shufflevector(low, Low, 0, 1, 4, 5);
+    r[1] = __builtin_shufflevector(low, Low, 2, 3, 6, 7);
+    r[2] = __builtin_shufflevector(high, High, 0, 1, 4, 5);
+    r[3] = __builtin_shufflevector(high, High, 2, 3, 6, 7);
 }
 #endif
 
@@ -3090,27 +3997,34 @@ GS4I_INLINE void gs4i_row_dot(gs4i_quad *q, const gs4i_row *x, const gs4i_row *y
     GS4I_ROW_MUL(t, *x, *y);
 #ifdef GS4I_LONG_ROWS
     {
-        const gs4i_pair p = __builtin_shufflevector(t, t, 0, 1, 2, 3, 4, 5, 6, 7) + __builtin_shufflevector(t, t, 8, 9, 10, 11, 12, 13, 14, 15);
+        const gs4i_pair p = __builtin_shufflevector(t, t, 0, 1, 2, 3, 4, 5, 6, 7)
+                            + __builtin_shufflevector(t, t, 8, 9, 10, 11, 12, 13, 14, 15);
         *q = __builtin_shufflevector(p, p, 0, 1, 2, 3) + __builtin_shufflevector(p, p, 4, 5, 6, 7);
     }
 #elif defined(GS4I_PAIRS)
     t.cd += t.ab;
-    *q = __builtin_shufflevector(t.cd, t.cd, 0, 1, 2, 3) + __builtin_shufflevector(t.ab, t.ab, 4, 5, 6, 7);
+    *q = __builtin_shufflevector(t.cd, t.cd, 0, 1, 2, 3)
+         + __builtin_shufflevector(t.ab, t.ab, 4, 5, 6, 7);
 #else
-    GS4I_SUM(*q, t.a, t.c); GS4I_SUM(*q, *q, t.b);
+    GS4I_SUM(*q, t.a, t.c);
+    GS4I_SUM(*q, *q, t.b);
 #endif
 }
 
-/* Sixteen particles of a block go together, a batch. What each does by itself is done for GS4I_WIDTH of them at a time: one
- * number of each side by side in a `wide`, the widest vector of the machine, or a plain number where there are none. The
- * formulas are written once for all of these, in loops over the wides of a batch. */
-enum { GS4I_BATCH = 16 };
+/* Sixteen particles of a block go together, a batch. What each does by itself is done for
+ * GS4I_WIDTH of them at a time: one number of each side by side in a `wide`, the widest vector
+ * of the machine, or a plain number where there are none. The formulas are written once for all
+ * of these, in loops over the wides of a batch. */
+enum {
+    GS4I_BATCH = 16
+};
 #ifndef GS4I_VECTORS
 #define GS4I_WIDTH 1
 typedef gs4_real gs4i_wide;
 typedef int32_t gs4i_wide_int;
 typedef int gs4i_wide_mask;
-#define GS4I_CHOOSE(r, mask, x, y) ((r) = (mask) ? (x) : (y))          /* r = mask ? x : y  lane by lane */
+/* r = mask ? x : y  lane by lane */
+#define GS4I_CHOOSE(r, mask, x, y) ((r) = (mask) ? (x) : (y))
 #define GS4I_CHOOSE_INT GS4I_CHOOSE
 #define GS4I_TRUNCATE(i, x) ((i) = (int32_t)(x))
 #define GS4I_TO_REAL(x, i) ((x) = (gs4_real)(i))
@@ -3129,18 +4043,26 @@ typedef int64_t gs4i_wide_mask __attribute__((vector_size(GS4I_WIDTH * sizeof(in
 #else
 typedef int32_t gs4i_wide_mask __attribute__((vector_size(GS4I_WIDTH * sizeof(int32_t))));
 #endif
-#define GS4I_CHOOSE(r, mask, x, y) do { const gs4i_wide_mask gs4i_m = (mask); \
-    (r) = (gs4i_wide)(((gs4i_wide_mask)(x) & gs4i_m) | ((gs4i_wide_mask)(y) & ~gs4i_m)); } while (0)
-#define GS4I_CHOOSE_INT(r, mask, x, y) do { const gs4i_wide_int gs4i_m = (mask); (r) = ((x) & gs4i_m) | ((y) & ~gs4i_m); } while (0)
+#define GS4I_CHOOSE(r, mask, x, y)                                                         \
+    do {                                                                                   \
+        const gs4i_wide_mask gs4i_m = (mask);                                              \
+        (r) = (gs4i_wide)(((gs4i_wide_mask)(x)&gs4i_m) | ((gs4i_wide_mask)(y) & ~gs4i_m)); \
+    } while (0)
+#define GS4I_CHOOSE_INT(r, mask, x, y)        \
+    do {                                      \
+        const gs4i_wide_int gs4i_m = (mask);  \
+        (r) = ((x)&gs4i_m) | ((y) & ~gs4i_m); \
+    } while (0)
 #define GS4I_TRUNCATE(i, x) ((i) = __builtin_convertvector(x, gs4i_wide_int))
 #define GS4I_TO_REAL(x, i) ((x) = __builtin_convertvector(i, gs4i_wide))
 #endif
 #define GS4I_WIDE_MAX(r, x, y) GS4I_CHOOSE(r, (x) > (y), x, y)
 #define GS4I_WIDE_MIN(r, x, y) GS4I_CHOOSE(r, (x) < (y), x, y)
 
-typedef gs4i_wide gs4i_lanes[GS4I_BATCH / GS4I_WIDTH];                 /* one number of each particle of a batch */
+/* one number of each particle of a batch */
+typedef gs4i_wide gs4i_lanes[GS4I_BATCH / GS4I_WIDTH];
 #define GS4I_BATCH_LOOP(b) for (b = 0; b < GS4I_BATCH / GS4I_WIDTH; b++)
-#define GS4I_NTH(lanes, n) (((gs4_real *)(lanes))[n])                  /* of particle n */
+#define GS4I_NTH(lanes, n) (((gs4_real *)(lanes))[n]) /* of particle n */
 #define GS4I_NTH_CONST(lanes, n) (((const gs4_real *)(lanes))[n])
 
 /* Does the mask hold for all? */
@@ -3163,9 +4085,16 @@ GS4I_INLINE void gs4i_load_four(const gs4_real *from, int apart, gs4i_wide *p)
 {
     gs4i_quad a, b, c, d;
     gs4i_pair ab, cd;
-    if (apart == 4) { GS4I_LOAD(*p, from); return; }
-    GS4I_LOAD(a, from); GS4I_LOAD(b, from + apart); GS4I_LOAD(c, from + 2 * apart); GS4I_LOAD(d, from + 3 * apart);
-    ab = __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7); cd = __builtin_shufflevector(c, d, 0, 1, 2, 3, 4, 5, 6, 7);
+    if (apart == 4) {
+        GS4I_LOAD(*p, from);
+        return;
+    }
+    GS4I_LOAD(a, from);
+    GS4I_LOAD(b, from + apart);
+    GS4I_LOAD(c, from + 2 * apart);
+    GS4I_LOAD(d, from + 3 * apart);
+    ab = __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7);
+    cd = __builtin_shufflevector(c, d, 0, 1, 2, 3, 4, 5, 6, 7);
     *p = __builtin_shufflevector(ab, cd, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
 }
 #endif
@@ -3175,30 +4104,43 @@ GS4I_INLINE void gs4i_sixteen_to_lanes(const gs4_real *from, int apart, gs4i_lan
 {
 #if GS4I_WIDTH == 16
     gs4i_wide p0, p1, p2, p3, xy, zw, XY, ZW;
-    gs4i_load_four(from, apart, &p0); gs4i_load_four(from + 4 * apart, apart, &p1);
-    gs4i_load_four(from + 8 * apart, apart, &p2); gs4i_load_four(from + 12 * apart, apart, &p3);
+    gs4i_load_four(from, apart, &p0);
+    gs4i_load_four(from + 4 * apart, apart, &p1);
+    gs4i_load_four(from + 8 * apart, apart, &p2);
+    gs4i_load_four(from + 12 * apart, apart, &p3);
     xy = __builtin_shufflevector(p0, p1, 0, 4, 8, 12, 16, 20, 24, 28, 1, 5, 9, 13, 17, 21, 25, 29);
-    zw = __builtin_shufflevector(p0, p1, 2, 6, 10, 14, 18, 22, 26, 30, 3, 7, 11, 15, 19, 23, 27, 31);
+    zw =
+        __builtin_shufflevector(p0, p1, 2, 6, 10, 14, 18, 22, 26, 30, 3, 7, 11, 15, 19, 23, 27, 31);
     XY = __builtin_shufflevector(p2, p3, 0, 4, 8, 12, 16, 20, 24, 28, 1, 5, 9, 13, 17, 21, 25, 29);
-    ZW = __builtin_shufflevector(p2, p3, 2, 6, 10, 14, 18, 22, 26, 30, 3, 7, 11, 15, 19, 23, 27, 31);
-    to[0][0] = __builtin_shufflevector(xy, XY, 0, 1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 20, 21, 22, 23);
-    to[1][0] = __builtin_shufflevector(xy, XY, 8, 9, 10, 11, 12, 13, 14, 15, 24, 25, 26, 27, 28, 29, 30, 31);
-    to[2][0] = __builtin_shufflevector(zw, ZW, 0, 1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 20, 21, 22, 23);
-    to[3][0] = __builtin_shufflevector(zw, ZW, 8, 9, 10, 11, 12, 13, 14, 15, 24, 25, 26, 27, 28, 29, 30, 31);
+    ZW =
+        __builtin_shufflevector(p2, p3, 2, 6, 10, 14, 18, 22, 26, 30, 3, 7, 11, 15, 19, 23, 27, 31);
+    to[0][0] =
+        __builtin_shufflevector(xy, XY, 0, 1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 20, 21, 22, 23);
+    to[1][0] = __builtin_shufflevector(xy, XY, 8, 9, 10, 11, 12, 13, 14, 15, 24, 25, 26, 27, 28, 29,
+                                       30, 31);
+    to[2][0] =
+        __builtin_shufflevector(zw, ZW, 0, 1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 20, 21, 22, 23);
+    to[3][0] = __builtin_shufflevector(zw, ZW, 8, 9, 10, 11, 12, 13, 14, 15, 24, 25, 26, 27, 28, 29,
+                                       30, 31);
 #elif GS4I_WIDTH == 8
     int b, i;
     for (b = 0; b < 2; b++) {
-        gs4i_wide p[4], xy, zw, XY, ZW;                     /* particles 0 and 4, 1 and 5, ... */
+        gs4i_wide p[4], xy, zw, XY, ZW; /* particles 0 and 4, 1 and 5, ... */
         for (i = 0; i < 4; i++, from += apart) {
             gs4i_quad low, high;
-            GS4I_LOAD(low, from); GS4I_LOAD(high, from + 4 * apart);
+            GS4I_LOAD(low, from);
+            GS4I_LOAD(high, from + 4 * apart);
             p[i] = __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7);
         }
         from += 4 * apart;
-        xy = __builtin_shufflevector(p[0], p[1], 0, 8, 1, 9, 4, 12, 5, 13); zw = __builtin_shufflevector(p[0], p[1], 2, 10, 3, 11, 6, 14, 7, 15);
-        XY = __builtin_shufflevector(p[2], p[3], 0, 8, 1, 9, 4, 12, 5, 13); ZW = __builtin_shufflevector(p[2], p[3], 2, 10, 3, 11, 6, 14, 7, 15);
-        to[0][b] = __builtin_shufflevector(xy, XY, 0, 1, 8, 9, 4, 5, 12, 13); to[1][b] = __builtin_shufflevector(xy, XY, 2, 3, 10, 11, 6, 7, 14, 15);
-        to[2][b] = __builtin_shufflevector(zw, ZW, 0, 1, 8, 9, 4, 5, 12, 13); to[3][b] = __builtin_shufflevector(zw, ZW, 2, 3, 10, 11, 6, 7, 14, 15);
+        xy = __builtin_shufflevector(p[0], p[1], 0, 8, 1, 9, 4, 12, 5, 13);
+        zw = __builtin_shufflevector(p[0], p[1], 2, 10, 3, 11, 6, 14, 7, 15);
+        XY = __builtin_shufflevector(p[2], p[3], 0, 8, 1, 9, 4, 12, 5, 13);
+        ZW = __builtin_shufflevector(p[2], p[3], 2, 10, 3, 11, 6, 14, 7, 15);
+        to[0][b] = __builtin_shufflevector(xy, XY, 0, 1, 8, 9, 4, 5, 12, 13);
+        to[1][b] = __builtin_shufflevector(xy, XY, 2, 3, 10, 11, 6, 7, 14, 15);
+        to[2][b] = __builtin_shufflevector(zw, ZW, 0, 1, 8, 9, 4, 5, 12, 13);
+        to[3][b] = __builtin_shufflevector(zw, ZW, 2, 3, 10, 11, 6, 7, 14, 15);
     }
 #elif GS4I_WIDTH == 4
     gs4i_quad c[4];
@@ -3209,7 +4151,8 @@ GS4I_INLINE void gs4i_sixteen_to_lanes(const gs4_real *from, int apart, gs4i_lan
     }
 #else
     int b, i;
-    for (b = 0; b < GS4I_BATCH; b++) for (i = 0; i < 4; i++) to[i][b] = from[apart * b + i];
+    for (b = 0; b < GS4I_BATCH; b++)
+        for (i = 0; i < 4; i++) to[i][b] = from[apart * b + i];
 #endif
 }
 
@@ -3227,32 +4170,60 @@ GS4I_INLINE void gs4i_to_lanes(const gs4_real *from, int n, gs4i_lanes to[4])
 }
 
 /* And back: (x y z w) of each particle. */
-GS4I_INLINE void gs4i_from_lanes(const gs4i_wide *x, const gs4i_wide *y, const gs4i_wide *z, const gs4i_wide *w, gs4_real to[4 * GS4I_BATCH])
+GS4I_INLINE void gs4i_from_lanes(const gs4i_wide *x, const gs4i_wide *y, const gs4i_wide *z,
+                                 const gs4i_wide *w, gs4_real to[4 * GS4I_BATCH])
 {
 #if GS4I_WIDTH == 16
-    const gs4i_wide xy = __builtin_shufflevector(*x, *y, 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);    /* of particles 0 1 4 5 8 9 .. */
-    const gs4i_wide XY = __builtin_shufflevector(*x, *y, 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
-    const gs4i_wide zw = __builtin_shufflevector(*z, *w, 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
-    const gs4i_wide ZW = __builtin_shufflevector(*z, *w, 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
-    const gs4i_wide p04 = __builtin_shufflevector(xy, zw, 0, 1, 16, 17, 2, 3, 18, 19, 4, 5, 20, 21, 6, 7, 22, 23);      /* 0 1 4 5 */
-    const gs4i_wide p8c = __builtin_shufflevector(xy, zw, 8, 9, 24, 25, 10, 11, 26, 27, 12, 13, 28, 29, 14, 15, 30, 31);
-    const gs4i_wide p26 = __builtin_shufflevector(XY, ZW, 0, 1, 16, 17, 2, 3, 18, 19, 4, 5, 20, 21, 6, 7, 22, 23);      /* 2 3 6 7 */
-    const gs4i_wide pae = __builtin_shufflevector(XY, ZW, 8, 9, 24, 25, 10, 11, 26, 27, 12, 13, 28, 29, 14, 15, 30, 31);
-    const gs4i_wide p0 = __builtin_shufflevector(p04, p26, 0, 1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 20, 21, 22, 23);
-    const gs4i_wide p4 = __builtin_shufflevector(p04, p26, 8, 9, 10, 11, 12, 13, 14, 15, 24, 25, 26, 27, 28, 29, 30, 31);
-    const gs4i_wide p8 = __builtin_shufflevector(p8c, pae, 0, 1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 20, 21, 22, 23);
-    const gs4i_wide pc = __builtin_shufflevector(p8c, pae, 8, 9, 10, 11, 12, 13, 14, 15, 24, 25, 26, 27, 28, 29, 30, 31);
-    GS4I_STORE(to, p0); GS4I_STORE(to + 16, p4); GS4I_STORE(to + 32, p8); GS4I_STORE(to + 48, pc);
+    /* of particles 0 1 4 5 8 9 .. */
+    const gs4i_wide xy =
+        __builtin_shufflevector(*x, *y, 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
+    const gs4i_wide XY =
+        __builtin_shufflevector(*x, *y, 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
+    const gs4i_wide zw =
+        __builtin_shufflevector(*z, *w, 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
+    const gs4i_wide ZW =
+        __builtin_shufflevector(*z, *w, 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
+    /* 0 1 4 5 */
+    const gs4i_wide p04 =
+        __builtin_shufflevector(xy, zw, 0, 1, 16, 17, 2, 3, 18, 19, 4, 5, 20, 21, 6, 7, 22, 23);
+    const gs4i_wide p8c = __builtin_shufflevector(xy, zw, 8, 9, 24, 25, 10, 11, 26, 27, 12, 13, 28,
+                                                  29, 14, 15, 30, 31);
+    /* 2 3 6 7 */
+    const gs4i_wide p26 =
+        __builtin_shufflevector(XY, ZW, 0, 1, 16, 17, 2, 3, 18, 19, 4, 5, 20, 21, 6, 7, 22, 23);
+    const gs4i_wide pae = __builtin_shufflevector(XY, ZW, 8, 9, 24, 25, 10, 11, 26, 27, 12, 13, 28,
+                                                  29, 14, 15, 30, 31);
+    const gs4i_wide p0 =
+        __builtin_shufflevector(p04, p26, 0, 1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 20, 21, 22, 23);
+    const gs4i_wide p4 = __builtin_shufflevector(p04, p26, 8, 9, 10, 11, 12, 13, 14, 15, 24, 25, 26,
+                                                 27, 28, 29, 30, 31);
+    const gs4i_wide p8 =
+        __builtin_shufflevector(p8c, pae, 0, 1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 20, 21, 22, 23);
+    const gs4i_wide pc = __builtin_shufflevector(p8c, pae, 8, 9, 10, 11, 12, 13, 14, 15, 24, 25, 26,
+                                                 27, 28, 29, 30, 31);
+    GS4I_STORE(to, p0);
+    GS4I_STORE(to + 16, p4);
+    GS4I_STORE(to + 32, p8);
+    GS4I_STORE(to + 48, pc);
 #elif GS4I_WIDTH == 8
     int b;
     for (b = 0; b < 2; b++, to += 32) {
-        const gs4i_wide xy = __builtin_shufflevector(x[b], y[b], 0, 8, 1, 9, 4, 12, 5, 13), XY = __builtin_shufflevector(x[b], y[b], 2, 10, 3, 11, 6, 14, 7, 15);
-        const gs4i_wide zw = __builtin_shufflevector(z[b], w[b], 0, 8, 1, 9, 4, 12, 5, 13), ZW = __builtin_shufflevector(z[b], w[b], 2, 10, 3, 11, 6, 14, 7, 15);
-        const gs4i_wide p04 = __builtin_shufflevector(xy, zw, 0, 1, 8, 9, 4, 5, 12, 13), p15 = __builtin_shufflevector(xy, zw, 2, 3, 10, 11, 6, 7, 14, 15);
-        const gs4i_wide p26 = __builtin_shufflevector(XY, ZW, 0, 1, 8, 9, 4, 5, 12, 13), p37 = __builtin_shufflevector(XY, ZW, 2, 3, 10, 11, 6, 7, 14, 15);
-        const gs4i_wide p01 = __builtin_shufflevector(p04, p15, 0, 1, 2, 3, 8, 9, 10, 11), p23 = __builtin_shufflevector(p26, p37, 0, 1, 2, 3, 8, 9, 10, 11);
-        const gs4i_wide p45 = __builtin_shufflevector(p04, p15, 4, 5, 6, 7, 12, 13, 14, 15), p67 = __builtin_shufflevector(p26, p37, 4, 5, 6, 7, 12, 13, 14, 15);
-        GS4I_STORE(to, p01); GS4I_STORE(to + 8, p23); GS4I_STORE(to + 16, p45); GS4I_STORE(to + 24, p67);
+        const gs4i_wide xy = __builtin_shufflevector(x[b], y[b], 0, 8, 1, 9, 4, 12, 5, 13),
+                        XY = __builtin_shufflevector(x[b], y[b], 2, 10, 3, 11, 6, 14, 7, 15);
+        const gs4i_wide zw = __builtin_shufflevector(z[b], w[b], 0, 8, 1, 9, 4, 12, 5, 13),
+                        ZW = __builtin_shufflevector(z[b], w[b], 2, 10, 3, 11, 6, 14, 7, 15);
+        const gs4i_wide p04 = __builtin_shufflevector(xy, zw, 0, 1, 8, 9, 4, 5, 12, 13),
+                        p15 = __builtin_shufflevector(xy, zw, 2, 3, 10, 11, 6, 7, 14, 15);
+        const gs4i_wide p26 = __builtin_shufflevector(XY, ZW, 0, 1, 8, 9, 4, 5, 12, 13),
+                        p37 = __builtin_shufflevector(XY, ZW, 2, 3, 10, 11, 6, 7, 14, 15);
+        const gs4i_wide p01 = __builtin_shufflevector(p04, p15, 0, 1, 2, 3, 8, 9, 10, 11),
+                        p23 = __builtin_shufflevector(p26, p37, 0, 1, 2, 3, 8, 9, 10, 11);
+        const gs4i_wide p45 = __builtin_shufflevector(p04, p15, 4, 5, 6, 7, 12, 13, 14, 15),
+                        p67 = __builtin_shufflevector(p26, p37, 4, 5, 6, 7, 12, 13, 14, 15);
+        GS4I_STORE(to, p01);
+        GS4I_STORE(to + 8, p23);
+        GS4I_STORE(to + 16, p45);
+        GS4I_STORE(to + 24, p67);
     }
 #elif GS4I_WIDTH == 4
     int b;
@@ -3260,32 +4231,44 @@ GS4I_INLINE void gs4i_from_lanes(const gs4i_wide *x, const gs4i_wide *y, const g
         gs4_real four[16];
         gs4i_quad c[4];
         int i;
-        memcpy(four, (const gs4_real *)x + b, 4 * sizeof *four); memcpy(four + 4, (const gs4_real *)y + b, 4 * sizeof *four);
-        memcpy(four + 8, (const gs4_real *)z + b, 4 * sizeof *four); memcpy(four + 12, (const gs4_real *)w + b, 4 * sizeof *four);
+        memcpy(four, (const gs4_real *)x + b, 4 * sizeof *four);
+        memcpy(four + 4, (const gs4_real *)y + b, 4 * sizeof *four);
+        memcpy(four + 8, (const gs4_real *)z + b, 4 * sizeof *four);
+        memcpy(four + 12, (const gs4_real *)w + b, 4 * sizeof *four);
         gs4i_transpose(four, 4, c);
         for (i = 0; i < 4; i++) GS4I_STORE(to + 4 * (b + i), c[i]);
     }
 #else
     int b;
-    for (b = 0; b < GS4I_BATCH; b++) { to[4 * b] = x[b]; to[4 * b + 1] = y[b]; to[4 * b + 2] = z[b]; to[4 * b + 3] = w[b]; }
+    for (b = 0; b < GS4I_BATCH; b++) {
+        to[4 * b] = x[b];
+        to[4 * b + 1] = y[b];
+        to[4 * b + 2] = z[b];
+        to[4 * b + 3] = w[b];
+    }
 #endif
 }
 
-/* `reals` numbers of each of n particles, side by side in memory, into as many lanes. Not one number more is read: those behind
- * may belong to another block, which is in work. */
+/* `reals` numbers of each of n particles, side by side in memory, into as many lanes. Not one
+ * number more is read: those behind may belong to another block, which is in work. */
 GS4I_INLINE void gs4i_numbers_to_lanes(const gs4_real *from, int reals, int n, gs4i_lanes *l)
 {
     gs4_real four[4 * GS4I_BATCH];
     gs4i_lanes last[4];
     int part, b;
     for (part = 0; 4 * part + 4 <= reals; part++) {
-        if (n == GS4I_BATCH) { gs4i_sixteen_to_lanes(from + 4 * part, reals, l + 4 * part); continue; }
+        if (n == GS4I_BATCH) {
+            gs4i_sixteen_to_lanes(from + 4 * part, reals, l + 4 * part);
+            continue;
+        }
         for (b = 0; b < n; b++) memcpy(four + 4 * b, from + reals * b + 4 * part, 4 * sizeof *four);
         gs4i_to_lanes(four, n, l + 4 * part);
     }
     if (4 * part == reals) return;
     memset(four, 0, sizeof four);
-    for (b = 0; b < n; b++) memcpy(four + 4 * b, from + reals * b + 4 * part, (size_t)(reals - 4 * part) * sizeof *four);
+    for (b = 0; b < n; b++)
+        memcpy(four + 4 * b, from + reals * b + 4 * part,
+               (size_t)(reals - 4 * part) * sizeof *four);
     gs4i_to_lanes(four, n, last);
     memcpy(l + 4 * part, last, (size_t)(reals - 4 * part) * sizeof *last);
 }
@@ -3299,18 +4282,24 @@ GS4I_INLINE void gs4i_lanes_to_numbers(gs4i_lanes *l, int reals, int n, gs4_real
         gs4i_from_lanes(l[4 * part], l[4 * part + 1], l[4 * part + 2], l[4 * part + 3], four);
         for (b = 0; b < n; b++) memcpy(to + reals * b + 4 * part, four + 4 * b, 4 * sizeof *four);
     }
-    for (part *= 4; part < reals; part++) for (b = 0; b < n; b++) to[reals * b + part] = GS4I_NTH(l[part], b);
+    for (part *= 4; part < reals; part++)
+        for (b = 0; b < n; b++) to[reals * b + part] = GS4I_NTH(l[part], b);
 }
 
-/* Weights and derivatives (1/m) of a batch, [axis][node], and where each particle's first node is in the tile. */
+/* Weights and derivatives (1/m) of a batch, [axis][node], and where each particle's first node
+ * is in the tile. */
 typedef struct gs4i_stencils {
     gs4i_lanes w[3][3], d[3][3];
-    gs4i_lanes xi[3];                   /* offset from the centre of its cell, in cells */
-    int32_t base[GS4I_BATCH];           /* number of its first node in the tile, or -1: outside of it */
+    gs4i_lanes xi[3]; /* offset from the centre of its cell, in cells */
+    /* number of its first node in the tile, or -1: outside of it */
+    int32_t base[GS4I_BATCH];
 } gs4i_stencils;
 
-/* From the domain to tile coordinates: (x - origin) / h - first; a particle there is in the cell of node floor(x). */
-typedef struct gs4i_frame { gs4_real origin[3], first[3], inv_h; } gs4i_frame;
+/* From the domain to tile coordinates: (x - origin) / h - first; a particle there is in the cell
+ * of node floor(x). */
+typedef struct gs4i_frame {
+    gs4_real origin[3], first[3], inv_h;
+} gs4i_frame;
 
 /* Coordinates outside of 1 <= x < 7 cells, and NaN, give base -1. */
 GS4I_INLINE void gs4i_stencils_at(gs4i_stencils *s, const gs4i_frame *f, gs4i_lanes x[3])
@@ -3327,10 +4316,16 @@ GS4I_INLINE void gs4i_stencils_at(gs4i_stencils *s, const gs4i_frame *f, gs4i_la
             GS4I_CHOOSE(safe, (t >= GS4I_C(1)) & (t < GS4I_C(GS4I_TILE - 1)), t, zero);
             GS4I_TRUNCATE(cell[a], safe);
             GS4I_TO_REAL(xi, cell[a]);
-            xi = safe - xi - GS4I_C(0.5); lo = GS4I_C(0.5) - xi; hi = GS4I_C(0.5) + xi;
+            xi = safe - xi - GS4I_C(0.5);
+            lo = GS4I_C(0.5) - xi;
+            hi = GS4I_C(0.5) + xi;
             s->xi[a][b] = xi;
-            s->w[a][0][b] = GS4I_C(0.5) * (lo * lo); s->w[a][1][b] = GS4I_C(0.75) - xi * xi; s->w[a][2][b] = GS4I_C(0.5) * (hi * hi);
-            s->d[a][0][b] = -f->inv_h * lo; s->d[a][1][b] = (-2 * f->inv_h) * xi; s->d[a][2][b] = f->inv_h * hi;
+            s->w[a][0][b] = GS4I_C(0.5) * (lo * lo);
+            s->w[a][1][b] = GS4I_C(0.75) - xi * xi;
+            s->w[a][2][b] = GS4I_C(0.5) * (hi * hi);
+            s->d[a][0][b] = -f->inv_h * lo;
+            s->d[a][1][b] = (-2 * f->inv_h) * xi;
+            s->d[a][2][b] = f->inv_h * hi;
         }
         base = ((cell[2] - 1) * GS4I_TILE + (cell[1] - 1)) * GS4I_TILE + (cell[0] - 1);
         GS4I_CHOOSE_INT(base, (cell[0] > 0) & (cell[1] > 0) & (cell[2] > 0), base, 0 * base - 1);
@@ -3338,20 +4333,24 @@ GS4I_INLINE void gs4i_stencils_at(gs4i_stencils *s, const gs4i_frame *f, gs4i_la
     }
 }
 
-/* tile += row by row  y_j z_k P0 + dy_j z_k P1 + y_j dz_k P2,  where the x-weights are in P0, P1, P2 already. */
-GS4I_INLINE void gs4i_scatter_rows(gs4_real *GS4I_RESTRICT at, const gs4i_row *p0, const gs4i_row *p1, const gs4i_row *p2,
-                                   const gs4i_stencils *s, int n)
+/* tile += row by row  y_j z_k P0 + dy_j z_k P1 + y_j dz_k P2,  where the x-weights are in P0,
+ * P1, P2 already. */
+GS4I_INLINE void gs4i_scatter_rows(gs4_real *GS4I_RESTRICT at, const gs4i_row *p0,
+                                   const gs4i_row *p1, const gs4i_row *p2, const gs4i_stencils *s,
+                                   int n)
 {
     int j, k;
     for (j = 0; j < 3; j++) {
         gs4i_row a, b;
-        GS4I_ROW_SPLAT_MUL(a, GS4I_NTH_CONST(s->w[1][j], n), *p0); GS4I_ROW_SPLAT_MAD(a, GS4I_NTH_CONST(s->d[1][j], n), *p1);
+        GS4I_ROW_SPLAT_MUL(a, GS4I_NTH_CONST(s->w[1][j], n), *p0);
+        GS4I_ROW_SPLAT_MAD(a, GS4I_NTH_CONST(s->d[1][j], n), *p1);
         GS4I_ROW_SPLAT_MUL(b, GS4I_NTH_CONST(s->w[1][j], n), *p2);
         for (k = 0; k < 3; k++) {
             gs4_real *row = at + 4 * GS4I_TILE * (GS4I_TILE * k + j);
             gs4i_row r, t;
             GS4I_ROW_LOAD(r, row);
-            GS4I_ROW_SPLAT_MUL(t, GS4I_NTH_CONST(s->w[2][k], n), a); GS4I_ROW_SPLAT_MAD(t, GS4I_NTH_CONST(s->d[2][k], n), b);
+            GS4I_ROW_SPLAT_MUL(t, GS4I_NTH_CONST(s->w[2][k], n), a);
+            GS4I_ROW_SPLAT_MAD(t, GS4I_NTH_CONST(s->d[2][k], n), b);
             GS4I_ROW_SUM(r, r, t);
             GS4I_ROW_STORE(row, r);
         }
@@ -3359,44 +4358,66 @@ GS4I_INLINE void gs4i_scatter_rows(gs4_real *GS4I_RESTRICT at, const gs4i_row *p
 }
 
 /* The three rows of one z: sums with the weights and with the derivatives along y */
-GS4I_INLINE void gs4i_gather_plane(const gs4_real *at, const gs4i_stencils *s, int n, gs4i_row *plain, gs4i_row *slope)
+GS4I_INLINE void gs4i_gather_plane(const gs4_real *at, const gs4i_stencils *s, int n,
+                                   gs4i_row *plain, gs4i_row *slope)
 {
     gs4i_row r;
     GS4I_ROW_LOAD(r, at);
-    GS4I_ROW_SPLAT_MUL(*plain, GS4I_NTH_CONST(s->w[1][0], n), r); GS4I_ROW_SPLAT_MUL(*slope, GS4I_NTH_CONST(s->d[1][0], n), r);
+    GS4I_ROW_SPLAT_MUL(*plain, GS4I_NTH_CONST(s->w[1][0], n), r);
+    GS4I_ROW_SPLAT_MUL(*slope, GS4I_NTH_CONST(s->d[1][0], n), r);
     GS4I_ROW_LOAD(r, at + 4 * GS4I_TILE);
-    GS4I_ROW_SPLAT_MAD(*plain, GS4I_NTH_CONST(s->w[1][1], n), r); GS4I_ROW_SPLAT_MAD(*slope, GS4I_NTH_CONST(s->d[1][1], n), r);
+    GS4I_ROW_SPLAT_MAD(*plain, GS4I_NTH_CONST(s->w[1][1], n), r);
+    GS4I_ROW_SPLAT_MAD(*slope, GS4I_NTH_CONST(s->d[1][1], n), r);
     GS4I_ROW_LOAD(r, at + 8 * GS4I_TILE);
-    GS4I_ROW_SPLAT_MAD(*plain, GS4I_NTH_CONST(s->w[1][2], n), r); GS4I_ROW_SPLAT_MAD(*slope, GS4I_NTH_CONST(s->d[1][2], n), r);
+    GS4I_ROW_SPLAT_MAD(*plain, GS4I_NTH_CONST(s->w[1][2], n), r);
+    GS4I_ROW_SPLAT_MAD(*slope, GS4I_NTH_CONST(s->d[1][2], n), r);
 }
 
-/* What nodes give to a batch: value (with the fourth number of the nodes) and the columns of its gradient, four numbers a
- * particle; then the same in lanes. */
-typedef struct gs4i_gathered { gs4_real value[4 * GS4I_BATCH], dx[4 * GS4I_BATCH], dy[4 * GS4I_BATCH], dz[4 * GS4I_BATCH]; } gs4i_gathered;
+/* What nodes give to a batch: value (with the fourth number of the nodes) and the columns of its
+ * gradient, four numbers a particle; then the same in lanes. */
+typedef struct gs4i_gathered {
+    gs4_real value[4 * GS4I_BATCH], dx[4 * GS4I_BATCH], dy[4 * GS4I_BATCH], dz[4 * GS4I_BATCH];
+} gs4i_gathered;
 
-/* Forces of a batch on its way to the nodes: the columns of -V sigma, and m g; four numbers a particle. */
-typedef struct gs4i_forces { gs4_real x[4 * GS4I_BATCH], y[4 * GS4I_BATCH], z[4 * GS4I_BATCH], weight[4 * GS4I_BATCH]; } gs4i_forces;
+/* Forces of a batch on its way to the nodes: the columns of -V sigma, and m g; four numbers a
+ * particle. */
+typedef struct gs4i_forces {
+    gs4_real x[4 * GS4I_BATCH], y[4 * GS4I_BATCH], z[4 * GS4I_BATCH], weight[4 * GS4I_BATCH];
+} gs4i_forces;
 
-/* Particle n: value = sum_i w_i f_i, dx = sum_i dw_i/dx f_i, ...; wx and dx the spread weights and derivatives along x */
-GS4I_INLINE void gs4i_gather_local(const gs4_real *at, const gs4i_stencils *s, int n, const gs4i_row *wx, const gs4i_row *dx, gs4i_gathered *g)
+/* Particle n: value = sum_i w_i f_i, dx = sum_i dw_i/dx f_i, ...; wx and dx the spread weights
+ * and derivatives along x */
+GS4I_INLINE void gs4i_gather_local(const gs4_real *at, const gs4i_stencils *s, int n,
+                                   const gs4i_row *wx, const gs4i_row *dx, gs4i_gathered *g)
 {
     const int next = 4 * GS4I_TILE * GS4I_TILE;
     gs4i_row plain, slope, s0, s1, s2;
     gs4i_quad q;
     gs4i_gather_plane(at, s, n, &plain, &slope);
-    GS4I_ROW_SPLAT_MUL(s0, GS4I_NTH_CONST(s->w[2][0], n), plain); GS4I_ROW_SPLAT_MUL(s1, GS4I_NTH_CONST(s->w[2][0], n), slope); GS4I_ROW_SPLAT_MUL(s2, GS4I_NTH_CONST(s->d[2][0], n), plain);
+    GS4I_ROW_SPLAT_MUL(s0, GS4I_NTH_CONST(s->w[2][0], n), plain);
+    GS4I_ROW_SPLAT_MUL(s1, GS4I_NTH_CONST(s->w[2][0], n), slope);
+    GS4I_ROW_SPLAT_MUL(s2, GS4I_NTH_CONST(s->d[2][0], n), plain);
     gs4i_gather_plane(at + next, s, n, &plain, &slope);
-    GS4I_ROW_SPLAT_MAD(s0, GS4I_NTH_CONST(s->w[2][1], n), plain); GS4I_ROW_SPLAT_MAD(s1, GS4I_NTH_CONST(s->w[2][1], n), slope); GS4I_ROW_SPLAT_MAD(s2, GS4I_NTH_CONST(s->d[2][1], n), plain);
+    GS4I_ROW_SPLAT_MAD(s0, GS4I_NTH_CONST(s->w[2][1], n), plain);
+    GS4I_ROW_SPLAT_MAD(s1, GS4I_NTH_CONST(s->w[2][1], n), slope);
+    GS4I_ROW_SPLAT_MAD(s2, GS4I_NTH_CONST(s->d[2][1], n), plain);
     gs4i_gather_plane(at + 2 * next, s, n, &plain, &slope);
-    GS4I_ROW_SPLAT_MAD(s0, GS4I_NTH_CONST(s->w[2][2], n), plain); GS4I_ROW_SPLAT_MAD(s1, GS4I_NTH_CONST(s->w[2][2], n), slope); GS4I_ROW_SPLAT_MAD(s2, GS4I_NTH_CONST(s->d[2][2], n), plain);
-    gs4i_row_dot(&q, wx, &s0); GS4I_STORE(g->value + 4 * n, q);
-    gs4i_row_dot(&q, dx, &s0); GS4I_STORE(g->dx + 4 * n, q);
-    gs4i_row_dot(&q, wx, &s1); GS4I_STORE(g->dy + 4 * n, q);
-    gs4i_row_dot(&q, wx, &s2); GS4I_STORE(g->dz + 4 * n, q);
+    GS4I_ROW_SPLAT_MAD(s0, GS4I_NTH_CONST(s->w[2][2], n), plain);
+    GS4I_ROW_SPLAT_MAD(s1, GS4I_NTH_CONST(s->w[2][2], n), slope);
+    GS4I_ROW_SPLAT_MAD(s2, GS4I_NTH_CONST(s->d[2][2], n), plain);
+    gs4i_row_dot(&q, wx, &s0);
+    GS4I_STORE(g->value + 4 * n, q);
+    gs4i_row_dot(&q, dx, &s0);
+    GS4I_STORE(g->dx + 4 * n, q);
+    gs4i_row_dot(&q, wx, &s1);
+    GS4I_STORE(g->dy + 4 * n, q);
+    gs4i_row_dot(&q, wx, &s2);
+    GS4I_STORE(g->dz + 4 * n, q);
 }
 
 /* The value alone. */
-GS4I_INLINE void gs4i_gather_value(const gs4_real *at, const gs4i_stencils *s, int n, const gs4i_row *wx, gs4_real value[4 * GS4I_BATCH])
+GS4I_INLINE void gs4i_gather_value(const gs4_real *at, const gs4i_stencils *s, int n,
+                                   const gs4i_row *wx, gs4_real value[4 * GS4I_BATCH])
 {
     gs4i_row r, s0, t;
     gs4i_quad q;
@@ -3408,7 +4429,10 @@ GS4I_INLINE void gs4i_gather_value(const gs4_real *at, const gs4i_stencils *s, i
         GS4I_ROW_SPLAT_MAD(t, GS4I_NTH_CONST(s->w[2][1], n), r);
         GS4I_ROW_LOAD(r, at + 8 * GS4I_TILE * GS4I_TILE);
         GS4I_ROW_SPLAT_MAD(t, GS4I_NTH_CONST(s->w[2][2], n), r);
-        if (j == 0) GS4I_ROW_SPLAT_MUL(s0, GS4I_NTH_CONST(s->w[1][0], n), t); else GS4I_ROW_SPLAT_MAD(s0, GS4I_NTH_CONST(s->w[1][j], n), t);
+        if (j == 0)
+            GS4I_ROW_SPLAT_MUL(s0, GS4I_NTH_CONST(s->w[1][0], n), t);
+        else
+            GS4I_ROW_SPLAT_MAD(s0, GS4I_NTH_CONST(s->w[1][j], n), t);
     }
     gs4i_row_dot(&q, wx, &s0);
     GS4I_STORE(value + 4 * n, q);
@@ -3417,20 +4441,24 @@ GS4I_INLINE void gs4i_gather_value(const gs4_real *at, const gs4i_stencils *s, i
 /* The x-weights and x-derivatives of particle n, spread over rows. */
 GS4I_INLINE void gs4i_x_weights(const gs4i_stencils *s, int n, gs4i_row *w, gs4i_row *d)
 {
-    gs4i_row_of_nodes(w, GS4I_NTH_CONST(s->w[0][0], n), GS4I_NTH_CONST(s->w[0][1], n), GS4I_NTH_CONST(s->w[0][2], n));
-    gs4i_row_of_nodes(d, GS4I_NTH_CONST(s->d[0][0], n), GS4I_NTH_CONST(s->d[0][1], n), GS4I_NTH_CONST(s->d[0][2], n));
+    gs4i_row_of_nodes(w, GS4I_NTH_CONST(s->w[0][0], n), GS4I_NTH_CONST(s->w[0][1], n),
+                      GS4I_NTH_CONST(s->w[0][2], n));
+    gs4i_row_of_nodes(d, GS4I_NTH_CONST(s->d[0][0], n), GS4I_NTH_CONST(s->d[0][1], n),
+                      GS4I_NTH_CONST(s->d[0][2], n));
 }
 
 /* Velocity gradients of a batch from what was gathered: L[i][j] = dv_i/dx_j. */
 typedef gs4i_lanes gs4i_gradient[3][3];
 
-GS4I_INLINE void gs4i_gradient_lanes(const gs4_real *dx, const gs4_real *dy, const gs4_real *dz, int n, gs4i_gradient L)
+GS4I_INLINE void gs4i_gradient_lanes(const gs4_real *dx, const gs4_real *dy, const gs4_real *dz,
+                                     int n, gs4i_gradient L)
 {
     gs4i_lanes c[4];
     int i, j, b;
     for (j = 0; j < 3; j++) {
         gs4i_to_lanes(j == 0 ? dx : j == 1 ? dy : dz, n, c);
-        for (i = 0; i < 3; i++) GS4I_BATCH_LOOP(b) L[i][j][b] = c[i][b];
+        for (i = 0; i < 3; i++)
+            GS4I_BATCH_LOOP(b) L[i][j][b] = c[i][b];
     }
 }
 
@@ -3447,34 +4475,50 @@ GS4I_INLINE void gs4i_gradient_squared(gs4i_gradient L, gs4i_lanes squared)
     }
 }
 
-/* ==== [[grid]] blocks of nodes where there is material ============================================= *
+/* ==== [[grid]] blocks of nodes where there is material ========================================= *
  *
- * Nodes -4 .. n+3 exist along each axis (images of the walls live outside 0 .. n-1). One number per block of the
- * domain says where its nodes are; only blocks within reach of particles have any: time and memory follow the
- * material, not the domain. Per node: (momentum, mass) -> (velocity, mass); (force, -) -> (acceleration, -); and,
- * for GS4, the acceleration it remembers from step to step (`memory`, fourth number: 1 where there is one). */
+ * Nodes -4 .. n+3 exist along each axis (images of the walls live outside 0 .. n-1). One number
+ * per block of the domain says where its nodes are; only blocks within reach of particles have
+ * any: time and memory follow the material, not the domain. Per node: (momentum, mass) ->
+ * (velocity, mass); (force, -) -> (acceleration, -); and, for GS4, the acceleration it remembers
+ * from step to step (`memory`, fourth number: 1 where there is one). */
 
 #define GS4I_NODE_REALS (4 * GS4I_BLOCK_NODES)
 
 typedef struct gs4i_grid {
-    int cells[3], blocks[3];            /* domain in cells; table in blocks, one block more on every side */
-    gs4_real h, inv_h; gs4_vec3 origin;
+    /* domain in cells; table in blocks, one block more on every side */
+    int cells[3], blocks[3];
+    gs4_real h, inv_h;
+    gs4_vec3 origin;
     int periodic[3];
-    int32_t *table; size_t table_count; /* per block: 1 + its slot, 0: no nodes */
-    int active, capacity;               /* blocks with nodes, ascending by number: slot s is block[s] */
-    uint32_t *block; int32_t *occupant; /* per slot: its number; which occupied block it is, or -1 */
-    gs4_real *momentum, *force, *memory;/* GS4I_NODE_REALS per slot; memory NULL when not needed */
-    int occupied, occupied_capacity;    /* blocks with particles, ascending */
+    int32_t *table;
+    size_t table_count; /* per block: 1 + its slot, 0: no nodes */
+    /* blocks with nodes, ascending by number: slot s is block[s] */
+    int active, capacity;
+    /* per slot: its number; which occupied block it is, or -1 */
+    uint32_t *block;
+    int32_t *occupant;
+    gs4_real *momentum, *force, *memory; /* GS4I_NODE_REALS per slot; memory NULL when not needed */
+    int occupied, occupied_capacity;     /* blocks with particles, ascending */
     uint32_t *occupied_block;
-    int32_t *first;                     /* per occupied block: its first particle; one more at the end */
-    int32_t *neighbour;                 /* per occupied block: slots of the 27 blocks around, x fastest */
-    int32_t *by_colour; int colour_first[9];    /* occupied blocks by parity of their coordinates: same colour, disjoint tiles */
-    int32_t *jump_of; gs4_real *jump; int jump_count, jump_capacity;   /* [[boundary]]: per slot, 1 + its place in `jump` */
-    uint8_t *contact;                   /* of the nodes in `jump`, see [[boundary]] */
-    gs4_real *spread;                   /* 4 a slot: mean velocity of its nodes, how far they are from it, see [[step]] */
-    int with_sharp;                     /* sharpened gradients: */
-    gs4_real *sharp, *full;             /* a field sharpened; how full its nodes are, one number each: see gs4i_sharpen_block */
-    gs4i_scratch lists[2], histogram;   /* of sorting */
+    /* per occupied block: its first particle; one more at the end */
+    int32_t *first;
+    /* per occupied block: slots of the 27 blocks around, x fastest */
+    int32_t *neighbour;
+    /* occupied blocks by parity of their coordinates: same colour, disjoint tiles */
+    int32_t *by_colour;
+    int colour_first[9];
+    /* [[boundary]]: per slot, 1 + its place in `jump` */
+    int32_t *jump_of;
+    gs4_real *jump;
+    int jump_count, jump_capacity;
+    uint8_t *contact; /* of the nodes in `jump`, see [[boundary]] */
+    /* 4 a slot: mean velocity of its nodes, how far they are from it, see [[step]] */
+    gs4_real *spread;
+    int with_sharp; /* sharpened gradients: */
+    /* a field sharpened; how full its nodes are, one number each: see gs4i_sharpen_block */
+    gs4_real *sharp, *full;
+    gs4i_scratch lists[2], histogram; /* of sorting */
 } gs4i_grid;
 
 GS4I_INLINE void gs4i_block_coordinates(const gs4i_grid *g, uint32_t block, int at[3])
@@ -3486,18 +4530,22 @@ GS4I_INLINE void gs4i_block_coordinates(const gs4i_grid *g, uint32_t block, int 
 
 GS4I_INLINE uint32_t gs4i_block_number(const gs4i_grid *g, int x, int y, int z)
 {
-    return ((uint32_t)z * (uint32_t)g->blocks[1] + (uint32_t)y) * (uint32_t)g->blocks[0] + (uint32_t)x;
+    return ((uint32_t)z * (uint32_t)g->blocks[1] + (uint32_t)y) * (uint32_t)g->blocks[0]
+           + (uint32_t)x;
 }
 
-/* Where node (x, y, z), each from -4, is in the arrays of four numbers; -1: it does not exist now. */
+/* Where node (x, y, z), each from -4, is in the arrays of four numbers; -1: it does not exist
+ * now. */
 GS4I_INLINE ptrdiff_t gs4i_node_at(const gs4i_grid *g, int x, int y, int z)
 {
     int32_t slot = g->table[gs4i_block_number(g, (x + 4) >> 2, (y + 4) >> 2, (z + 4) >> 2)];
     if (!slot) return -1;
-    return (ptrdiff_t)(slot - 1) * GS4I_NODE_REALS + 4 * ((((z & 3) << 2 | (y & 3)) << 2) | (x & 3));
+    return (ptrdiff_t)(slot - 1) * GS4I_NODE_REALS
+           + 4 * ((((z & 3) << 2 | (y & 3)) << 2) | (x & 3));
 }
 
-/* Block that holds the particles of cell (x, y, z). Cells beyond the domain belong to the nearest one inside. */
+/* Block that holds the particles of cell (x, y, z). Cells beyond the domain belong to the
+ * nearest one inside. */
 GS4I_INLINE uint32_t gs4i_home_block(const gs4i_grid *g, const int cell[3])
 {
     int at[3], a;
@@ -3514,11 +4562,13 @@ static void gs4i_grid_free(gs4i_memory *m, gs4i_grid *g)
     gs4i_free(m, g->table, g->table_count, sizeof *g->table);
     gs4i_free(m, g->block, c, sizeof *g->block);
     gs4i_free(m, g->occupant, c, sizeof *g->occupant);
-    gs4i_free(m, g->jump_of, c, sizeof *g->jump_of); gs4i_free(m, g->spread, c, 4 * sizeof *g->spread);
+    gs4i_free(m, g->jump_of, c, sizeof *g->jump_of);
+    gs4i_free(m, g->spread, c, 4 * sizeof *g->spread);
     gs4i_free(m, g->momentum, c, GS4I_NODE_REALS * sizeof(gs4_real));
     gs4i_free(m, g->force, c, GS4I_NODE_REALS * sizeof(gs4_real));
     gs4i_free(m, g->memory, c, GS4I_NODE_REALS * sizeof(gs4_real));
-    gs4i_free(m, g->sharp, c, GS4I_NODE_REALS * sizeof(gs4_real)); gs4i_free(m, g->full, c, GS4I_BLOCK_NODES * sizeof(gs4_real));
+    gs4i_free(m, g->sharp, c, GS4I_NODE_REALS * sizeof(gs4_real));
+    gs4i_free(m, g->full, c, GS4I_BLOCK_NODES * sizeof(gs4_real));
     gs4i_free(m, g->occupied_block, o, sizeof *g->occupied_block);
     gs4i_free(m, g->first, o + 1, sizeof *g->first);
     gs4i_free(m, g->neighbour, o, 27 * sizeof *g->neighbour);
@@ -3534,7 +4584,8 @@ static void gs4i_grid_free(gs4i_memory *m, gs4i_grid *g)
 static int gs4i_grid_reserve(gs4i_memory *m, gs4i_grid *g, int count, int with_memory)
 {
     gs4i_grid n = *g;
-    size_t c, old = (size_t)g->capacity, keep = (size_t)g->active, node = GS4I_NODE_REALS * sizeof(gs4_real), one = GS4I_BLOCK_NODES * sizeof(gs4_real);
+    size_t c, old = (size_t)g->capacity, keep = (size_t)g->active,
+              node = GS4I_NODE_REALS * sizeof(gs4_real), one = GS4I_BLOCK_NODES * sizeof(gs4_real);
     if (count <= g->capacity) return GS4_OK;
     n.capacity = count + count / 16;
     c = (size_t)n.capacity;
@@ -3547,17 +4598,30 @@ static int gs4i_grid_reserve(gs4i_memory *m, gs4i_grid *g, int count, int with_m
     n.memory = with_memory ? (gs4_real *)gs4i_alloc(m, c, node) : NULL;
     n.sharp = g->with_sharp ? (gs4_real *)gs4i_alloc(m, c, node) : NULL;
     n.full = g->with_sharp ? (gs4_real *)gs4i_alloc(m, c, one) : NULL;
-    if (!n.block || !n.occupant || !n.jump_of || !n.spread || !n.momentum || !n.force || (with_memory && !n.memory) || (g->with_sharp && (!n.sharp || !n.full))) {
-        gs4i_free(m, n.block, c, sizeof *n.block); gs4i_free(m, n.occupant, c, sizeof *n.occupant);
-        gs4i_free(m, n.jump_of, c, sizeof *n.jump_of); gs4i_free(m, n.spread, c, 4 * sizeof *n.spread); gs4i_free(m, n.momentum, c, node);
-        gs4i_free(m, n.force, c, node); gs4i_free(m, n.memory, c, node); gs4i_free(m, n.sharp, c, node); gs4i_free(m, n.full, c, one);
+    if (!n.block || !n.occupant || !n.jump_of || !n.spread || !n.momentum || !n.force
+        || (with_memory && !n.memory) || (g->with_sharp && (!n.sharp || !n.full))) {
+        gs4i_free(m, n.block, c, sizeof *n.block);
+        gs4i_free(m, n.occupant, c, sizeof *n.occupant);
+        gs4i_free(m, n.jump_of, c, sizeof *n.jump_of);
+        gs4i_free(m, n.spread, c, 4 * sizeof *n.spread);
+        gs4i_free(m, n.momentum, c, node);
+        gs4i_free(m, n.force, c, node);
+        gs4i_free(m, n.memory, c, node);
+        gs4i_free(m, n.sharp, c, node);
+        gs4i_free(m, n.full, c, one);
         return GS4_ERROR_MEMORY;
     }
     if (g->block) memcpy(n.block, g->block, keep * sizeof *n.block);
     if (g->memory) memcpy(n.memory, g->memory, keep * node);
-    gs4i_free(m, g->block, old, sizeof *g->block); gs4i_free(m, g->occupant, old, sizeof *g->occupant);
-    gs4i_free(m, g->jump_of, old, sizeof *g->jump_of); gs4i_free(m, g->spread, old, 4 * sizeof *g->spread); gs4i_free(m, g->momentum, old, node);
-    gs4i_free(m, g->force, old, node); gs4i_free(m, g->memory, old, node); gs4i_free(m, g->sharp, old, node); gs4i_free(m, g->full, old, one);
+    gs4i_free(m, g->block, old, sizeof *g->block);
+    gs4i_free(m, g->occupant, old, sizeof *g->occupant);
+    gs4i_free(m, g->jump_of, old, sizeof *g->jump_of);
+    gs4i_free(m, g->spread, old, 4 * sizeof *g->spread);
+    gs4i_free(m, g->momentum, old, node);
+    gs4i_free(m, g->force, old, node);
+    gs4i_free(m, g->memory, old, node);
+    gs4i_free(m, g->sharp, old, node);
+    gs4i_free(m, g->full, old, one);
     *g = n;
     return GS4_OK;
 }
@@ -3566,7 +4630,8 @@ static int gs4i_grid_reserve(gs4i_memory *m, gs4i_grid *g, int count, int with_m
 static int gs4i_grid_reserve_occupied(gs4i_memory *m, gs4i_grid *g, int count)
 {
     size_t c, old = (size_t)g->occupied_capacity;
-    uint32_t *block; int32_t *first, *neighbour, *by_colour;
+    uint32_t *block;
+    int32_t *first, *neighbour, *by_colour;
     if (count <= g->occupied_capacity) return GS4_OK;
     c = (size_t)count + (size_t)count / 4 + 64;
     block = (uint32_t *)gs4i_alloc(m, c, sizeof *block);
@@ -3574,8 +4639,10 @@ static int gs4i_grid_reserve_occupied(gs4i_memory *m, gs4i_grid *g, int count)
     neighbour = (int32_t *)gs4i_alloc(m, c, 27 * sizeof *neighbour);
     by_colour = (int32_t *)gs4i_alloc(m, c, sizeof *by_colour);
     if (!block || !first || !neighbour || !by_colour) {
-        gs4i_free(m, block, c, sizeof *block); gs4i_free(m, first, c + 1, sizeof *first);
-        gs4i_free(m, neighbour, c, 27 * sizeof *neighbour); gs4i_free(m, by_colour, c, sizeof *by_colour);
+        gs4i_free(m, block, c, sizeof *block);
+        gs4i_free(m, first, c + 1, sizeof *first);
+        gs4i_free(m, neighbour, c, 27 * sizeof *neighbour);
+        gs4i_free(m, by_colour, c, sizeof *by_colour);
         return GS4_ERROR_MEMORY;
     }
     if (g->occupied_block) {
@@ -3584,31 +4651,42 @@ static int gs4i_grid_reserve_occupied(gs4i_memory *m, gs4i_grid *g, int count)
         memcpy(neighbour, g->neighbour, old * 27 * sizeof *neighbour);
         memcpy(by_colour, g->by_colour, old * sizeof *by_colour);
     }
-    gs4i_free(m, g->occupied_block, old, sizeof *block); gs4i_free(m, g->first, old + 1, sizeof *first);
-    gs4i_free(m, g->neighbour, old, 27 * sizeof *neighbour); gs4i_free(m, g->by_colour, old, sizeof *by_colour);
-    g->occupied_block = block; g->first = first; g->neighbour = neighbour; g->by_colour = by_colour;
+    gs4i_free(m, g->occupied_block, old, sizeof *block);
+    gs4i_free(m, g->first, old + 1, sizeof *first);
+    gs4i_free(m, g->neighbour, old, 27 * sizeof *neighbour);
+    gs4i_free(m, g->by_colour, old, sizeof *by_colour);
+    g->occupied_block = block;
+    g->first = first;
+    g->neighbour = neighbour;
+    g->by_colour = by_colour;
     g->occupied_capacity = (int)c;
     return GS4_OK;
 }
 
-/* Blocks along one axis that tiles of block `b` reach, those behind a periodic wall included; at most 6. */
+/* Blocks along one axis that tiles of block `b` reach, those behind a periodic wall included; at
+ * most 6. */
 static int gs4i_axis_reach(const gs4i_grid *g, int axis, int b, int out[6])
 {
     int n = 0, n_cells = g->cells[axis], i;
     for (i = -1; i <= 1; i++) out[n++] = b + i;
     if (g->periodic[axis]) {
-        int first = 4 * (b - 1) - 2, node;                  /* tile nodes first .. first + 7 */
+        int first = 4 * (b - 1) - 2, node; /* tile nodes first .. first + 7 */
         for (node = first; node < first + GS4I_TILE; node++) {
-            int wrapped = node < 0 ? node + n_cells : node >= n_cells ? node - n_cells : node, at = (wrapped >> 2) + 1;
+            int wrapped = node < 0          ? node + n_cells
+                          : node >= n_cells ? node - n_cells
+                                            : node,
+                at = (wrapped >> 2) + 1;
             if (wrapped == node) continue;
-            for (i = 0; i < n && out[i] != at; i++) {}
+            for (i = 0; i < n && out[i] != at; i++) {
+            }
             if (i == n && n < 6) out[n++] = at;
         }
     }
     return n;
 }
 
-#define GS4I_SEEN 0x40000000            /* mark in the table while lists are made; slots stay below it */
+/* mark in the table while lists are made; slots stay below it */
+#define GS4I_SEEN 0x40000000
 
 /* Does any node of this slot remember something? */
 static int gs4i_slot_remembers(const gs4i_grid *g, int slot)
@@ -3619,8 +4697,9 @@ static int gs4i_slot_remembers(const gs4i_grid *g, int slot)
     return any;
 }
 
-/* Make the list of blocks that need nodes in lists[1]: all that the occupied ones reach, and those that remember something,
- * so that a step which sorts and is refused then forgets nothing. Returns how many, or an error. */
+/* Make the list of blocks that need nodes in lists[1]: all that the occupied ones reach, and
+ * those that remember something, so that a step which sorts and is refused then forgets nothing.
+ * Returns how many, or an error. */
 static int gs4i_grid_collect(gs4i_memory *m, gs4i_grid *g, const uint32_t *occupied, int count)
 {
     uint32_t *list = (uint32_t *)g->lists[1].data;
@@ -3628,20 +4707,34 @@ static int gs4i_grid_collect(gs4i_memory *m, gs4i_grid *g, const uint32_t *occup
     for (o = 0; o < count && result == GS4_OK; o++) {
         int at[3], rx[6], ry[6], rz[6], nx, ny, nz, i, j, k;
         gs4i_block_coordinates(g, occupied[o], at);
-        nx = gs4i_axis_reach(g, 0, at[0], rx); ny = gs4i_axis_reach(g, 1, at[1], ry); nz = gs4i_axis_reach(g, 2, at[2], rz);
-        list = (uint32_t *)gs4i_scratch_reserve(m, &g->lists[1], (size_t)(n + nx * ny * nz) * sizeof *list, (size_t)n * sizeof *list);
-        if (!list) { list = (uint32_t *)g->lists[1].data; result = GS4_ERROR_MEMORY; break; }
-        for (k = 0; k < nz; k++) for (j = 0; j < ny; j++) for (i = 0; i < nx; i++) {
-            uint32_t b = gs4i_block_number(g, rx[i], ry[j], rz[k]);
-            if (g->table[b] & GS4I_SEEN) continue;
-            g->table[b] |= GS4I_SEEN;
-            list[n++] = b;
+        nx = gs4i_axis_reach(g, 0, at[0], rx);
+        ny = gs4i_axis_reach(g, 1, at[1], ry);
+        nz = gs4i_axis_reach(g, 2, at[2], rz);
+        list = (uint32_t *)gs4i_scratch_reserve(
+            m, &g->lists[1], (size_t)(n + nx * ny * nz) * sizeof *list, (size_t)n * sizeof *list);
+        if (!list) {
+            list = (uint32_t *)g->lists[1].data;
+            result = GS4_ERROR_MEMORY;
+            break;
         }
+        for (k = 0; k < nz; k++)
+            for (j = 0; j < ny; j++)
+                for (i = 0; i < nx; i++) {
+                    uint32_t b = gs4i_block_number(g, rx[i], ry[j], rz[k]);
+                    if (g->table[b] & GS4I_SEEN) continue;
+                    g->table[b] |= GS4I_SEEN;
+                    list[n++] = b;
+                }
     }
     for (o = 0; g->memory && o < g->active && result == GS4_OK; o++) {
         if ((g->table[g->block[o]] & GS4I_SEEN) || !gs4i_slot_remembers(g, o)) continue;
-        list = (uint32_t *)gs4i_scratch_reserve(m, &g->lists[1], (size_t)(n + 1) * sizeof *list, (size_t)n * sizeof *list);
-        if (!list) { list = (uint32_t *)g->lists[1].data; result = GS4_ERROR_MEMORY; break; }
+        list = (uint32_t *)gs4i_scratch_reserve(m, &g->lists[1], (size_t)(n + 1) * sizeof *list,
+                                                (size_t)n * sizeof *list);
+        if (!list) {
+            list = (uint32_t *)g->lists[1].data;
+            result = GS4_ERROR_MEMORY;
+            break;
+        }
         g->table[g->block[o]] |= GS4I_SEEN;
         list[n++] = g->block[o];
     }
@@ -3664,13 +4757,17 @@ static void gs4i_grid_link(gs4i_grid *g)
     for (o = 0; o < g->occupied; o++) {
         int at[3], slot = 0;
         gs4i_block_coordinates(g, g->occupied_block[o], at);
-        for (k = -1; k <= 1; k++) for (j = -1; j <= 1; j++) for (i = -1; i <= 1; i++)
-            g->neighbour[27 * (size_t)o + (size_t)slot++] = g->table[gs4i_block_number(g, at[0] + i, at[1] + j, at[2] + k)] - 1;
+        for (k = -1; k <= 1; k++)
+            for (j = -1; j <= 1; j++)
+                for (i = -1; i <= 1; i++)
+                    g->neighbour[27 * (size_t)o + (size_t)slot++] =
+                        g->table[gs4i_block_number(g, at[0] + i, at[1] + j, at[2] + k)] - 1;
         g->occupant[g->neighbour[27 * (size_t)o + 13]] = o;
     }
     for (colour = 0; colour < 8; colour++) {
         g->colour_first[colour] = n;
-        for (o = 0; o < g->occupied; o++) if (gs4i_block_colour(g, g->occupied_block[o]) == colour) g->by_colour[n++] = o;
+        for (o = 0; o < g->occupied; o++)
+            if (gs4i_block_colour(g, g->occupied_block[o]) == colour) g->by_colour[n++] = o;
     }
     g->colour_first[8] = n;
 }
@@ -3682,32 +4779,50 @@ static int gs4i_grid_is_complete(const gs4i_grid *g)
     for (o = 0; o < g->occupied; o++) {
         int at[3], rx[6], ry[6], rz[6], nx, ny, nz;
         gs4i_block_coordinates(g, g->occupied_block[o], at);
-        nx = gs4i_axis_reach(g, 0, at[0], rx); ny = gs4i_axis_reach(g, 1, at[1], ry); nz = gs4i_axis_reach(g, 2, at[2], rz);
-        for (k = 0; k < nz; k++) for (j = 0; j < ny; j++) for (i = 0; i < nx; i++)
-            if (!g->table[gs4i_block_number(g, rx[i], ry[j], rz[k])]) return 0;
+        nx = gs4i_axis_reach(g, 0, at[0], rx);
+        ny = gs4i_axis_reach(g, 1, at[1], ry);
+        nz = gs4i_axis_reach(g, 2, at[2], rz);
+        for (k = 0; k < nz; k++)
+            for (j = 0; j < ny; j++)
+                for (i = 0; i < nx; i++)
+                    if (!g->table[gs4i_block_number(g, rx[i], ry[j], rz[k])]) return 0;
     }
     return 1;
 }
 
-/* Give nodes to the occupied blocks and all within their reach; what nodes remember moves with them.
- * `occupied` ascending. Nothing changes when memory is refused. */
-static int gs4i_grid_occupy(gs4i_memory *m, gs4i_grid *g, const uint32_t *occupied, int count, int with_memory)
+/* Give nodes to the occupied blocks and all within their reach; what nodes remember moves with
+ * them. `occupied` ascending. Nothing changes when memory is refused. */
+static int gs4i_grid_occupy(gs4i_memory *m, gs4i_grid *g, const uint32_t *occupied, int count,
+                            int with_memory)
 {
     const size_t node = GS4I_NODE_REALS;
     uint32_t *list;
     int n = gs4i_grid_collect(m, g, occupied, count), s;
     if (n < 0) return n;
-    if (gs4i_grid_reserve(m, g, n, with_memory) != GS4_OK || gs4i_grid_reserve_occupied(m, g, count) != GS4_OK) return GS4_ERROR_MEMORY;
+    if (gs4i_grid_reserve(m, g, n, with_memory) != GS4_OK
+        || gs4i_grid_reserve_occupied(m, g, count) != GS4_OK)
+        return GS4_ERROR_MEMORY;
     list = (uint32_t *)g->lists[1].data;
     gs4i_sort(list, n);
-    for (s = 0; with_memory && s < n; s++) {                /* `force` is free between steps: fill it, then swap */
+    /* `force` is free between steps: fill it, then swap */
+    for (s = 0; with_memory && s < n; s++) {
         int32_t old = g->table[list[s]];
-        if (old) memcpy(g->force + node * (size_t)s, g->memory + node * (size_t)(old - 1), node * sizeof(gs4_real));
-        else memset(g->force + node * (size_t)s, 0, node * sizeof(gs4_real));
+        if (old)
+            memcpy(g->force + node * (size_t)s, g->memory + node * (size_t)(old - 1),
+                   node * sizeof(gs4_real));
+        else
+            memset(g->force + node * (size_t)s, 0, node * sizeof(gs4_real));
     }
-    if (with_memory) { gs4_real *t = g->force; g->force = g->memory; g->memory = t; }
+    if (with_memory) {
+        gs4_real *t = g->force;
+        g->force = g->memory;
+        g->memory = t;
+    }
     for (s = 0; s < g->active; s++) g->table[g->block[s]] = 0;
-    for (s = 0; s < n; s++) { g->table[list[s]] = s + 1; g->block[s] = list[s]; }
+    for (s = 0; s < n; s++) {
+        g->table[list[s]] = s + 1;
+        g->block[s] = list[s];
+    }
     g->active = n;
     memmove(g->occupied_block, occupied, (size_t)count * sizeof *occupied);
     g->occupied = count;
@@ -3715,7 +4830,8 @@ static int gs4i_grid_occupy(gs4i_memory *m, gs4i_grid *g, const uint32_t *occupi
     return GS4_OK;
 }
 
-/* Where row (y, z) of the tile of occupied block o continues in the blocks left, of it and right. */
+/* Where row (y, z) of the tile of occupied block o continues in the blocks left, of it and
+ * right. */
 GS4I_INLINE void gs4i_tile_row(const gs4i_grid *g, int o, int y, int z, ptrdiff_t at[3])
 {
     const int32_t *nb = g->neighbour + 27 * (size_t)o;
@@ -3724,22 +4840,30 @@ GS4I_INLINE void gs4i_tile_row(const gs4i_grid *g, int o, int y, int z, ptrdiff_
 }
 
 /* Rows of a tile that particles touch, a bit each: row (y, z) is bit 8 z + y. */
-GS4I_INLINE uint64_t gs4i_touched_rows(int base) { return (uint64_t)0x070707u << (base / GS4I_TILE); }
+GS4I_INLINE uint64_t gs4i_touched_rows(int base)
+{
+    return (uint64_t)0x070707u << (base / GS4I_TILE);
+}
 
-/* Ask for two rows of nodes of a tile before they are needed: a few with each batch of particles, because
- * rows are scattered, no processor foresees them, and all at once are more than one can wait for. */
+/* Ask for two rows of nodes of a tile before they are needed: a few with each batch of
+ * particles, because rows are scattered, no processor foresees them, and all at once are more
+ * than one can wait for. */
 GS4I_INLINE void gs4i_tile_prefetch(const gs4i_grid *g, int o, int row, const gs4_real *field)
 {
     int end = row + 2;
     for (; row < end && row < 64; row++) {
         ptrdiff_t at[3];
         gs4i_tile_row(g, o, row & 7, row >> 3, at);
-        GS4I_PREFETCH(field + at[0] + 8); GS4I_PREFETCH(field + at[1]); GS4I_PREFETCH(field + at[2]);
+        GS4I_PREFETCH(field + at[0] + 8);
+        GS4I_PREFETCH(field + at[1]);
+        GS4I_PREFETCH(field + at[2]);
     }
 }
 
-/* The touched rows of a field into a tile, and the row behind each, because reads may run a node over the end. */
-static void gs4i_tile_load(const gs4i_grid *g, int o, uint64_t rows, const gs4_real *GS4I_RESTRICT field, gs4_real *GS4I_RESTRICT tile)
+/* The touched rows of a field into a tile, and the row behind each, because reads may run a node
+ * over the end. */
+static void gs4i_tile_load(const gs4i_grid *g, int o, uint64_t rows,
+                           const gs4_real *GS4I_RESTRICT field, gs4_real *GS4I_RESTRICT tile)
 {
     int row;
     rows |= rows << 1;
@@ -3754,7 +4878,8 @@ static void gs4i_tile_load(const gs4i_grid *g, int o, uint64_t rows, const gs4_r
     memset(tile, 0, 16 * sizeof(gs4_real));
 }
 
-static void gs4i_tile_add(const gs4i_grid *g, int o, uint64_t rows, const gs4_real *GS4I_RESTRICT tile, gs4_real *GS4I_RESTRICT field)
+static void gs4i_tile_add(const gs4i_grid *g, int o, uint64_t rows,
+                          const gs4_real *GS4I_RESTRICT tile, gs4_real *GS4I_RESTRICT field)
 {
     int row, i;
     for (row = 0; row < 64; row++, tile += 4 * GS4I_TILE) {
@@ -3762,21 +4887,27 @@ static void gs4i_tile_add(const gs4i_grid *g, int o, uint64_t rows, const gs4_re
         if (!(rows >> row & 1)) continue;
         gs4i_tile_row(g, o, row & 7, row >> 3, at);
         for (i = 0; i < GS4I_TILE; i++) {
-            gs4_real *to = field + (i < 2 ? at[0] + 8 + 4 * i : i < 6 ? at[1] + 4 * (i - 2) : at[2] + 4 * (i - 6));
+            gs4_real *to = field
+                           + (i < 2   ? at[0] + 8 + 4 * i
+                              : i < 6 ? at[1] + 4 * (i - 2)
+                                      : at[2] + 4 * (i - 6));
             gs4i_quad sum, q;
-            GS4I_LOAD(sum, to); GS4I_LOAD(q, tile + 4 * i);
+            GS4I_LOAD(sum, to);
+            GS4I_LOAD(q, tile + 4 * i);
             GS4I_SUM(sum, sum, q);
             GS4I_STORE(to, sum);
         }
     }
 }
 
-/* --- sharpened gradients --------------------------------------------------------------------------------
+/* --- sharpened gradients -------------------------------------------------------------------------
  *
- * Each of the four transfers of a step sees 1 - (k h)^2/8 of a wave exp(ikx). S v = v - sum_a share_a D_a v, D_a the second difference along axis a,
- * gives that back: gradients are those of S v, and forces of stress go through the transpose of S, so that stress gives to motion what it takes from
- * it. D_a of a linear field is 0: momentum, turning and uniform strain stay what they are. share_a is the least `full` of the three nodes of D_a:
- * 1/4 where they are filled to 80 % (by mass, of the densest material), 0 where one is to less than 40 %, smooth between. */
+ * Each of the four transfers of a step sees 1 - (k h)^2/8 of a wave exp(ikx). S v = v - sum_a
+ * share_a D_a v, D_a the second difference along axis a, gives that back: gradients are those of
+ * S v, and forces of stress go through the transpose of S, so that stress gives to motion what
+ * it takes from it. D_a of a linear field is 0: momentum, turning and uniform strain stay what
+ * they are. share_a is the least `full` of the three nodes of D_a: 1/4 where they are filled to
+ * 80 % (by mass, of the densest material), 0 where one is to less than 40 %, smooth between. */
 
 /* What a node that holds so much of what it can hold allows. */
 GS4I_INLINE gs4_real gs4i_fullness(gs4_real filled)
@@ -3785,16 +4916,24 @@ GS4I_INLINE gs4_real gs4i_fullness(gs4_real filled)
     return GS4I_C(0.25) * t * t * (3 - 2 * t);
 }
 
-/* Eight nodes in a row along an axis: two of the block before (its slot, or -1), four of slot s, two of the block behind. */
-GS4I_INLINE void gs4i_line_of_nodes(const gs4i_grid *g, int s, const int side[2], int node, int apart, const gs4_real *from, gs4_real full[8], gs4i_quad v[8])
+/* Eight nodes in a row along an axis: two of the block before (its slot, or -1), four of slot s,
+ * two of the block behind. */
+GS4I_INLINE void gs4i_line_of_nodes(const gs4i_grid *g, int s, const int side[2], int node,
+                                    int apart, const gs4_real *from, gs4_real full[8],
+                                    gs4i_quad v[8])
 {
     int i;
     for (i = 0; i < 8; i++) {
         const int slot = i < 2 ? side[0] : i < 6 ? s : side[1];
-        const size_t at = (size_t)GS4I_BLOCK_NODES * (size_t)slot + (size_t)(node + ((i + 2) & 3) * apart);
+        const size_t at =
+            (size_t)GS4I_BLOCK_NODES * (size_t)slot + (size_t)(node + ((i + 2) & 3) * apart);
         const gs4i_quad none = { GS4I_LANES(0, 0, 0, 0) };
-        v[i] = none; full[i] = 0;
-        if (slot >= 0) { full[i] = g->full[at]; GS4I_LOAD(v[i], from + 4 * at); }
+        v[i] = none;
+        full[i] = 0;
+        if (slot >= 0) {
+            full[i] = g->full[at];
+            GS4I_LOAD(v[i], from + 4 * at);
+        }
     }
 }
 
@@ -3804,19 +4943,26 @@ static void gs4i_sharpen_block(const gs4i_grid *g, int s, const gs4_real *from, 
     gs4_real *to = g->sharp + (size_t)GS4I_NODE_REALS * (size_t)s, most = 0;
     int at[3], a, line, i;
     memcpy(to, from + (size_t)GS4I_NODE_REALS * (size_t)s, GS4I_NODE_REALS * sizeof *to);
-    for (i = 0; i < GS4I_BLOCK_NODES; i++) most = gs4i_max(most, g->full[(size_t)GS4I_BLOCK_NODES * (size_t)s + (size_t)i]);
+    for (i = 0; i < GS4I_BLOCK_NODES; i++)
+        most = gs4i_max(most, g->full[(size_t)GS4I_BLOCK_NODES * (size_t)s + (size_t)i]);
     if (!(most > 0)) return;
     gs4i_block_coordinates(g, g->block[s], at);
     for (a = 0; a < 3; a++) {
-        const int apart = 1 << 2 * a, jump = a == 0 ? 1 : a == 1 ? g->blocks[0] : g->blocks[0] * g->blocks[1];
+        const int apart = 1 << 2 * a, jump = a == 0   ? 1
+                                             : a == 1 ? g->blocks[0]
+                                                      : g->blocks[0] * g->blocks[1];
         int side[2];
-        for (i = 0; i < 2; i++) side[i] = (i ? at[a] + 1 < g->blocks[a] : at[a] > 0) ? g->table[(int)g->block[s] + (i ? jump : -jump)] - 1 : -1;
+        for (i = 0; i < 2; i++)
+            side[i] = (i ? at[a] + 1 < g->blocks[a] : at[a] > 0)
+                          ? g->table[(int)g->block[s] + (i ? jump : -jump)] - 1
+                          : -1;
         for (line = 0; line < 16; line++) {
             const int node = (line / apart * 4 * apart) + line % apart;
             gs4_real full[8], share[8];
             gs4i_quad v[8], d, own;
             gs4i_line_of_nodes(g, s, side, node, apart, from, full, v);
-            for (i = 1; i < 7; i++) share[i] = gs4i_min(full[i], gs4i_min(full[i - 1], full[i + 1]));
+            for (i = 1; i < 7; i++)
+                share[i] = gs4i_min(full[i], gs4i_min(full[i - 1], full[i + 1]));
             for (i = 1; i < 7 && transposed; i++) GS4I_SPLAT_MUL(v[i], share[i], v[i]);
             for (i = 2; i < 6; i++) {
                 gs4_real *x = to + 4 * (node + (i - 2) * apart);
@@ -3832,39 +4978,51 @@ static void gs4i_sharpen_block(const gs4i_grid *g, int s, const gs4_real *from, 
     }
 }
 
-/* ==== [[particles]] the store, and how it is sorted by block ======================================= *
+/* ==== [[particles]] the store, and how it is sorted by block =================================== *
  *
- * Arrays of small vectors, each 16 bytes in float where it can be: (x y z mass), (vx vy vz J) and their rates
- * (ax ay az dJ/dt), the velocity gradient, and how much v differs from the grid's velocity there. Sorting permutes in
- * place along the cycles of the permutation: no second copy of anything. */
+ * Arrays of small vectors, each 16 bytes in float where it can be: (x y z mass), (vx vy vz J)
+ * and their rates (ax ay az dJ/dt), the velocity gradient, and how much v differs from the
+ * grid's velocity there. Sorting permutes in place along the cycles of the permutation: no
+ * second copy of anything. */
 
-/* Where the step just before left the rates: a rate of this rule belongs to the time (gamma - 1/2) dt before that of its
- * quantity, so that in free flight dx/dt = v - shift a exactly, and the small rest fits a half. */
-typedef struct gs4i_reach { gs4_real ahead /* alpha_f dt */, shift /* (gamma - 1/2) dt of the last step */; } gs4i_reach;
+/* Where the step just before left the rates: a rate of this rule belongs to the time (gamma -
+ * 1/2) dt before that of its quantity, so that in free flight dx/dt = v - shift a exactly, and
+ * the small rest fits a half. */
+typedef struct gs4i_reach {
+    gs4_real ahead /* alpha_f dt */, shift /* (gamma - 1/2) dt of the last step */;
+} gs4i_reach;
 
 /* Rule 1 of the manual for one step of size dt. */
 typedef struct gs4i_rule {
     gs4_real dt, alpha_m, alpha_f, gamma;
-    gs4i_reach reach;                   /* ahead = alpha_f dt: from t_n to the stage */
-    gs4_real s;                         /* alpha_f gamma dt / alpha_m: weight of the new rate at the stage */
-    gs4_real before;                    /* y** = y + before r: alpha_f dt - s, 0 for symplectic Euler */
-    gs4_real decay, damped;             /* k = 1 / flip_decay_time, 1/s; 1 / (1 + s k) */
-    gs4_real fade;                      /* k, where (4) would not be stable with it less: k (1 + x)/(1 + x + x^2), 1/s, x = k over what would be */
-    gs4_real fading;                    /* where that is shorter than dt k is 0, and this much of what the grid cannot see goes at once: a rate
-                                           of it would be blown up by a longer step, and with rho_inf 1 it would not fade */
-    gs4_real mixing;                    /* 1/s: at most, of temperatures, see [[heat]] */
-    gs4_real inv_area;                  /* 1 / h^2 */
-    gs4_real fast_decay;                /* what is added to k where the grid sees little: c0 / h */
-    gs4_real inv_full;                  /* 1 / mass of a node in the midst of the lightest material */
-    gs4_real inv_fullest;               /* of the densest */
+    gs4i_reach reach; /* ahead = alpha_f dt: from t_n to the stage */
+    /* alpha_f gamma dt / alpha_m: weight of the new rate at the stage */
+    gs4_real s;
+    /* y** = y + before r: alpha_f dt - s, 0 for symplectic Euler */
+    gs4_real before;
+    gs4_real decay, damped; /* k = 1 / flip_decay_time, 1/s; 1 / (1 + s k) */
+    /* k, where (4) would not be stable with it less: k (1 + x)/(1 + x + x^2), 1/s, x = k over
+     * what would be */
+    gs4_real fade;
+    /* where that is shorter than dt k is 0, and this much of what the grid cannot see goes at
+     * once: a rate of it would be blown up by a longer step, and with rho_inf 1 it would not
+     * fade */
+    gs4_real fading;
+    gs4_real mixing;     /* 1/s: at most, of temperatures, see [[heat]] */
+    gs4_real inv_area;   /* 1 / h^2 */
+    gs4_real fast_decay; /* what is added to k where the grid sees little: c0 / h */
+    /* 1 / mass of a node in the midst of the lightest material */
+    gs4_real inv_full;
+    gs4_real inv_fullest; /* of the densest */
     gs4_real inv_alpha_m, next_shift;
-    int afresh;                         /* no rates yet: first step, or after an edit */
+    int afresh; /* no rates yet: first step, or after an edit */
 } gs4i_rule;
 
 #ifdef GS4_DOUBLE
-typedef float gs4i_half;                /* half of gs4_real's width: enough for a small difference, see S2 in [[transfer]] */
+/* half of gs4_real's width: enough for a small difference, see S2 in [[transfer]] */
+typedef float gs4i_half;
 #else
-typedef uint16_t gs4i_half;             /* the upper half of a float, rounded */
+typedef uint16_t gs4i_half; /* the upper half of a float, rounded */
 #endif
 
 GS4I_INLINE gs4i_half gs4i_to_half(gs4_real v)
@@ -3872,7 +5030,8 @@ GS4I_INLINE gs4i_half gs4i_to_half(gs4_real v)
 #ifdef GS4_DOUBLE
     return (gs4i_half)v;
 #else
-    uint32_t u; memcpy(&u, &v, sizeof u);
+    uint32_t u;
+    memcpy(&u, &v, sizeof u);
     return (gs4i_half)((u + 0x7fffu + ((u >> 16) & 1u)) >> 16);
 #endif
 }
@@ -3882,53 +5041,99 @@ GS4I_INLINE gs4_real gs4i_from_half(gs4i_half v)
 #ifdef GS4_DOUBLE
     return (gs4_real)v;
 #else
-    const uint32_t u = (uint32_t)v << 16; gs4_real r;
+    const uint32_t u = (uint32_t)v << 16;
+    gs4_real r;
     memcpy(&r, &u, sizeof r);
     return r;
 #endif
 }
 
 typedef struct gs4i_particles {
-    int count, capacity, with_rates;    /* arrays are one element longer than that: a quad may be read over the end */
-    gs4_real *position;                 /* 4: x y z, mass */
-    gs4_real *velocity;                 /* 4: v, volume ratio J */
-    gs4_real *rate;                     /* 4: dv/dt, dJ/dt; NULL for symplectic Euler */
-    gs4_real *affine[3];                /* 4 each: column j of the velocity gradient, dv_i/dx_j; NULL for GS4 */
-    gs4_real *elastic; int elastic_reals;   /* 12: non-local stress xx yy zz xy xz yz (Pa) and its rate; 6 for Euler; 0: the scene has none */
-    gs4_real *deformation; int deformation_reals;   /* 24, see [[solid]]: F, row-major, M (1/s), turning w (rad/s) and its rate; 9 for Euler; 0: none */
-    gs4_real *heat; int with_heat;      /* 4: temperature, liquid fraction, rate of enthalpy over heat capacity, what rounding still owes the temperature; 0: the scene has none */
-    uint8_t *liquid;                    /* 1 while liquid; with heat */
-    gs4_real *flux, *flux_rate; int with_flux;  /* 4 each: non-local heat flux (W/m^2), 0, and its rate; 0: the scene has none */
-    gs4i_half *lag;                     /* 4: v - shift a - dx/dt, 0, see S2; NULL for symplectic Euler */
-    gs4_real *hidden; int with_fading;  /* 4: V - v~, from S4 to S7 of a step: what the grid does not see of the velocity fades; NULL where it does not */
-    uint32_t *id; uint8_t *material;
-    uint32_t *order;                    /* scratch: block, then destination of each particle */
+    /* arrays are one element longer than that: a quad may be read over the end */
+    int count, capacity, with_rates;
+    gs4_real *position; /* 4: x y z, mass */
+    gs4_real *velocity; /* 4: v, volume ratio J */
+    gs4_real *rate;     /* 4: dv/dt, dJ/dt; NULL for symplectic Euler */
+    /* 4 each: column j of the velocity gradient, dv_i/dx_j; NULL for GS4 */
+    gs4_real *affine[3];
+    /* 12: non-local stress xx yy zz xy xz yz (Pa) and its rate; 6 for Euler; 0: the scene has
+     * none */
+    gs4_real *elastic;
+    int elastic_reals;
+    /* 24, see [[solid]]: F, row-major, M (1/s), turning w (rad/s) and its rate; 9 for Euler; 0:
+     * none */
+    gs4_real *deformation;
+    int deformation_reals;
+    /* 4: temperature, liquid fraction, rate of enthalpy over heat capacity, what rounding still
+     * owes the temperature; 0: the scene has none */
+    gs4_real *heat;
+    int with_heat;
+    uint8_t *liquid; /* 1 while liquid; with heat */
+    /* 4 each: non-local heat flux (W/m^2), 0, and its rate; 0: the scene has none */
+    gs4_real *flux, *flux_rate;
+    int with_flux;
+    /* 4: v - shift a - dx/dt, 0, see S2; NULL for symplectic Euler */
+    gs4i_half *lag;
+    /* 4: V - v~, from S4 to S7 of a step: what the grid does not see of the velocity fades; NULL
+     * where it does not */
+    gs4_real *hidden;
+    int with_fading;
+    uint32_t *id;
+    uint8_t *material;
+    uint32_t *order; /* scratch: block, then destination of each particle */
 } gs4i_particles;
 
-enum { GS4I_ARRAYS = 17, GS4I_STATE_ARRAYS = 15 };      /* those of the state come first, then scratch */
-typedef struct gs4i_array { void **data; size_t size; int wanted; } gs4i_array;
+/* those of the state come first, then scratch */
+enum {
+    GS4I_ARRAYS = 17,
+    GS4I_STATE_ARRAYS = 15
+};
+typedef struct gs4i_array {
+    void **data;
+    size_t size;
+    int wanted;
+} gs4i_array;
 
-/* The arrays of a store with the size of one element, largest first: for growing, sorting, hashing, saving. */
+/* The arrays of a store with the size of one element, largest first: for growing, sorting,
+ * hashing, saving. */
 static void gs4i_particle_arrays(gs4i_particles *p, gs4i_array out[GS4I_ARRAYS])
 {
     int i;
-    for (i = 0; i < 3; i++) { out[i].data = (void **)&p->affine[i]; out[i].size = 4 * sizeof(gs4_real); }
-    out[3].data = (void **)&p->position; out[3].size = 4 * sizeof(gs4_real);
-    out[4].data = (void **)&p->velocity; out[4].size = 4 * sizeof(gs4_real);
-    out[5].data = (void **)&p->rate;     out[5].size = 4 * sizeof(gs4_real);
-    out[6].data = (void **)&p->lag;      out[6].size = 4 * sizeof(gs4i_half);
-    out[7].data = (void **)&p->id;       out[7].size = sizeof(uint32_t);
-    out[8].data = (void **)&p->material; out[8].size = 1;
-    out[9].data = (void **)&p->elastic;  out[9].size = (size_t)p->elastic_reals * sizeof(gs4_real);
-    out[10].data = (void **)&p->heat;    out[10].size = 4 * sizeof(gs4_real);
-    out[11].data = (void **)&p->flux;    out[11].size = 4 * sizeof(gs4_real);
-    out[12].data = (void **)&p->flux_rate; out[12].size = 4 * sizeof(gs4_real);
-    out[13].data = (void **)&p->liquid;  out[13].size = 1;
-    out[14].data = (void **)&p->deformation; out[14].size = (size_t)p->deformation_reals * sizeof(gs4_real);
-    out[15].data = (void **)&p->order;   out[15].size = sizeof(uint32_t);
-    out[16].data = (void **)&p->hidden;  out[16].size = 4 * sizeof(gs4_real);
+    for (i = 0; i < 3; i++) {
+        out[i].data = (void **)&p->affine[i];
+        out[i].size = 4 * sizeof(gs4_real);
+    }
+    out[3].data = (void **)&p->position;
+    out[3].size = 4 * sizeof(gs4_real);
+    out[4].data = (void **)&p->velocity;
+    out[4].size = 4 * sizeof(gs4_real);
+    out[5].data = (void **)&p->rate;
+    out[5].size = 4 * sizeof(gs4_real);
+    out[6].data = (void **)&p->lag;
+    out[6].size = 4 * sizeof(gs4i_half);
+    out[7].data = (void **)&p->id;
+    out[7].size = sizeof(uint32_t);
+    out[8].data = (void **)&p->material;
+    out[8].size = 1;
+    out[9].data = (void **)&p->elastic;
+    out[9].size = (size_t)p->elastic_reals * sizeof(gs4_real);
+    out[10].data = (void **)&p->heat;
+    out[10].size = 4 * sizeof(gs4_real);
+    out[11].data = (void **)&p->flux;
+    out[11].size = 4 * sizeof(gs4_real);
+    out[12].data = (void **)&p->flux_rate;
+    out[12].size = 4 * sizeof(gs4_real);
+    out[13].data = (void **)&p->liquid;
+    out[13].size = 1;
+    out[14].data = (void **)&p->deformation;
+    out[14].size = (size_t)p->deformation_reals * sizeof(gs4_real);
+    out[15].data = (void **)&p->order;
+    out[15].size = sizeof(uint32_t);
+    out[16].data = (void **)&p->hidden;
+    out[16].size = 4 * sizeof(gs4_real);
     for (i = 0; i < GS4I_ARRAYS; i++) out[i].wanted = p->with_rates ? i > 2 : i != 5 && i != 6;
-    out[9].wanted = p->elastic_reals > 0; out[14].wanted = p->deformation_reals > 0;
+    out[9].wanted = p->elastic_reals > 0;
+    out[14].wanted = p->deformation_reals > 0;
     out[10].wanted = out[13].wanted = p->with_heat;
     out[11].wanted = out[12].wanted = p->with_flux;
     out[16].wanted = p->with_fading;
@@ -3939,7 +5144,10 @@ static void gs4i_particles_free(gs4i_memory *m, gs4i_particles *p)
     gs4i_array a[GS4I_ARRAYS];
     int i;
     gs4i_particle_arrays(p, a);
-    for (i = 0; i < GS4I_ARRAYS; i++) { gs4i_free(m, *a[i].data, (size_t)p->capacity + 1, a[i].size); *a[i].data = NULL; }
+    for (i = 0; i < GS4I_ARRAYS; i++) {
+        gs4i_free(m, *a[i].data, (size_t)p->capacity + 1, a[i].size);
+        *a[i].data = NULL;
+    }
     p->capacity = 0;
 }
 
@@ -3955,8 +5163,12 @@ static int gs4i_particles_reserve(gs4i_memory *m, gs4i_particles *p, int wanted)
     for (i = 0; i < GS4I_ARRAYS; i++) *to[i].data = NULL;
     grown.capacity = wanted;
     for (i = 0; i < GS4I_ARRAYS && !failed; i++)
-        if (to[i].wanted) failed = (*to[i].data = gs4i_alloc(m, (size_t)wanted + 1, to[i].size)) == NULL;
-    if (failed) { gs4i_particles_free(m, &grown); return GS4_ERROR_MEMORY; }
+        if (to[i].wanted)
+            failed = (*to[i].data = gs4i_alloc(m, (size_t)wanted + 1, to[i].size)) == NULL;
+    if (failed) {
+        gs4i_particles_free(m, &grown);
+        return GS4_ERROR_MEMORY;
+    }
     for (i = 0; i < GS4I_ARRAYS; i++)
         if (*from[i].data) memcpy(*to[i].data, *from[i].data, (size_t)p->count * from[i].size);
     gs4i_particles_free(m, p);
@@ -3964,7 +5176,7 @@ static int gs4i_particles_reserve(gs4i_memory *m, gs4i_particles *p, int wanted)
     return GS4_OK;
 }
 
-#define GS4I_LEADER 0x80000000u         /* in `order`: start of a cycle that moves something */
+#define GS4I_LEADER 0x80000000u /* in `order`: start of a cycle that moves something */
 #define GS4I_VISITED 0x40000000u
 #define GS4I_DESTINATION 0x3fffffffu
 #define GS4I_MAX_PARTICLES 0x3ffffff0
@@ -3976,7 +5188,10 @@ static void gs4i_mark_cycles(uint32_t *order, int count)
         uint32_t j = (uint32_t)i;
         if (order[i] & GS4I_VISITED) continue;
         if ((order[i] & GS4I_DESTINATION) != j) order[i] |= GS4I_LEADER;
-        do { order[j] |= GS4I_VISITED; j = order[j] & GS4I_DESTINATION; } while (j != (uint32_t)i);
+        do {
+            order[j] |= GS4I_VISITED;
+            j = order[j] & GS4I_DESTINATION;
+        } while (j != (uint32_t)i);
     }
 }
 
@@ -3997,7 +5212,8 @@ GS4I_INLINE void gs4i_permute_sized(char *data, size_t size, const uint32_t *ord
     }
 }
 
-/* Move every element to its destination; the sizes are spelled out so that copies are plain moves. */
+/* Move every element to its destination; the sizes are spelled out so that copies are plain
+ * moves. */
 static void gs4i_permute_task(int index, void *context)
 {
     gs4i_particles *p = (gs4i_particles *)context;
@@ -4014,18 +5230,20 @@ static void gs4i_permute_task(int index, void *context)
     case 32: gs4i_permute_sized(data, 32, p->order, p->count); break;
     case 24: gs4i_permute_sized(data, 24, p->order, p->count); break;
     case 16: gs4i_permute_sized(data, 16, p->order, p->count); break;
-    case 8:  gs4i_permute_sized(data, 8, p->order, p->count); break;
-    case 4:  gs4i_permute_sized(data, 4, p->order, p->count); break;
+    case 8: gs4i_permute_sized(data, 8, p->order, p->count); break;
+    case 4: gs4i_permute_sized(data, 4, p->order, p->count); break;
     default: gs4i_permute_sized(data, a[index].size, p->order, p->count); break;
     }
 }
 
-/* Counting sort by block, stable, in a number of chunks that depends on the number of particles alone. */
+/* Counting sort by block, stable, in a number of chunks that depends on the number of particles
+ * alone. */
 typedef struct gs4i_sorting {
-    gs4i_particles *p; gs4i_grid *g;
-    gs4i_reach reach;                   /* sorted by where they are expected at the stage */
+    gs4i_particles *p;
+    gs4i_grid *g;
+    gs4i_reach reach; /* sorted by where they are expected at the stage */
     int chunks;
-    uint32_t *histogram;                /* [chunk][occupied block] */
+    uint32_t *histogram; /* [chunk][occupied block] */
 } gs4i_sorting;
 
 GS4I_INLINE void gs4i_chunk(const gs4i_sorting *s, int index, int *begin, int *end)
@@ -4036,30 +5254,42 @@ GS4I_INLINE void gs4i_chunk(const gs4i_sorting *s, int index, int *begin, int *e
 
 /* What a batch of particles is; with Euler's tier rates and lag are zero. */
 typedef struct gs4i_batch {
-    gs4i_lanes x[4];                    /* and mass */
-    gs4i_lanes v[4];                    /* and J */
-    gs4i_lanes a[4];                    /* dv/dt and dJ/dt */
-    gs4i_lanes move[3];                 /* dx/dt */
+    gs4i_lanes x[4];    /* and mass */
+    gs4i_lanes v[4];    /* and J */
+    gs4i_lanes a[4];    /* dv/dt and dJ/dt */
+    gs4i_lanes move[3]; /* dx/dt */
 } gs4i_batch;
 
-/* Ask for a batch some batches ahead: prefetchers of processors end at each page, which is all too soon. */
+/* Ask for a batch some batches ahead: prefetchers of processors end at each page, which is all
+ * too soon. */
 GS4I_INLINE void gs4i_prefetch_particles(const gs4i_particles *p, size_t i)
 {
     int b;
     if (i + GS4I_BATCH > (size_t)p->count) return;
     for (b = 0; b < 4 * GS4I_BATCH; b += 16) {
-        GS4I_PREFETCH(p->position + 4 * i + b); GS4I_PREFETCH(p->velocity + 4 * i + b);
-        if (p->with_rates) GS4I_PREFETCH(p->rate + 4 * i + b); else GS4I_PREFETCH(p->affine[0] + 4 * i + b);
-        if (p->with_rates) GS4I_PREFETCH(p->lag + 4 * i + b);
-        else { GS4I_PREFETCH(p->affine[1] + 4 * i + b); GS4I_PREFETCH(p->affine[2] + 4 * i + b); }
+        GS4I_PREFETCH(p->position + 4 * i + b);
+        GS4I_PREFETCH(p->velocity + 4 * i + b);
+        if (p->with_rates)
+            GS4I_PREFETCH(p->rate + 4 * i + b);
+        else
+            GS4I_PREFETCH(p->affine[0] + 4 * i + b);
+        if (p->with_rates)
+            GS4I_PREFETCH(p->lag + 4 * i + b);
+        else {
+            GS4I_PREFETCH(p->affine[1] + 4 * i + b);
+            GS4I_PREFETCH(p->affine[2] + 4 * i + b);
+        }
     }
-    for (b = 0; b < p->elastic_reals * GS4I_BATCH; b += 16) GS4I_PREFETCH(p->elastic + (size_t)p->elastic_reals * i + b);
-    for (b = 0; b < p->deformation_reals * GS4I_BATCH; b += 16) GS4I_PREFETCH(p->deformation + (size_t)p->deformation_reals * i + b);
+    for (b = 0; b < p->elastic_reals * GS4I_BATCH; b += 16)
+        GS4I_PREFETCH(p->elastic + (size_t)p->elastic_reals * i + b);
+    for (b = 0; b < p->deformation_reals * GS4I_BATCH; b += 16)
+        GS4I_PREFETCH(p->deformation + (size_t)p->deformation_reals * i + b);
     for (b = 0; b < 4 * GS4I_BATCH && p->heat; b += 16) GS4I_PREFETCH(p->heat + 4 * i + b);
 }
 
 /* Particles i to i + n. */
-GS4I_INLINE void gs4i_load_batch(const gs4i_particles *p, size_t i, int n, gs4i_reach reach, gs4i_batch *q)
+GS4I_INLINE void gs4i_load_batch(const gs4i_particles *p, size_t i, int n, gs4i_reach reach,
+                                 gs4i_batch *q)
 {
     gs4_real halves[4 * GS4I_BATCH];
     gs4i_lanes lag[4];
@@ -4069,21 +5299,26 @@ GS4I_INLINE void gs4i_load_batch(const gs4i_particles *p, size_t i, int n, gs4i_
     gs4i_to_lanes(p->velocity + 4 * i, n, q->v);
     if (!p->with_rates) {
         memset(q->a, 0, sizeof q->a);
-        for (c = 0; c < 3; c++) GS4I_BATCH_LOOP(b) q->move[c][b] = q->v[c][b];
+        for (c = 0; c < 3; c++)
+            GS4I_BATCH_LOOP(b) q->move[c][b] = q->v[c][b];
         return;
     }
     gs4i_to_lanes(p->rate + 4 * i, n, q->a);
-    if (n == GS4I_BATCH) for (b = 0; b < 4 * GS4I_BATCH; b++) halves[b] = gs4i_from_half(p->lag[4 * i + (size_t)b]);
-    else for (b = 0; b < 4 * n; b++) halves[b] = gs4i_from_half(p->lag[4 * i + (size_t)b]);
+    if (n == GS4I_BATCH)
+        for (b = 0; b < 4 * GS4I_BATCH; b++) halves[b] = gs4i_from_half(p->lag[4 * i + (size_t)b]);
+    else
+        for (b = 0; b < 4 * n; b++) halves[b] = gs4i_from_half(p->lag[4 * i + (size_t)b]);
     gs4i_to_lanes(halves, n, lag);
-    for (c = 0; c < 3; c++) GS4I_BATCH_LOOP(b) q->move[c][b] = (q->v[c][b] - reach.shift * q->a[c][b]) - lag[c][b];
+    for (c = 0; c < 3; c++)
+        GS4I_BATCH_LOOP(b) q->move[c][b] = (q->v[c][b] - reach.shift * q->a[c][b]) - lag[c][b];
 }
 
 /* S2: x~ = x + alpha_f dt dx/dt. */
 GS4I_INLINE void gs4i_predict_positions(const gs4i_batch *q, gs4i_reach reach, gs4i_lanes x[3])
 {
     int b, c;
-    for (c = 0; c < 3; c++) GS4I_BATCH_LOOP(b) x[c][b] = q->x[c][b] + reach.ahead * q->move[c][b];
+    for (c = 0; c < 3; c++)
+        GS4I_BATCH_LOOP(b) x[c][b] = q->x[c][b] + reach.ahead * q->move[c][b];
 }
 
 static void gs4i_sort_keys_task(int index, void *context)
@@ -4127,7 +5362,8 @@ static void gs4i_sort_place_task(int index, void *context)
     for (; i < end; i++) s->p->order[i] = h[s->g->occupant[s->g->table[s->p->order[i]] - 1]]++;
 }
 
-/* List of the blocks that particles are in, ascending, from the keys in `order`, in lists[0]. Returns how many, or an error. */
+/* List of the blocks that particles are in, ascending, from the keys in `order`, in lists[0].
+ * Returns how many, or an error. */
 static int gs4i_list_occupied(gs4i_memory *m, gs4i_sorting *s)
 {
     uint32_t last = UINT32_MAX, *list = (uint32_t *)s->g->lists[0].data;
@@ -4135,8 +5371,13 @@ static int gs4i_list_occupied(gs4i_memory *m, gs4i_sorting *s)
     for (i = 0; i < s->p->count; i++) {
         uint32_t b = s->p->order[i];
         if (b == last || (s->g->table[b] & GS4I_SEEN)) continue;
-        list = (uint32_t *)gs4i_scratch_reserve(m, &s->g->lists[0], (size_t)(n + 1) * sizeof *list, (size_t)n * sizeof *list);
-        if (!list) { list = (uint32_t *)s->g->lists[0].data; result = GS4_ERROR_MEMORY; break; }
+        list = (uint32_t *)gs4i_scratch_reserve(m, &s->g->lists[0], (size_t)(n + 1) * sizeof *list,
+                                                (size_t)n * sizeof *list);
+        if (!list) {
+            list = (uint32_t *)s->g->lists[0].data;
+            result = GS4_ERROR_MEMORY;
+            break;
+        }
         s->g->table[b] |= GS4I_SEEN;
         list[n++] = last = b;
     }
@@ -4146,27 +5387,35 @@ static int gs4i_list_occupied(gs4i_memory *m, gs4i_sorting *s)
     return n;
 }
 
-/* S1. Sort the particles by the block of their predicted position and give nodes to all blocks in reach.
- * Nothing has changed when memory is refused. */
-static int gs4i_particles_sort(gs4i_memory *m, const gs4i_tasks *tasks, gs4i_particles *p, gs4i_grid *g, gs4i_reach reach)
+/* S1. Sort the particles by the block of their predicted position and give nodes to all blocks
+ * in reach. Nothing has changed when memory is refused. */
+static int gs4i_particles_sort(gs4i_memory *m, const gs4i_tasks *tasks, gs4i_particles *p,
+                               gs4i_grid *g, gs4i_reach reach)
 {
     gs4i_sorting s;
     uint32_t sum = 0;
     int count, o, c;
-    s.p = p; s.g = g; s.reach = reach;
+    s.p = p;
+    s.g = g;
+    s.reach = reach;
     s.chunks = p->count / 4096 < 1 ? 1 : p->count / 4096 > 64 ? 64 : p->count / 4096;
     gs4i_parallel_for(tasks, s.chunks, gs4i_sort_keys_task, &s);
     count = gs4i_list_occupied(m, &s);
     if (count < 0) return count;
-    s.histogram = (uint32_t *)gs4i_scratch_reserve(m, &g->histogram, (size_t)s.chunks * (size_t)count * sizeof *s.histogram, 0);
-    if (!s.histogram || gs4i_grid_occupy(m, g, (const uint32_t *)g->lists[0].data, count, p->with_rates) != GS4_OK) return GS4_ERROR_MEMORY;
+    s.histogram = (uint32_t *)gs4i_scratch_reserve(
+        m, &g->histogram, (size_t)s.chunks * (size_t)count * sizeof *s.histogram, 0);
+    if (!s.histogram
+        || gs4i_grid_occupy(m, g, (const uint32_t *)g->lists[0].data, count, p->with_rates)
+               != GS4_OK)
+        return GS4_ERROR_MEMORY;
     memset(s.histogram, 0, (size_t)s.chunks * (size_t)count * sizeof *s.histogram);
     gs4i_parallel_for(tasks, s.chunks, gs4i_sort_count_task, &s);
     for (o = 0; o < count; o++) {
         g->first[o] = (int32_t)sum;
         for (c = 0; c < s.chunks; c++) {
             uint32_t *h = s.histogram + (size_t)c * (size_t)count + o, n = *h;
-            *h = sum; sum += n;
+            *h = sum;
+            sum += n;
         }
     }
     g->first[count] = (int32_t)sum;
@@ -4176,25 +5425,32 @@ static int gs4i_particles_sort(gs4i_memory *m, const gs4i_tasks *tasks, gs4i_par
     return GS4_OK;
 }
 
-/* ==== [[liquid]] pressure, viscosity, presets ====================================================== */
+/* ==== [[liquid]] pressure, viscosity, presets ================================================= */
 
-#define GS4I_MOST_STRETCH GS4I_C(512)   /* of solids that do not yield; the determinant of F in float means nothing much beyond */
+/* of solids that do not yield; the determinant of F in float means nothing much beyond */
+#define GS4I_MOST_STRETCH GS4I_C(512)
 
 /* What the particles need of a material, ready for use. */
 typedef struct gs4i_law {
-    gs4_real inv_density, tait;         /* 1 / rho0; rho0 c0^2 / 7 */
-    gs4_real viscosity, sound_speed, density;   /* viscosity: the local part, F_v mu */
-    gs4_real local, temperature;        /* F_v; K, where the scene has no heat: that of the air */
-    gs4_real modulus, inv_lambda, stretch, nu, alpha;   /* non-local: G0; 1 / lambda_b; 2 lambda_b / lambda_0s; 2 / Q; all 0: none */
-    gs4_real shear_modulus, low, high;  /* of solids: G, Pa (0: a liquid), and between what the singular values of F stay */
-    gs4_real capacity, conductivity, flux_time, fourier;    /* c; k; tau; F_T, 1 where tau is 0 */
-    gs4_real melting, latent;           /* T_m, beyond every temperature where the phase is fixed; L / c, K */
-    int varies;                         /* with the shear rate or the temperature: Cross-WLF, or by viscosity_fn */
-    gs4_viscosity_fn viscosity_fn; void *viscosity_user;
-    gs4_material is;                    /* as described */
+    gs4_real inv_density, tait;               /* 1 / rho0; rho0 c0^2 / 7 */
+    gs4_real viscosity, sound_speed, density; /* viscosity: the local part, F_v mu */
+    gs4_real local, temperature; /* F_v; K, where the scene has no heat: that of the air */
+    /* non-local: G0; 1 / lambda_b; 2 lambda_b / lambda_0s; 2 / Q; all 0: none */
+    gs4_real modulus, inv_lambda, stretch, nu, alpha;
+    /* of solids: G, Pa (0: a liquid), and between what the singular values of F stay */
+    gs4_real shear_modulus, low, high;
+    gs4_real capacity, conductivity, flux_time, fourier; /* c; k; tau; F_T, 1 where tau is 0 */
+    /* T_m, beyond every temperature where the phase is fixed; L / c, K */
+    gs4_real melting, latent;
+    /* with the shear rate or the temperature: Cross-WLF, or by viscosity_fn */
+    int varies;
+    gs4_viscosity_fn viscosity_fn;
+    void *viscosity_user;
+    gs4_material is; /* as described */
 } gs4i_law;
 
-/* Tait: p = (rho0 c0^2 / 7) (J^-7 - 1) in Pa; grows without bound as J -> 0, never below -rho0 c0^2 / 7. */
+/* Tait: p = (rho0 c0^2 / 7) (J^-7 - 1) in Pa; grows without bound as J -> 0, never below -rho0
+ * c0^2 / 7. */
 GS4I_INLINE void gs4i_pressure(const gs4i_wide *tait, const gs4i_wide *J, gs4i_wide *p)
 {
     const gs4i_wide i = GS4I_C(1) / *J, i2 = i * i, i4 = i2 * i2;
@@ -4204,39 +5460,52 @@ GS4I_INLINE void gs4i_pressure(const gs4i_wide *tait, const gs4i_wide *J, gs4i_w
 /* What the particles of a batch need of their materials. */
 typedef struct gs4i_batch_laws {
     gs4i_lanes inv_density, tait, viscosity, sound_speed;
-    gs4i_lanes temperature;             /* that of the air where the scene has no heat; else see gs4i_stage_temperature */
+    /* that of the air where the scene has no heat; else see gs4i_stage_temperature */
+    gs4i_lanes temperature;
     const gs4i_law *of[GS4I_BATCH];
-    int callbacks;                      /* some of those seen so far have one */
+    int callbacks; /* some of those seen so far have one */
 } gs4i_batch_laws;
 
-/* Consecutive batches mostly have the same materials: only what differs is looked up. What is solid in a scene with heat goes by `frozen`. */
-GS4I_INLINE void gs4i_take_laws(const gs4i_law *laws, const gs4i_law *frozen, const gs4i_particles *p, size_t i, int n, gs4i_batch_laws *l)
+/* Consecutive batches mostly have the same materials: only what differs is looked up. What is
+ * solid in a scene with heat goes by `frozen`. */
+GS4I_INLINE void gs4i_take_laws(const gs4i_law *laws, const gs4i_law *frozen,
+                                const gs4i_particles *p, size_t i, int n, gs4i_batch_laws *l)
 {
     int b;
     for (b = 0; b < GS4I_BATCH; b++) {
         const size_t at = i + (size_t)(b < n ? b : 0);
-        const gs4i_law *law = p->liquid && !p->liquid[at] ? &frozen[p->material[at]] : &laws[p->material[at]];
+        const gs4i_law *law =
+            p->liquid && !p->liquid[at] ? &frozen[p->material[at]] : &laws[p->material[at]];
         if (law == l->of[b]) continue;
-        l->of[b] = law; l->callbacks |= law->varies;
-        GS4I_NTH(l->inv_density, b) = law->inv_density; GS4I_NTH(l->tait, b) = law->tait;
-        GS4I_NTH(l->viscosity, b) = law->viscosity; GS4I_NTH(l->sound_speed, b) = law->sound_speed;
+        l->of[b] = law;
+        l->callbacks |= law->varies;
+        GS4I_NTH(l->inv_density, b) = law->inv_density;
+        GS4I_NTH(l->tait, b) = law->tait;
+        GS4I_NTH(l->viscosity, b) = law->viscosity;
+        GS4I_NTH(l->sound_speed, b) = law->sound_speed;
         GS4I_NTH(l->temperature, b) = law->temperature;
     }
 }
 
 static int gs4i_is_default_cross_wlf(const gs4_material *m)
 {
-    return m->cross_wlf.a == 0 && m->cross_wlf.n == 0 && m->cross_wlf.d1 == 0 && m->cross_wlf.a1 == 0 && m->cross_wlf.t1 == 0 && m->cross_wlf.t2 == 0;
+    return m->cross_wlf.a == 0 && m->cross_wlf.n == 0 && m->cross_wlf.d1 == 0
+           && m->cross_wlf.a1 == 0 && m->cross_wlf.t1 == 0 && m->cross_wlf.t2 == 0;
 }
 
-/* Cross-WLF, Pa s: mu = mu0 / (1 + a (mu0 rate)^n), mu0 = d1 exp(-a1 (T - t1) / (T - t2)); absurdly large, which is refused,
- * where mu0 is, and from t2 down, where the law ends: a liquid would be a glass there. */
+/* Cross-WLF, Pa s: mu = mu0 / (1 + a (mu0 rate)^n), mu0 = d1 exp(-a1 (T - t1) / (T - t2));
+ * absurdly large, which is refused, where mu0 is, and from t2 down, where the law ends: a liquid
+ * would be a glass there. */
 static gs4_real gs4i_cross_wlf(const gs4_material *m, gs4_real temperature, gs4_real shear_rate)
 {
     const double T = (double)temperature, n = (double)m->cross_wlf.n;
-    const double mu0 = (double)m->cross_wlf.d1 * exp(-(double)m->cross_wlf.a1 * (T - (double)m->cross_wlf.t1) / (T - (double)m->cross_wlf.t2));
-    if (!(mu0 < (double)GS4I_HUGE) || (m->cross_wlf.a1 > 0 && temperature <= m->cross_wlf.t2)) return GS4I_HUGE;
-    if (!(m->cross_wlf.a > 0)) return GS4I_C(mu0);              /* 0 times infinity, at rest and with n below 0 */
+    const double mu0 = (double)m->cross_wlf.d1
+                       * exp(-(double)m->cross_wlf.a1 * (T - (double)m->cross_wlf.t1)
+                             / (T - (double)m->cross_wlf.t2));
+    if (!(mu0 < (double)GS4I_HUGE) || (m->cross_wlf.a1 > 0 && temperature <= m->cross_wlf.t2))
+        return GS4I_HUGE;
+    /* 0 times infinity, at rest and with n below 0 */
+    if (!(m->cross_wlf.a > 0)) return GS4I_C(mu0);
     return GS4I_C(mu0 / (1 + (double)m->cross_wlf.a * pow(mu0 * (double)shear_rate, n)));
 }
 
@@ -4245,22 +5514,33 @@ static gs4_real gs4i_viscosity_of(const gs4i_law *law, gs4_real T, gs4i_gradient
 {
     gs4_real sum = 0, rate;
     int i, j;
-    for (j = 0; j < 3; j++) for (i = 0; i < 3; i++) { const gs4_real d = GS4I_NTH(L[i][j], n) + GS4I_NTH(L[j][i], n); sum += d * d; }
+    for (j = 0; j < 3; j++)
+        for (i = 0; i < 3; i++) {
+            const gs4_real d = GS4I_NTH(L[i][j], n) + GS4I_NTH(L[j][i], n);
+            sum += d * d;
+        }
     rate = GS4I_SQRT(GS4I_C(0.5) * sum);
     if (!law->varies) return law->is.viscosity;
-    return law->viscosity_fn ? law->viscosity_fn(T, rate, law->viscosity_user) : gs4i_cross_wlf(&law->is, T, rate);
+    return law->viscosity_fn ? law->viscosity_fn(T, rate, law->viscosity_user)
+                             : gs4i_cross_wlf(&law->is, T, rate);
 }
 
-/* What follows from the material alone: Cross-WLF constants of the paper where none are given, and both parts of viscosity. */
+/* What follows from the material alone: Cross-WLF constants of the paper where none are given,
+ * and both parts of viscosity. */
 static void gs4i_set_law(gs4i_law *l, gs4_real temperature)
 {
     gs4_material *m = &l->is;
     const int elastic = m->liquid != GS4_NEWTONIAN;
     if (gs4i_is_default_cross_wlf(m)) {
-        m->cross_wlf.a = GS4I_C(5.66e3); m->cross_wlf.n = GS4I_C(-0.75); m->cross_wlf.d1 = GS4I_C(3.32e9);
-        m->cross_wlf.a1 = GS4I_C(20.194); m->cross_wlf.t1 = 100; m->cross_wlf.t2 = GS4I_C(48.4);
+        m->cross_wlf.a = GS4I_C(5.66e3);
+        m->cross_wlf.n = GS4I_C(-0.75);
+        m->cross_wlf.d1 = GS4I_C(3.32e9);
+        m->cross_wlf.a1 = GS4I_C(20.194);
+        m->cross_wlf.t1 = 100;
+        m->cross_wlf.t2 = GS4I_C(48.4);
     }
-    l->density = m->density; l->inv_density = 1 / m->density;
+    l->density = m->density;
+    l->inv_density = 1 / m->density;
     l->varies = m->viscosity_law != GS4_VISCOSITY_CONSTANT;
     l->viscosity_fn = m->viscosity_law == GS4_VISCOSITY_CALLBACK ? m->viscosity_fn : NULL;
     l->viscosity_user = m->viscosity_user;
@@ -4275,32 +5555,42 @@ static void gs4i_set_law(gs4i_law *l, gs4_real temperature)
     l->shear_modulus = m->solid != GS4_NO_SOLID && !m->can_melt ? m->shear_modulus : 0;
     l->low = m->yield_compression > 0 ? 1 - m->yield_compression : 1 / GS4I_MOST_STRETCH;
     l->high = m->yield_stretch > 0 ? 1 + m->yield_stretch : GS4I_MOST_STRETCH;
-    l->capacity = m->heat_capacity; l->conductivity = m->conductivity;
-    l->flux_time = m->flux_relaxation_time; l->fourier = l->flux_time > 0 ? m->fourier_fraction : 1;
-    l->melting = m->can_melt ? m->melting_temperature : m->solid == GS4_NO_SOLID ? -4 * GS4I_HUGE : 4 * GS4I_HUGE;
+    l->capacity = m->heat_capacity;
+    l->conductivity = m->conductivity;
+    l->flux_time = m->flux_relaxation_time;
+    l->fourier = l->flux_time > 0 ? m->fourier_fraction : 1;
+    l->melting = m->can_melt                ? m->melting_temperature
+                 : m->solid == GS4_NO_SOLID ? -4 * GS4I_HUGE
+                                            : 4 * GS4I_HUGE;
     l->latent = m->latent_heat > 0 ? m->latent_heat / m->heat_capacity : 0;
 }
 
-/* Of the solid phase, from that of the liquid one: the stress of F with the same pressure, in place of all stress of liquids. A material that melts but
- * is no solid flows in both phases. */
+/* Of the solid phase, from that of the liquid one: the stress of F with the same pressure, in
+ * place of all stress of liquids. A material that melts but is no solid flows in both phases. */
 static void gs4i_freeze_law(gs4i_law *l)
 {
     if (!l->is.can_melt || l->is.solid == GS4_NO_SOLID) return;
     l->shear_modulus = l->is.shear_modulus;
     l->viscosity = l->inv_lambda = l->modulus = l->stretch = l->nu = l->alpha = 0;
-    l->local = 0; l->varies = 0;
+    l->local = 0;
+    l->varies = 0;
 }
 
 /* Six numbers of a symmetric tensor: xx yy zz xy xz yz. */
 typedef gs4i_lanes gs4i_symmetric[6];
 
-/* Cauchy stress (Pa, tension positive) but for the non-local part: -p I + 2 F_v mu D, and F_v mu. */
-GS4I_INLINE void gs4i_liquid_stress(const gs4i_batch_laws *l, const gs4i_wide *J, gs4i_gradient L, gs4i_symmetric sigma, gs4i_wide *mu)
+/* Cauchy stress (Pa, tension positive) but for the non-local part: -p I + 2 F_v mu D, and F_v
+ * mu. */
+GS4I_INLINE void gs4i_liquid_stress(const gs4i_batch_laws *l, const gs4i_wide *J, gs4i_gradient L,
+                                    gs4i_symmetric sigma, gs4i_wide *mu)
 {
     int b;
     GS4I_BATCH_LOOP(b) mu[b] = l->viscosity[b];
     for (b = 0; b < GS4I_BATCH && l->callbacks; b++)
-        if (l->of[b]->varies) GS4I_NTH(mu, b) = l->of[b]->local * gs4i_viscosity_of(l->of[b], GS4I_NTH_CONST(l->temperature, b), L, b);
+        if (l->of[b]->varies)
+            GS4I_NTH(mu, b) =
+                l->of[b]->local
+                * gs4i_viscosity_of(l->of[b], GS4I_NTH_CONST(l->temperature, b), L, b);
     GS4I_BATCH_LOOP(b) {
         gs4i_wide p;
         gs4i_pressure(&l->tait[b], &J[b], &p);
@@ -4313,28 +5603,53 @@ GS4I_INLINE void gs4i_liquid_stress(const gs4i_batch_laws *l, const gs4i_wide *J
     }
 }
 
-/* Liquids to start from: density (kg/m^3) and viscosity (Pa s) near the temperature given; of viscoelastic ones also the local
- * fraction, the relaxation and stretch times (s), anisotropy and arms. */
-static const struct gs4i_preset_row { const char *name; double density, viscosity; gs4_liquid liquid; double local, relaxation, stretch, anisotropy, arms; } gs4i_presets[] = {
-    { "water",     998.2, 1.002e-3, GS4_NEWTONIAN, 0, 0, 0, 0, 0 },  /* 20 C; Kestin, Sokolov & Wakeham, J. Phys. Chem. Ref. Data 7 (1978) 941 */
-    { "olive oil", 911,   0.084, GS4_NEWTONIAN, 0, 0, 0, 0, 0 },     /* 20 C; Fellows, Food Processing Technology (2000), table 1.6 */
-    { "glycerol",  1261,  1.41, GS4_NEWTONIAN, 0, 0, 0, 0, 0 },      /* 20 C; Segur & Oberstar, Ind. Eng. Chem. 43 (1951) 2117 */
-    { "honey",     1420,  10, GS4_NEWTONIAN, 0, 0, 0, 0, 0 },        /* 20-25 C, 17 % water; Yanniotis, Skaltsi & Karaburnioti, J. Food Eng. 72 (2006) 372 */
-    { "cream",     1000,  3063, GS4_POM_POM, 0.02, 12.25, 11.025, 1, 16 },        /* "GS4 viscoelastic MPM" (2021), table 4, coiling 3 */
-    { "ice cream", 1000,  3063, GS4_POM_POM, 0.01, 3.0625, 2.7563, 0.01, 16 },    /* the same, buckling 2 */
-    { "boger fluid", 1000, 3063, GS4_OLDROYD_B, 0.02, 12.25, 0, 0, 0 },           /* the same, coiling 2: elastic, not shear thinning */
-    { "polymer melt", 760, 2769, GS4_POM_POM, 0.394, 0.50349, 0.16783, 0.15, 2 }  /* low-density polyethylene at 170 C: third mode of Verbeeten, Peters &
-                                         Baaijens, J. Rheology 45 (2001) 823, table II, the two faster ones as local viscosity */
+/* Liquids to start from: density (kg/m^3) and viscosity (Pa s) near the temperature given; of
+ * viscoelastic ones also the local fraction, the relaxation and stretch times (s), anisotropy
+ * and arms. */
+static const struct gs4i_preset_row {
+    const char *name;
+    double density, viscosity;
+    gs4_liquid liquid;
+    double local, relaxation, stretch, anisotropy, arms;
+} gs4i_presets[] = {
+    /* 20 C; Kestin, Sokolov & Wakeham, J. Phys. Chem. Ref. Data 7 (1978) 941 */
+    { "water", 998.2, 1.002e-3, GS4_NEWTONIAN, 0, 0, 0, 0, 0 },
+    /* 20 C; Fellows, Food Processing Technology (2000), table 1.6 */
+    { "olive oil", 911, 0.084, GS4_NEWTONIAN, 0, 0, 0, 0, 0 },
+    /* 20 C; Segur & Oberstar, Ind. Eng. Chem. 43 (1951) 2117 */
+    { "glycerol", 1261, 1.41, GS4_NEWTONIAN, 0, 0, 0, 0, 0 },
+    /* 20-25 C, 17 % water; Yanniotis, Skaltsi & Karaburnioti, J. Food Eng. 72 (2006) 372 */
+    { "honey", 1420, 10, GS4_NEWTONIAN, 0, 0, 0, 0, 0 },
+    /* "GS4 viscoelastic MPM" (2021), table 4, coiling 3 */
+    { "cream", 1000, 3063, GS4_POM_POM, 0.02, 12.25, 11.025, 1, 16 },
+    /* the same, buckling 2 */
+    { "ice cream", 1000, 3063, GS4_POM_POM, 0.01, 3.0625, 2.7563, 0.01, 16 },
+    /* the same, coiling 2: elastic, not shear thinning */
+    { "boger fluid", 1000, 3063, GS4_OLDROYD_B, 0.02, 12.25, 0, 0, 0 },
+    /* low-density polyethylene at 170 C: third mode of Verbeeten, Peters & Baaijens, J. Rheology
+     * 45 (2001) 823, table II, the two faster ones as local viscosity */
+    { "polymer melt", 760, 2769, GS4_POM_POM, 0.394, 0.50349, 0.16783, 0.15, 2 }
 };
 
-/* What melts: viscosity (Pa s) of the liquid, shear modulus (Pa) and yield of the solid, c (J/(kg K)), k (W/(m K)), T_m (degrees Celsius), L (J/kg).
- * Heat is as measured, within some 10 % and over the range in which each really melts. Solids are softer than real ones by a factor of 10 to 1e5,
- * so that a step of the explicit scheme is not ruled by their sound: raise shear_modulus where stiffness matters. */
-static const struct gs4i_melt_row { const char *name; double density, viscosity; gs4_solid solid; double modulus, compression, stretch, capacity, conductivity, melting, latent; } gs4i_melts[] = {
-    { "chocolate", 1270, 3, GS4_FIXED_COROTATED, 2e4, 0.05, 0.05, 1600, 0.25, 34, 4.5e4 },       /* dark; Beckett, Science of Chocolate (2008): viscosity, c, L */
-    { "wax",       900, 0.05, GS4_FIXED_COROTATED, 2e4, 0.05, 0.05, 2500, 0.24, 56, 2e5 },       /* paraffin; Ukrainczyk, Kurajica & Sipusic (2010): c, k, L */
-    { "butter",    911, 0.05, GS4_FIXED_COROTATED, 1e4, 0.02, 0.02, 2400, 0.2, 32, 8e4 },        /* Rao, Rizvi & Datta, Engineering Properties of Foods: c, k */
-    { "lava",      2600, 1000, GS4_NEO_HOOKEAN, 1e5, 0.05, 0.05, 1150, 1.5, 1070, 4e5 }          /* basalt, molten at 1130 C; Shaw (1969): viscosity; Lange and others (1994): c, L */
+/* What melts: viscosity (Pa s) of the liquid, shear modulus (Pa) and yield of the solid, c
+ * (J/(kg K)), k (W/(m K)), T_m (degrees Celsius), L (J/kg). Heat is as measured, within some 10
+ * % and over the range in which each really melts. Solids are softer than real ones by a factor
+ * of 10 to 1e5, so that a step of the explicit scheme is not ruled by their sound: raise
+ * shear_modulus where stiffness matters. */
+static const struct gs4i_melt_row {
+    const char *name;
+    double density, viscosity;
+    gs4_solid solid;
+    double modulus, compression, stretch, capacity, conductivity, melting, latent;
+} gs4i_melts[] = {
+    /* dark; Beckett, Science of Chocolate (2008): viscosity, c, L */
+    { "chocolate", 1270, 3, GS4_FIXED_COROTATED, 2e4, 0.05, 0.05, 1600, 0.25, 34, 4.5e4 },
+    /* paraffin; Ukrainczyk, Kurajica & Sipusic (2010): c, k, L */
+    { "wax", 900, 0.05, GS4_FIXED_COROTATED, 2e4, 0.05, 0.05, 2500, 0.24, 56, 2e5 },
+    /* Rao, Rizvi & Datta, Engineering Properties of Foods: c, k */
+    { "butter", 911, 0.05, GS4_FIXED_COROTATED, 1e4, 0.02, 0.02, 2400, 0.2, 32, 8e4 },
+    /* basalt, molten at 1130 C; Shaw (1969): viscosity; Lange and others (1994): c, L */
+    { "lava", 2600, 1000, GS4_NEO_HOOKEAN, 1e5, 0.05, 0.05, 1150, 1.5, 1070, 4e5 }
 };
 
 static int gs4i_preset(const char *name, gs4_material *m)
@@ -4344,53 +5659,78 @@ static int gs4i_preset(const char *name, gs4_material *m)
         const struct gs4i_preset_row *p = &gs4i_presets[i];
         if (strcmp(name, p->name) != 0) continue;
         memset(m, 0, sizeof *m);
-        m->density = GS4I_C(p->density); m->viscosity = GS4I_C(p->viscosity);
-        m->liquid = p->liquid; m->local_fraction = GS4I_C(p->local);
-        m->relaxation_time = GS4I_C(p->relaxation); m->stretch_time = GS4I_C(p->stretch);
-        m->anisotropy = GS4I_C(p->anisotropy); m->arms = GS4I_C(p->arms);
+        m->density = GS4I_C(p->density);
+        m->viscosity = GS4I_C(p->viscosity);
+        m->liquid = p->liquid;
+        m->local_fraction = GS4I_C(p->local);
+        m->relaxation_time = GS4I_C(p->relaxation);
+        m->stretch_time = GS4I_C(p->stretch);
+        m->anisotropy = GS4I_C(p->anisotropy);
+        m->arms = GS4I_C(p->arms);
         return GS4_OK;
     }
     for (i = 0; i < sizeof gs4i_melts / sizeof gs4i_melts[0]; i++) {
         const struct gs4i_melt_row *p = &gs4i_melts[i];
         if (strcmp(name, p->name) != 0) continue;
         memset(m, 0, sizeof *m);
-        m->density = GS4I_C(p->density); m->viscosity = GS4I_C(p->viscosity);
-        m->solid = p->solid; m->shear_modulus = GS4I_C(p->modulus);
-        m->yield_compression = GS4I_C(p->compression); m->yield_stretch = GS4I_C(p->stretch);
-        m->heat_capacity = GS4I_C(p->capacity); m->conductivity = GS4I_C(p->conductivity);
-        m->can_melt = 1; m->melting_temperature = GS4I_C(p->melting); m->latent_heat = GS4I_C(p->latent);
+        m->density = GS4I_C(p->density);
+        m->viscosity = GS4I_C(p->viscosity);
+        m->solid = p->solid;
+        m->shear_modulus = GS4I_C(p->modulus);
+        m->yield_compression = GS4I_C(p->compression);
+        m->yield_stretch = GS4I_C(p->stretch);
+        m->heat_capacity = GS4I_C(p->capacity);
+        m->conductivity = GS4I_C(p->conductivity);
+        m->can_melt = 1;
+        m->melting_temperature = GS4I_C(p->melting);
+        m->latent_heat = GS4I_C(p->latent);
         return GS4_OK;
     }
     return GS4_ERROR_ARGUMENT;
 }
 
-/* ==== [[viscoelastic]] the non-local stress: UCM, Oldroyd-B, extended Pom-Pom ====================== *
+/* ==== [[viscoelastic]] the non-local stress: UCM, Oldroyd-B, extended Pom-Pom ================== *
  *
- * With G0 = (1 - F_v) mu / lambda_b, S = s/G0, r = lambda_b/lambda_0s, nu = 2/Q (Verbeeten, Peters & Baaijens 2001):
+ * With G0 = (1 - F_v) mu / lambda_b, S = s/G0, r = lambda_b/lambda_0s, nu = 2/Q (Verbeeten,
+ * Peters & Baaijens 2001):
  *
  *     ds/dt = L s + s L^T + 2 G0 D - [f s + G0 (f - 1) I + (alpha/G0) s.s] / lambda_b
- *     f = 2 r exp(nu (Lam - 1)) (1 - 1/Lam) + (1 - alpha tr(S.S)/3) / Lam^2,   Lam = sqrt(1 + tr S/3);   Oldroyd-B: f = 1, alpha = 0
+ *     f = 2 r exp(nu (Lam - 1)) (1 - 1/Lam) + (1 - alpha tr(S.S)/3) / Lam^2,
+ *     Lam = sqrt(1 + tr S/3);   Oldroyd-B: f = 1, alpha = 0
  *
- * The conformation c = S + I is positive definite: its eigenvalues are squares of stretches. Two integrators of second order:
- * rule 1 of the manual, in lanes, with the relaxation f s implicit, where the step resolves the material; and, particle by
- * particle where it does not, one that keeps c positive definite by construction: UCM and Oldroyd-B exactly; a pom-pom by the split
- * c <- E c E^T, E = exp(L h), between two half relaxations dc/dt = -[f c - I + alpha (c - I)^2] / lambda_b, in substeps h chosen by
- * comparing one with two halves. For alpha > 1 an eigenvalue below 1 - 1/alpha falls without end: the model leaves the cone in
- * finite time. Then, and only then, it relaxes there without the term of alpha, none relaxes to less, none is above 1e6, and how
- * often is counted. */
+ * The conformation c = S + I is positive definite: its eigenvalues are squares of stretches. Two
+ * integrators of second order: rule 1 of the manual, in lanes, with the relaxation f s implicit,
+ * where the step resolves the material; and, particle by particle where it does not, one that
+ * keeps c positive definite by construction: UCM and Oldroyd-B exactly; a pom-pom by the split c
+ * <- E c E^T, E = exp(L h), between two half relaxations dc/dt = -[f c - I + alpha (c - I)^2] /
+ * lambda_b, in substeps h chosen by comparing one with two halves. For alpha > 1 an eigenvalue
+ * below 1 - 1/alpha falls without end: the model leaves the cone in finite time. Then, and only
+ * then, it relaxes there without the term of alpha, none relaxes to less, none is above 1e6, and
+ * how often is counted. */
 
 /* What the particles of a batch need of their materials. */
 typedef struct gs4i_elastic_laws {
     gs4i_lanes modulus, inv_lambda, stretch /* 2 r; 0: f = 1 */, nu, alpha, temperature;
     const gs4i_law *of[GS4I_BATCH];
-    int pom_pom, varies;                /* some of those seen so far are, or do */
+    int pom_pom, varies; /* some of those seen so far are, or do */
 } gs4i_elastic_laws;
 
 /* Of one batch: stress and its rate, Pa and Pa/s. */
-typedef struct gs4i_elastic { gs4i_symmetric s, rate; } gs4i_elastic;
+typedef struct gs4i_elastic {
+    gs4i_symmetric s, rate;
+} gs4i_elastic;
 
-enum { GS4I_XX, GS4I_YY, GS4I_ZZ, GS4I_XY, GS4I_XZ, GS4I_YZ };
-static const int gs4i_place[3][3] = { { GS4I_XX, GS4I_XY, GS4I_XZ }, { GS4I_XY, GS4I_YY, GS4I_YZ }, { GS4I_XZ, GS4I_YZ, GS4I_ZZ } };
+enum {
+    GS4I_XX,
+    GS4I_YY,
+    GS4I_ZZ,
+    GS4I_XY,
+    GS4I_XZ,
+    GS4I_YZ
+};
+static const int gs4i_place[3][3] = { { GS4I_XX, GS4I_XY, GS4I_XZ },
+                                      { GS4I_XY, GS4I_YY, GS4I_YZ },
+                                      { GS4I_XZ, GS4I_YZ, GS4I_ZZ } };
 
 static void gs4i_take_elastic_laws(const gs4i_batch_laws *laws, gs4i_elastic_laws *l)
 {
@@ -4399,23 +5739,33 @@ static void gs4i_take_elastic_laws(const gs4i_batch_laws *laws, gs4i_elastic_law
     for (n = 0; n < GS4I_BATCH; n++) {
         const gs4i_law *law = laws->of[n];
         if (law == l->of[n]) continue;
-        l->of[n] = law; l->pom_pom |= law->stretch > 0; l->varies |= law->varies;
-        GS4I_NTH(l->modulus, n) = law->modulus; GS4I_NTH(l->inv_lambda, n) = law->inv_lambda; GS4I_NTH(l->stretch, n) = law->stretch;
-        GS4I_NTH(l->nu, n) = law->nu; GS4I_NTH(l->alpha, n) = law->alpha;
+        l->of[n] = law;
+        l->pom_pom |= law->stretch > 0;
+        l->varies |= law->varies;
+        GS4I_NTH(l->modulus, n) = law->modulus;
+        GS4I_NTH(l->inv_lambda, n) = law->inv_lambda;
+        GS4I_NTH(l->stretch, n) = law->stretch;
+        GS4I_NTH(l->nu, n) = law->nu;
+        GS4I_NTH(l->alpha, n) = law->alpha;
     }
 }
 
-/* f - 1 without cancellation for small S, and how fast f changes with the stretch: r exp(nu (Lam - 1)) (1 + nu) at most. */
-GS4I_INLINE void gs4i_pom_pom(double stretch, double nu, double alpha, double trace3, double squares, double *f1, double *stiff)
+/* f - 1 without cancellation for small S, and how fast f changes with the stretch: r exp(nu (Lam
+ * - 1)) (1 + nu) at most. */
+GS4I_INLINE void gs4i_pom_pom(double stretch, double nu, double alpha, double trace3,
+                              double squares, double *f1, double *stiff)
 {
-    const double L2 = trace3 > -1 ? 1 + trace3 : 1e-30, Lam = sqrt(L2), long_by = trace3 / (Lam + 1);
+    const double L2 = trace3 > -1 ? 1 + trace3 : 1e-30, Lam = sqrt(L2),
+                 long_by = trace3 / (Lam + 1);
     const double e = stretch * exp(nu * long_by < 300 ? nu * long_by : 300);
     *f1 = e * long_by / Lam - (trace3 + alpha * squares / 3) / L2;
     *stiff = e * (1 + nu * fabs(long_by));
 }
 
-/* The right-hand side R at stress s and gradient L, f / lambda_b, and the rate (1/s) of its fastest part that is not in that. */
-static void gs4i_elastic_rate(const gs4i_elastic_laws *l, gs4i_lanes G, gs4i_symmetric s, gs4i_gradient L, gs4i_symmetric R, gs4i_lanes relax, gs4i_lanes stiff)
+/* The right-hand side R at stress s and gradient L, f / lambda_b, and the rate (1/s) of its
+ * fastest part that is not in that. */
+static void gs4i_elastic_rate(const gs4i_elastic_laws *l, gs4i_lanes G, gs4i_symmetric s,
+                              gs4i_gradient L, gs4i_symmetric R, gs4i_lanes relax, gs4i_lanes stiff)
 {
     gs4i_symmetric S, SS;
     gs4i_lanes trace3, squares, f1;
@@ -4427,18 +5777,23 @@ static void gs4i_elastic_rate(const gs4i_elastic_laws *l, gs4i_lanes G, gs4i_sym
         trace3[b] = (S[0][b] + S[1][b] + S[2][b]) * GS4I_C(1.0 / 3);
         for (i = 0; i < 3; i++)
             for (j = i; j < 3; j++)
-                SS[gs4i_place[i][j]][b] = S[gs4i_place[i][0]][b] * S[gs4i_place[0][j]][b] + S[gs4i_place[i][1]][b] * S[gs4i_place[1][j]][b]
-                                        + S[gs4i_place[i][2]][b] * S[gs4i_place[2][j]][b];
+                SS[gs4i_place[i][j]][b] = S[gs4i_place[i][0]][b] * S[gs4i_place[0][j]][b]
+                                          + S[gs4i_place[i][1]][b] * S[gs4i_place[1][j]][b]
+                                          + S[gs4i_place[i][2]][b] * S[gs4i_place[2][j]][b];
         squares[b] = SS[0][b] + SS[1][b] + SS[2][b];
-        f1[b] = trace3[b] - trace3[b]; stiff[b] = f1[b];
+        f1[b] = trace3[b] - trace3[b];
+        stiff[b] = f1[b];
     }
     for (n = 0; n < GS4I_BATCH && l->pom_pom; n++)
         if (GS4I_NTH_CONST(l->stretch, n) > 0) {
             double own, fast;
-            gs4i_pom_pom((double)GS4I_NTH_CONST(l->stretch, n), (double)GS4I_NTH_CONST(l->nu, n), (double)GS4I_NTH_CONST(l->alpha, n),
-                         (double)GS4I_NTH(trace3, n), (double)GS4I_NTH(squares, n), &own, &fast);
+            gs4i_pom_pom((double)GS4I_NTH_CONST(l->stretch, n), (double)GS4I_NTH_CONST(l->nu, n),
+                         (double)GS4I_NTH_CONST(l->alpha, n), (double)GS4I_NTH(trace3, n),
+                         (double)GS4I_NTH(squares, n), &own, &fast);
             GS4I_NTH(f1, n) = GS4I_C(own);
-            GS4I_NTH(stiff, n) = GS4I_C(fast + (double)GS4I_NTH_CONST(l->alpha, n) * 2 * (1 + sqrt((double)GS4I_NTH(squares, n))));
+            GS4I_NTH(stiff, n) = GS4I_C(fast
+                                        + (double)GS4I_NTH_CONST(l->alpha, n) * 2
+                                              * (1 + sqrt((double)GS4I_NTH(squares, n))));
         }
     GS4I_BATCH_LOOP(b) {
         relax[b] = l->inv_lambda[b] * (f1[b] + GS4I_C(1));
@@ -4446,36 +5801,64 @@ static void gs4i_elastic_rate(const gs4i_elastic_laws *l, gs4i_lanes G, gs4i_sym
         for (i = 0; i < 3; i++)
             for (j = i; j < 3; j++) {
                 const int ij = gs4i_place[i][j];
-                gs4i_wide sum = G[b] * (L[i][j][b] + L[j][i][b]) - relax[b] * s[ij][b] - l->inv_lambda[b] * l->alpha[b] * G[b] * SS[ij][b];
+                gs4i_wide sum = G[b] * (L[i][j][b] + L[j][i][b]) - relax[b] * s[ij][b]
+                                - l->inv_lambda[b] * l->alpha[b] * G[b] * SS[ij][b];
                 if (i == j) sum -= l->inv_lambda[b] * G[b] * f1[b];
-                for (k = 0; k < 3; k++) sum += L[i][k][b] * s[gs4i_place[k][j]][b] + L[j][k][b] * s[gs4i_place[k][i]][b];
+                for (k = 0; k < 3; k++)
+                    sum +=
+                        L[i][k][b] * s[gs4i_place[k][j]][b] + L[j][k][b] * s[gs4i_place[k][i]][b];
                 R[ij][b] = sum;
             }
     }
 }
 
-/* --- the split ----------------------------------------------------------------------------------------- */
+/* --- the split -------------------------------------------------------------------------------- */
 
 /* Of one particle, in double. */
-typedef struct gs4i_split { double inv_lambda, stretch, nu, alpha, L[3][3], swing /* how far f h / lambda_b moves within a relaxation */; int bounded; } gs4i_split;
+typedef struct gs4i_split {
+    double inv_lambda, stretch, nu, alpha, L[3][3],
+        swing /* how far f h / lambda_b moves within a relaxation */;
+    int bounded;
+} gs4i_split;
 
 /* Eigenvalues and eigenvectors (columns of Q) of a symmetric matrix, by Jacobi's rotations. */
 static void gs4i_eigen(const double m[6], double values[3], double Q[3][3])
 {
     double a[3][3];
     int i, j, k, p, q, sweep;
-    for (i = 0; i < 3; i++) for (j = 0; j < 3; j++) { a[i][j] = m[gs4i_place[i][j]]; Q[i][j] = i == j; }
-    for (sweep = 0; sweep < 20 && fabs(a[0][1]) + fabs(a[0][2]) + fabs(a[1][2]) > 0; sweep++)
-        for (p = 0; p < 2; p++) for (q = p + 1; q < 3; q++) {
-            const double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
-            double t, cosine, sine;
-            if (fabs(a[p][q]) <= 1e-18 * sqrt(fabs(a[p][p] * a[q][q]))) { a[p][q] = a[q][p] = 0; continue; }
-            t = (theta >= 0 ? 1 : -1) / (fabs(theta) + sqrt(theta * theta + 1));
-            cosine = 1 / sqrt(t * t + 1); sine = t * cosine;
-            for (k = 0; k < 3; k++) { const double x = a[k][p], y = a[k][q]; a[k][p] = cosine * x - sine * y; a[k][q] = sine * x + cosine * y; }
-            for (k = 0; k < 3; k++) { const double x = a[p][k], y = a[q][k]; a[p][k] = cosine * x - sine * y; a[q][k] = sine * x + cosine * y; }
-            for (k = 0; k < 3; k++) { const double x = Q[k][p], y = Q[k][q]; Q[k][p] = cosine * x - sine * y; Q[k][q] = sine * x + cosine * y; }
+    for (i = 0; i < 3; i++)
+        for (j = 0; j < 3; j++) {
+            a[i][j] = m[gs4i_place[i][j]];
+            Q[i][j] = i == j;
         }
+    for (sweep = 0; sweep < 20 && fabs(a[0][1]) + fabs(a[0][2]) + fabs(a[1][2]) > 0; sweep++)
+        for (p = 0; p < 2; p++)
+            for (q = p + 1; q < 3; q++) {
+                const double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
+                double t, cosine, sine;
+                if (fabs(a[p][q]) <= 1e-18 * sqrt(fabs(a[p][p] * a[q][q]))) {
+                    a[p][q] = a[q][p] = 0;
+                    continue;
+                }
+                t = (theta >= 0 ? 1 : -1) / (fabs(theta) + sqrt(theta * theta + 1));
+                cosine = 1 / sqrt(t * t + 1);
+                sine = t * cosine;
+                for (k = 0; k < 3; k++) {
+                    const double x = a[k][p], y = a[k][q];
+                    a[k][p] = cosine * x - sine * y;
+                    a[k][q] = sine * x + cosine * y;
+                }
+                for (k = 0; k < 3; k++) {
+                    const double x = a[p][k], y = a[q][k];
+                    a[p][k] = cosine * x - sine * y;
+                    a[q][k] = sine * x + cosine * y;
+                }
+                for (k = 0; k < 3; k++) {
+                    const double x = Q[k][p], y = Q[k][q];
+                    Q[k][p] = cosine * x - sine * y;
+                    Q[k][q] = sine * x + cosine * y;
+                }
+            }
     for (i = 0; i < 3; i++) values[i] = a[i][i];
 }
 
@@ -4484,35 +5867,45 @@ static double gs4i_relaxation(const gs4i_split *p, const double m[6], double *st
 {
     const double x = m[0] - 1, y = m[1] - 1, z = m[2] - 1;
     double f1;
-    gs4i_pom_pom(p->stretch, p->nu, p->alpha, (x + y + z) / 3, x * x + y * y + z * z + 2 * (m[3] * m[3] + m[4] * m[4] + m[5] * m[5]), &f1, stiff);
+    gs4i_pom_pom(p->stretch, p->nu, p->alpha, (x + y + z) / 3,
+                 x * x + y * y + z * z + 2 * (m[3] * m[3] + m[4] * m[4] + m[5] * m[5]), &f1, stiff);
     return f1 + 1;
 }
 
-/* Is the smallest eigenvalue more than what rounding of the largest makes of it? By det / (sum of principal minors), a third of it at least. */
+/* Is the smallest eigenvalue more than what rounding of the largest makes of it? By det / (sum
+ * of principal minors), a third of it at least. */
 static int gs4i_is_round(const double m[6])
 {
-    const double minors = (m[0] * m[1] - m[3] * m[3]) + (m[0] * m[2] - m[4] * m[4]) + (m[1] * m[2] - m[5] * m[5]);
-    const double det = m[0] * (m[1] * m[2] - m[5] * m[5]) - m[3] * (m[3] * m[2] - m[5] * m[4]) + m[4] * (m[3] * m[5] - m[1] * m[4]);
+    const double minors =
+        (m[0] * m[1] - m[3] * m[3]) + (m[0] * m[2] - m[4] * m[4]) + (m[1] * m[2] - m[5] * m[5]);
+    const double det = m[0] * (m[1] * m[2] - m[5] * m[5]) - m[3] * (m[3] * m[2] - m[5] * m[4])
+                       + m[4] * (m[3] * m[5] - m[1] * m[4]);
     return minors > 0 && det > 1e-11 * (m[0] + m[1] + m[2]) * minors;
 }
 
-/* With f frozen dc/dt = -[alpha c^2 + (f - 2 alpha) c - (1 - alpha)], t in units of lambda_b, is Riccati's equation: c = u v^-1 of the linear
- * (u, v)' = [[-g, 1 - alpha], [alpha, g]] (u, v), g = f/2 - alpha, whose exponential e has no negative entry for alpha in [0, 1]. Exact, and
+/* With f frozen dc/dt = -[alpha c^2 + (f - 2 alpha) c - (1 - alpha)], t in units of lambda_b, is
+ * Riccati's equation: c = u v^-1 of the linear (u, v)' = [[-g, 1 - alpha], [alpha, g]] (u, v), g
+ * = f/2 - alpha, whose exponential e has no negative entry for alpha in [0, 1]. Exact, and
  * positive definite as c is: (e00 c + e01)(e10 c + e11)^-1. */
 static void gs4i_relax_frozen(double alpha, double f, double t, const double c[6], double to[6])
 {
     const double g = 0.5 * f - alpha, w = sqrt(g * g + alpha * (1 - alpha));
     double e00 = 1 - g * t, e11 = 1 + g * t, grown = t, d[6], inverse[6], det;
     int i, j, k;
-    if (w * t > 1e-9) {                                     /* all times exp(-w t), which cancels */
-        const double q = exp(-2 * w * t), more = 1 + fabs(g) / w, less = alpha * (1 - alpha) / (w * (w + fabs(g)));
+    if (w * t > 1e-9) { /* all times exp(-w t), which cancels */
+        const double q = exp(-2 * w * t), more = 1 + fabs(g) / w,
+                     less = alpha * (1 - alpha) / (w * (w + fabs(g)));
         e00 = 0.5 * (g > 0 ? less + q * more : more + q * less);
         e11 = 0.5 * (g > 0 ? more + q * less : less + q * more);
         grown = -expm1(-2 * w * t) / (2 * w);
     }
     for (i = 0; i < 6; i++) d[i] = alpha * grown * c[i] + (i < 3 ? e11 : 0);
-    inverse[0] = d[1] * d[2] - d[5] * d[5]; inverse[3] = d[4] * d[5] - d[3] * d[2]; inverse[4] = d[3] * d[5] - d[4] * d[1];
-    inverse[1] = d[0] * d[2] - d[4] * d[4]; inverse[5] = d[3] * d[4] - d[0] * d[5]; inverse[2] = d[0] * d[1] - d[3] * d[3];
+    inverse[0] = d[1] * d[2] - d[5] * d[5];
+    inverse[3] = d[4] * d[5] - d[3] * d[2];
+    inverse[4] = d[3] * d[5] - d[4] * d[1];
+    inverse[1] = d[0] * d[2] - d[4] * d[4];
+    inverse[5] = d[3] * d[4] - d[0] * d[5];
+    inverse[2] = d[0] * d[1] - d[3] * d[3];
     det = d[0] * inverse[0] + d[3] * inverse[3] + d[4] * inverse[4];
     for (i = 0; i < 3; i++)
         for (j = i; j < 3; j++) {
@@ -4522,17 +5915,23 @@ static void gs4i_relax_frozen(double alpha, double f, double t, const double c[6
         }
 }
 
-/* The same for alpha > 1, and where rounding could make an eigenvalue negative: each by itself, dc/dt = -(g c - (1 - alpha)),
- * g = f + alpha (c - 2) frozen too, and held inside the bounds. */
-static void gs4i_relax_values(gs4i_split *p, double f, double t, const double now[3], const double c[3], double next[3])
+/* The same for alpha > 1, and where rounding could make an eigenvalue negative: each by itself,
+ * dc/dt = -(g c - (1 - alpha)), g = f + alpha (c - 2) frozen too, and held inside the bounds. */
+static void gs4i_relax_values(gs4i_split *p, double f, double t, const double now[3],
+                              const double c[3], double next[3])
 {
     int k;
     for (k = 0; k < 3; k++) {
-        const double lost = p->alpha > 1 ? 1 - 1 / p->alpha : 0, alpha = now[k] < lost ? 0 : p->alpha;
-        const double g = f + alpha * (now[k] - 2), x = g * t, phi = fabs(x) < 1e-9 ? 1 - 0.5 * x : -expm1(-x) / x;
+        const double lost = p->alpha > 1 ? 1 - 1 / p->alpha : 0,
+                     alpha = now[k] < lost ? 0 : p->alpha;
+        const double g = f + alpha * (now[k] - 2), x = g * t,
+                     phi = fabs(x) < 1e-9 ? 1 - 0.5 * x : -expm1(-x) / x;
         next[k] = c[k] * exp(-x) + (1 - alpha) * t * phi;
         if (!(p->alpha > 1)) continue;
-        if (alpha > 1 && !(next[k] >= 0.999 * lost)) { next[k] = 0.999 * lost; p->bounded = 1; }
+        if (alpha > 1 && !(next[k] >= 0.999 * lost)) {
+            next[k] = 0.999 * lost;
+            p->bounded = 1;
+        }
         if (alpha < p->alpha || next[k] > 1e6) p->bounded = 1;
         if (next[k] > 1e6) next[k] = 1e6;
     }
@@ -4544,23 +5943,28 @@ static void gs4i_recompose(double Q[3][3], const double values[3], double m[6])
     int i, j;
     for (i = 0; i < 3; i++)
         for (j = i; j < 3; j++)
-            m[gs4i_place[i][j]] = Q[i][0] * values[0] * Q[j][0] + Q[i][1] * values[1] * Q[j][1] + Q[i][2] * values[2] * Q[j][2];
+            m[gs4i_place[i][j]] = Q[i][0] * values[0] * Q[j][0] + Q[i][1] * values[1] * Q[j][1]
+                                  + Q[i][2] * values[2] * Q[j][2];
 }
 
-/* Relax for the time h: with f frozen, twice, half way ahead, then all the way with f from there. */
+/* Relax for the time h: with f frozen, twice, half way ahead, then all the way with f from
+ * there. */
 static void gs4i_relax(gs4i_split *p, double m[6], double h)
 {
     const double t = h * p->inv_lambda;
-    double half[6] = { 0, 0, 0, 0, 0, 0 }, c[6] = { 0, 0, 0, 0, 0, 0 }, next[3], Q[3][3], before, stiff;
+    double half[6] = { 0, 0, 0, 0, 0, 0 }, c[6] = { 0, 0, 0, 0, 0, 0 }, next[3], Q[3][3], before,
+           stiff;
     int i;
-    if (m[0] == 1 && m[1] == 1 && m[2] == 1 && m[3] == 0 && m[4] == 0 && m[5] == 0) return;     /* at rest */
+    /* at rest */
+    if (m[0] == 1 && m[1] == 1 && m[2] == 1 && m[3] == 0 && m[4] == 0 && m[5] == 0) return;
     if (p->alpha <= 1 && gs4i_is_round(m)) {
         memcpy(c, m, sizeof c);
         gs4i_relax_frozen(p->alpha, gs4i_relaxation(p, c, &before), 0.5 * t, c, half);
         gs4i_relax_frozen(p->alpha, gs4i_relaxation(p, half, &stiff), t, c, m);
     } else {
         gs4i_eigen(m, c, Q);
-        for (i = 0; i < 3; i++) c[i] = c[i] > 0 ? c[i] : 1e-30;         /* rounding of a thin ellipsoid */
+        /* rounding of a thin ellipsoid */
+        for (i = 0; i < 3; i++) c[i] = c[i] > 0 ? c[i] : 1e-30;
         gs4i_relax_values(p, gs4i_relaxation(p, c, &before), 0.5 * t, c, c, half);
         gs4i_relax_values(p, gs4i_relaxation(p, half, &stiff), t, half, c, next);
         gs4i_recompose(Q, next, m);
@@ -4572,7 +5976,9 @@ static void gs4i_multiply3(double a[3][3], double b[3][3], double r[3][3])
 {
     double out[3][3];
     int i, j;
-    for (i = 0; i < 3; i++) for (j = 0; j < 3; j++) out[i][j] = a[i][0] * b[0][j] + a[i][1] * b[1][j] + a[i][2] * b[2][j];
+    for (i = 0; i < 3; i++)
+        for (j = 0; j < 3; j++)
+            out[i][j] = a[i][0] * b[0][j] + a[i][1] * b[1][j] + a[i][2] * b[2][j];
     memcpy(r, out, sizeof out);
 }
 
@@ -4581,12 +5987,25 @@ static void gs4i_exponential(double L[3][3], double h, double E[3][3])
 {
     double A[3][3], term[3][3], size = 0;
     int i, j, k, n = 0;
-    for (i = 0; i < 3; i++) for (j = 0; j < 3; j++) if (fabs(L[i][j] * h) > size) size = fabs(L[i][j] * h);
-    while (size > 0.125 && n < 1000) { size *= 0.5; n++; }
-    for (i = 0; i < 3; i++) for (j = 0; j < 3; j++) { A[i][j] = ldexp(L[i][j] * h, -n); term[i][j] = E[i][j] = i == j; }
+    for (i = 0; i < 3; i++)
+        for (j = 0; j < 3; j++)
+            if (fabs(L[i][j] * h) > size) size = fabs(L[i][j] * h);
+    while (size > 0.125 && n < 1000) {
+        size *= 0.5;
+        n++;
+    }
+    for (i = 0; i < 3; i++)
+        for (j = 0; j < 3; j++) {
+            A[i][j] = ldexp(L[i][j] * h, -n);
+            term[i][j] = E[i][j] = i == j;
+        }
     for (k = 1; k <= 10; k++) {
         gs4i_multiply3(term, A, term);
-        for (i = 0; i < 3; i++) for (j = 0; j < 3; j++) { term[i][j] /= k; E[i][j] += term[i][j]; }
+        for (i = 0; i < 3; i++)
+            for (j = 0; j < 3; j++) {
+                term[i][j] /= k;
+                E[i][j] += term[i][j];
+            }
     }
     for (k = 0; k < n; k++) gs4i_multiply3(E, E, E);
 }
@@ -4596,29 +6015,41 @@ static void gs4i_convect(double E[3][3], double m[6])
 {
     double c[3][3], T[3][3];
     int i, j;
-    for (i = 0; i < 3; i++) for (j = 0; j < 3; j++) c[i][j] = m[gs4i_place[i][j]];
+    for (i = 0; i < 3; i++)
+        for (j = 0; j < 3; j++) c[i][j] = m[gs4i_place[i][j]];
     gs4i_multiply3(E, c, T);
-    for (i = 0; i < 3; i++) for (j = i; j < 3; j++) m[gs4i_place[i][j]] = T[i][0] * E[j][0] + T[i][1] * E[j][1] + T[i][2] * E[j][2];
+    for (i = 0; i < 3; i++)
+        for (j = i; j < 3; j++)
+            m[gs4i_place[i][j]] = T[i][0] * E[j][0] + T[i][1] * E[j][1] + T[i][2] * E[j][2];
 }
 
-/* UCM and Oldroyd-B: dS/dt = K S + S K^T + L + L^T, K = L - I/(2 lambda_b), is linear: S <- A S A^T + H, A = exp(K dt), by series over a
- * time so short that they need few terms, then doubled. Exact for constant L. */
+/* UCM and Oldroyd-B: dS/dt = K S + S K^T + L + L^T, K = L - I/(2 lambda_b), is linear: S <- A S
+ * A^T + H, A = exp(K dt), by series over a time so short that they need few terms, then doubled.
+ * Exact for constant L. */
 static void gs4i_linear_advance(const gs4i_split *p, double c[6], double dt)
 {
-    double K[3][3], A[3][3], M[3][3], T[3][3], H[6] = { 0, 0, 0, 0, 0, 0 }, values[3], size = 0, factor;
+    double K[3][3], A[3][3], M[3][3], T[3][3], H[6] = { 0, 0, 0, 0, 0, 0 }, values[3], size = 0,
+                                               factor;
     int i, j, k, n = 0;
     for (i = 0; i < 3; i++)
         for (j = 0; j < 3; j++) {
-            K[i][j] = p->L[i][j] - (i == j ? 0.5 * p->inv_lambda : 0); M[i][j] = p->L[i][j] + p->L[j][i];
+            K[i][j] = p->L[i][j] - (i == j ? 0.5 * p->inv_lambda : 0);
+            M[i][j] = p->L[i][j] + p->L[j][i];
             size = fmax(size, fabs(K[i][j]) * dt);
         }
-    while (size > 1.0 / 64 && n < 1000) { size *= 0.5; n++; }
+    while (size > 1.0 / 64 && n < 1000) {
+        size *= 0.5;
+        n++;
+    }
     dt = ldexp(dt, -n);
     gs4i_exponential(K, dt, A);
-    for (k = 1, factor = dt; k <= 8; k++, factor *= dt / k) {       /* H = sum of dt^k/k! M_k, M_1 = L + L^T, M_(k+1) = K M_k + M_k K^T */
-        for (i = 0; i < 3; i++) for (j = i; j < 3; j++) H[gs4i_place[i][j]] += factor * M[i][j];
+    /* H = sum of dt^k/k! M_k, M_1 = L + L^T, M_(k+1) = K M_k + M_k K^T */
+    for (k = 1, factor = dt; k <= 8; k++, factor *= dt / k) {
+        for (i = 0; i < 3; i++)
+            for (j = i; j < 3; j++) H[gs4i_place[i][j]] += factor * M[i][j];
         gs4i_multiply3(K, M, T);
-        for (i = 0; i < 3; i++) for (j = 0; j < 3; j++) M[i][j] = T[i][j] + T[j][i];
+        for (i = 0; i < 3; i++)
+            for (j = 0; j < 3; j++) M[i][j] = T[i][j] + T[j][i];
     }
     for (k = 0; k < n; k++) {
         double later[6];
@@ -4627,7 +6058,8 @@ static void gs4i_linear_advance(const gs4i_split *p, double c[6], double dt)
         for (i = 0; i < 6; i++) H[i] += later[i];
         gs4i_multiply3(A, A, A);
     }
-    if (!gs4i_is_round(c)) {                                /* rounding of a thin ellipsoid: flow would draw it out */
+    /* rounding of a thin ellipsoid: flow would draw it out */
+    if (!gs4i_is_round(c)) {
         gs4i_eigen(c, values, T);
         for (i = 0; i < 3; i++) values[i] = values[i] > 0 ? values[i] : 0;
         gs4i_recompose(T, values, c);
@@ -4637,40 +6069,61 @@ static void gs4i_linear_advance(const gs4i_split *p, double c[6], double dt)
     for (i = 0; i < 6; i++) c[i] += H[i] + (i < 3);
 }
 
-#define GS4I_SPLIT_TOLERANCE 5e-6       /* of a substep, relative to S */
-#define GS4I_SPLIT_LIMIT 20000          /* substeps; more means that nothing settles */
+#define GS4I_SPLIT_TOLERANCE 5e-6 /* of a substep, relative to S */
+#define GS4I_SPLIT_LIMIT 20000    /* substeps; more means that nothing settles */
 
-/* Conformation after the time dt under constant L. 0, or GS4_ERROR_UNSTABLE where it overflows or takes too long. */
+/* Conformation after the time dt under constant L. 0, or GS4_ERROR_UNSTABLE where it overflows
+ * or takes too long. */
 static int gs4i_split_advance(gs4i_split *p, double c[6], double dt)
 {
-    double h = fmin(dt, 0.25 / p->inv_lambda), left = dt, E[3][3], half[3][3];      /* over a longer one any two answers agree: all has relaxed */
+    /* over a longer one any two answers agree: all has relaxed */
+    double h = fmin(dt, 0.25 / p->inv_lambda), left = dt, E[3][3], half[3][3];
     int n, i;
-    if (!(p->stretch > 0)) { gs4i_linear_advance(p, c, dt); left = 0; }
+    if (!(p->stretch > 0)) {
+        gs4i_linear_advance(p, c, dt);
+        left = 0;
+    }
     for (n = 0; n < GS4I_SPLIT_LIMIT && left > 0; n++) {
         double one[6], two[6], error = 0, change = 0, before = 0, after = 0, size, ratio;
         if (h > left * (1 - 1e-12)) h = left;
         gs4i_exponential(p->L, 0.5 * h, half);
         gs4i_multiply3(half, half, E);
-        memcpy(one, c, sizeof one); memcpy(two, c, sizeof two);
+        memcpy(one, c, sizeof one);
+        memcpy(two, c, sizeof two);
         p->swing = 0;
-        gs4i_relax(p, one, 0.5 * h); gs4i_convect(E, one); gs4i_relax(p, one, 0.5 * h);
-        gs4i_relax(p, two, 0.25 * h); gs4i_convect(half, two); gs4i_relax(p, two, 0.5 * h); gs4i_convect(half, two); gs4i_relax(p, two, 0.25 * h);
-        for (i = 0; i < 6; i++) {                           /* lengths that no rotation of the axes changes */
+        gs4i_relax(p, one, 0.5 * h);
+        gs4i_convect(E, one);
+        gs4i_relax(p, one, 0.5 * h);
+        gs4i_relax(p, two, 0.25 * h);
+        gs4i_convect(half, two);
+        gs4i_relax(p, two, 0.5 * h);
+        gs4i_convect(half, two);
+        gs4i_relax(p, two, 0.25 * h);
+        /* lengths that no rotation of the axes changes */
+        for (i = 0; i < 6; i++) {
             const double weight = i < 3 ? 1 : 2, now = two[i] - (i < 3), then = c[i] - (i < 3);
-            error += weight * (two[i] - one[i]) * (two[i] - one[i]); change += weight * (now - then) * (now - then);
-            after += weight * now * now; before += weight * then * then;
+            error += weight * (two[i] - one[i]) * (two[i] - one[i]);
+            change += weight * (now - then) * (now - then);
+            after += weight * now * now;
+            before += weight * then * then;
         }
-        error = sqrt(error) / 3; change = sqrt(change); size = fmax(1e-14, sqrt(fmax(before, after)));
-        if (!(error < 1e145)) error = 1e290;                /* NaN, too */
-        ratio = fmax(error / (GS4I_SPLIT_TOLERANCE * size + 2e-15 * (1 + size)), p->swing);   /* where f swings, one and two halves agree on a wrong answer */
+        error = sqrt(error) / 3;
+        change = sqrt(change);
+        size = fmax(1e-14, sqrt(fmax(before, after)));
+        if (!(error < 1e145)) error = 1e290; /* NaN, too */
+        /* where f swings, one and two halves agree on a wrong answer */
+        ratio = fmax(error / (GS4I_SPLIT_TOLERANCE * size + 2e-15 * (1 + size)), p->swing);
         if (ratio <= 1) {
             memcpy(c, two, sizeof two);
             left -= h;
-            if (h < left && (change * (left / h) < 1e-6 * size || change < 4e-15 * (1 + size))) return GS4_OK;     /* it has settled */
+            /* it has settled */
+            if (h < left && (change * (left / h) < 1e-6 * size || change < 4e-15 * (1 + size)))
+                return GS4_OK;
         }
         h *= ratio > 0.01 ? fmax(0.9 / cbrt(ratio), 0.1) : 4;
     }
-    for (i = 0; i < 6; i++) if (!(fabs(c[i]) < 1e290)) return GS4_ERROR_UNSTABLE;
+    for (i = 0; i < 6; i++)
+        if (!(fabs(c[i]) < 1e290)) return GS4_ERROR_UNSTABLE;
     return left > 0 ? GS4_ERROR_UNSTABLE : GS4_OK;
 }
 
@@ -4679,50 +6132,77 @@ static void gs4i_conformation_rate(const gs4i_split *p, const double c[6], doubl
 {
     double S[3][3], f1 = 0, stiff, squares = 0;
     int i, j, k;
-    for (i = 0; i < 3; i++) for (j = 0; j < 3; j++) { S[i][j] = c[gs4i_place[i][j]] - (i == j); squares += S[i][j] * S[i][j]; }
-    if (p->stretch > 0) gs4i_pom_pom(p->stretch, p->nu, p->alpha, (S[0][0] + S[1][1] + S[2][2]) / 3, squares, &f1, &stiff);
+    for (i = 0; i < 3; i++)
+        for (j = 0; j < 3; j++) {
+            S[i][j] = c[gs4i_place[i][j]] - (i == j);
+            squares += S[i][j] * S[i][j];
+        }
+    if (p->stretch > 0)
+        gs4i_pom_pom(p->stretch, p->nu, p->alpha, (S[0][0] + S[1][1] + S[2][2]) / 3, squares, &f1,
+                     &stiff);
     for (i = 0; i < 3; i++)
         for (j = i; j < 3; j++) {
             double sum = -p->inv_lambda * ((f1 + 1) * S[i][j] + (i == j ? f1 : 0));
             for (k = 0; k < 3; k++) {
-                sum += p->L[i][k] * c[gs4i_place[k][j]] + p->L[j][k] * c[gs4i_place[k][i]] - p->inv_lambda * p->alpha * S[i][k] * S[k][j];
+                sum += p->L[i][k] * c[gs4i_place[k][j]] + p->L[j][k] * c[gs4i_place[k][i]]
+                       - p->inv_lambda * p->alpha * S[i][k] * S[k][j];
             }
             rate[gs4i_place[i][j]] = sum;
         }
 }
 
-/* How many particles took the split, how many of them had eigenvalues bounded; 1 + the last of the batch that could not be done. */
-typedef struct gs4i_elastic_count { int split, bounded, failed; } gs4i_elastic_count;
+/* How many particles took the split, how many of them had eigenvalues bounded; 1 + the last of
+ * the batch that could not be done. */
+typedef struct gs4i_elastic_count {
+    int split, bounded, failed;
+} gs4i_elastic_count;
 
-/* Particle n of a batch by the split over dt; `after`: its stress then, and with `rate` the rate that belongs to rule 1. */
-static void gs4i_split_one(const gs4i_elastic_laws *l, gs4i_lanes G, gs4i_gradient L, const gs4i_elastic *e, int n, double dt, double gamma,
+/* Particle n of a batch by the split over dt; `after`: its stress then, and with `rate` the rate
+ * that belongs to rule 1. */
+static void gs4i_split_one(const gs4i_elastic_laws *l, gs4i_lanes G, gs4i_gradient L,
+                           const gs4i_elastic *e, int n, double dt, double gamma,
                            gs4i_symmetric after, gs4i_lanes *rate, gs4i_elastic_count *count)
 {
     const double modulus = (double)GS4I_NTH(G, n);
     double c[6], before[6], end[6], fast = 0, gap = 1e-290, slope;
     gs4i_split p;
     int i, j;
-    p.inv_lambda = (double)GS4I_NTH_CONST(l->inv_lambda, n); p.stretch = (double)GS4I_NTH_CONST(l->stretch, n);
-    p.nu = (double)GS4I_NTH_CONST(l->nu, n); p.alpha = (double)GS4I_NTH_CONST(l->alpha, n); p.bounded = 0;
-    for (i = 0; i < 3; i++) for (j = 0; j < 3; j++) p.L[i][j] = (double)GS4I_NTH(L[i][j], n);
-    for (i = 0; i < 6; i++) before[i] = c[i] = (double)GS4I_NTH_CONST(e->s[i], n) / modulus + (i < 3);
+    p.inv_lambda = (double)GS4I_NTH_CONST(l->inv_lambda, n);
+    p.stretch = (double)GS4I_NTH_CONST(l->stretch, n);
+    p.nu = (double)GS4I_NTH_CONST(l->nu, n);
+    p.alpha = (double)GS4I_NTH_CONST(l->alpha, n);
+    p.bounded = 0;
+    for (i = 0; i < 3; i++)
+        for (j = 0; j < 3; j++) p.L[i][j] = (double)GS4I_NTH(L[i][j], n);
+    for (i = 0; i < 6; i++)
+        before[i] = c[i] = (double)GS4I_NTH_CONST(e->s[i], n) / modulus + (i < 3);
     count->split++;
     if (gs4i_split_advance(&p, c, dt) != GS4_OK) count->failed = n + 1;
     for (i = 0; i < 6; i++) GS4I_NTH(after[i], n) = GS4I_C(modulus * (c[i] - (i < 3)));
     count->bounded += p.bounded;
     if (!rate) return;
     gs4i_conformation_rate(&p, c, end);
-    for (i = 0; i < 6; i++) { fast = fmax(fast, fabs(end[i])); gap = fmax(gap, fabs((c[i] - before[i]) / dt - end[i])); }
-    slope = (2 * gamma - 1) * fmin(1, fast / gap);      /* a transient that is over does not belong into the rate */
-    for (i = 0; i < 6; i++) GS4I_NTH(rate[i], n) = GS4I_C(modulus * (slope * (c[i] - before[i]) / dt + (1 - slope) * end[i]));
+    for (i = 0; i < 6; i++) {
+        fast = fmax(fast, fabs(end[i]));
+        gap = fmax(gap, fabs((c[i] - before[i]) / dt - end[i]));
+    }
+    /* a transient that is over does not belong into the rate */
+    slope = (2 * gamma - 1) * fmin(1, fast / gap);
+    for (i = 0; i < 6; i++)
+        GS4I_NTH(rate[i], n) =
+            GS4I_C(modulus * (slope * (c[i] - before[i]) / dt + (1 - slope) * end[i]));
 }
 
-/* --- both together ------------------------------------------------------------------------------------- */
+/* --- both together ---------------------------------------------------------------------------- */
 
-/* Does rule 1 resolve each particle: |L| dt and what relaxes explicitly small, and c = s/G + I inside the cone, or above 1 - 1/alpha? */
-static int gs4i_resolved(gs4i_lanes G, const gs4i_wide *alpha, gs4i_gradient L, gs4i_symmetric s, gs4i_lanes relax, gs4i_lanes stiff, const gs4i_rule *rule, int ok[GS4I_BATCH])
+/* Does rule 1 resolve each particle: |L| dt and what relaxes explicitly small, and c = s/G + I
+ * inside the cone, or above 1 - 1/alpha? */
+static int gs4i_resolved(gs4i_lanes G, const gs4i_wide *alpha, gs4i_gradient L, gs4i_symmetric s,
+                         gs4i_lanes relax, gs4i_lanes stiff, const gs4i_rule *rule,
+                         int ok[GS4I_BATCH])
 {
-    const gs4_real dt = rule->dt, fastest = rule->afresh ? 1 / dt : GS4I_HUGE;      /* the midpoint rule of a first step damps nothing */
+    /* the midpoint rule of a first step damps nothing */
+    const gs4_real dt = rule->dt, fastest = rule->afresh ? 1 / dt : GS4I_HUGE;
     gs4i_lanes squared, verdict;
     int b, j, all = 1;
     gs4i_gradient_squared(L, squared);
@@ -4732,11 +6212,16 @@ static int gs4i_resolved(gs4i_lanes G, const gs4i_wide *alpha, gs4i_gradient L, 
         gs4i_wide_mask good;
         GS4I_WIDE_MAX(room, alpha[b], one);
         room = G[b] / room;
-        xx = s[0][b] + room; yy = s[1][b] + room; zz = s[2][b] + room;
+        xx = s[0][b] + room;
+        yy = s[1][b] + room;
+        zz = s[2][b] + room;
         minor = xx * yy - s[3][b] * s[3][b];
-        det = zz * minor - s[4][b] * (s[4][b] * yy - s[3][b] * s[5][b]) - s[5][b] * (xx * s[5][b] - s[3][b] * s[4][b]);
-        good = ((squared[b] * (dt * dt) < GS4I_C(0.0625)) & (stiff[b] * dt < GS4I_C(0.4)) & (relax[b] * dt > GS4I_C(-0.1)) & (relax[b] < fastest)
-            & (xx > GS4I_C(1e-3) * G[b]) & (minor > GS4I_C(1e-5) * xx * yy) & (det > GS4I_C(1e-5) * xx * yy * zz)) | (G[b] <= GS4I_TINY);
+        det = zz * minor - s[4][b] * (s[4][b] * yy - s[3][b] * s[5][b])
+              - s[5][b] * (xx * s[5][b] - s[3][b] * s[4][b]);
+        good = ((squared[b] * (dt * dt) < GS4I_C(0.0625)) & (stiff[b] * dt < GS4I_C(0.4))
+                & (relax[b] * dt > GS4I_C(-0.1)) & (relax[b] < fastest) & (xx > GS4I_C(1e-3) * G[b])
+                & (minor > GS4I_C(1e-5) * xx * yy) & (det > GS4I_C(1e-5) * xx * yy * zz))
+               | (G[b] <= GS4I_TINY);
         all &= gs4i_all(&good);
         GS4I_CHOOSE(verdict[b], good, one, zero);
     }
@@ -4751,31 +6236,41 @@ static void gs4i_moduli(const gs4i_elastic_laws *l, gs4i_gradient L, gs4i_lanes 
     memcpy(G, l->modulus, sizeof l->modulus);
     for (n = 0; n < GS4I_BATCH && l->varies; n++) {
         const gs4i_law *law = l->of[n];
-        if (law->varies && law->inv_lambda > 0) GS4I_NTH(G, n) = (1 - law->local) * gs4i_viscosity_of(law, GS4I_NTH_CONST(l->temperature, n), L, n) * law->inv_lambda;
+        if (law->varies && law->inv_lambda > 0)
+            GS4I_NTH(G, n) = (1 - law->local)
+                             * gs4i_viscosity_of(law, GS4I_NTH_CONST(l->temperature, n), L, n)
+                             * law->inv_lambda;
     }
 }
 
 /* S4: stress at the stage, s~ = s** + w (R + relax (s* - s~)), for n particles of the batch. */
-static void gs4i_stage_elastic(const gs4i_elastic_laws *l, gs4i_lanes G, const gs4i_elastic *e, const gs4i_rule *rule, gs4i_gradient L, int n,
-                               gs4i_symmetric s, gs4i_elastic_count *count)
+static void gs4i_stage_elastic(const gs4i_elastic_laws *l, gs4i_lanes G, const gs4i_elastic *e,
+                               const gs4i_rule *rule, gs4i_gradient L, int n, gs4i_symmetric s,
+                               gs4i_elastic_count *count)
 {
     const gs4_real ahead = rule->reach.ahead, w = rule->s;
     gs4i_symmetric R;
     gs4i_lanes relax, stiff;
     int b, c, ok[GS4I_BATCH];
-    for (c = 0; c < 6; c++) GS4I_BATCH_LOOP(b) s[c][b] = e->s[c][b] + ahead * e->rate[c][b];
+    for (c = 0; c < 6; c++)
+        GS4I_BATCH_LOOP(b) s[c][b] = e->s[c][b] + ahead * e->rate[c][b];
     gs4i_elastic_rate(l, G, s, L, R, relax, stiff);
     for (c = 0; c < 6; c++)
-        GS4I_BATCH_LOOP(b) s[c][b] = (e->s[c][b] + (ahead - w) * e->rate[c][b] + w * (R[c][b] + relax[b] * s[c][b])) / (GS4I_C(1) + w * relax[b]);
+        GS4I_BATCH_LOOP(b)
+            s[c][b] =
+                (e->s[c][b] + (ahead - w) * e->rate[c][b] + w * (R[c][b] + relax[b] * s[c][b]))
+                / (GS4I_C(1) + w * relax[b]);
     if (gs4i_resolved(G, l->alpha, L, s, relax, stiff, rule, ok)) return;
-    for (b = 0; b < n; b++) if (!ok[b]) gs4i_split_one(l, G, L, e, b, (double)ahead, 1, s, NULL, count);
+    for (b = 0; b < n; b++)
+        if (!ok[b]) gs4i_split_one(l, G, L, e, b, (double)ahead, 1, s, NULL, count);
 }
 
-/* S7: s by rule 1, (alpha_m + w relax) ds' = R(y) + relax (y - s*) - s' with w = alpha_f gamma dt, for n particles of the batch.
- * y is the predicted stress s*; where there are no rates to predict with, that of the midpoint rule; and it is taken again
- * at s* + w ds' for members with gamma near 1/2, which a prediction alone leaves unstable. */
-static void gs4i_correct_elastic(const gs4i_elastic_laws *l, gs4i_elastic *e, const gs4i_rule *rule, gs4i_gradient L, int n,
-                                 gs4i_elastic_count *count)
+/* S7: s by rule 1, (alpha_m + w relax) ds' = R(y) + relax (y - s*) - s' with w = alpha_f gamma
+ * dt, for n particles of the batch. y is the predicted stress s*; where there are no rates to
+ * predict with, that of the midpoint rule; and it is taken again at s* + w ds' for members with
+ * gamma near 1/2, which a prediction alone leaves unstable. */
+static void gs4i_correct_elastic(const gs4i_elastic_laws *l, gs4i_elastic *e, const gs4i_rule *rule,
+                                 gs4i_gradient L, int n, gs4i_elastic_count *count)
 {
     const gs4_real dt = rule->dt, w = rule->alpha_f * rule->gamma * dt;
     const gs4i_elastic old = *e;
@@ -4783,16 +6278,19 @@ static void gs4i_correct_elastic(const gs4i_elastic_laws *l, gs4i_elastic *e, co
     gs4i_lanes G, relax, stiff;
     int b, c, ok[GS4I_BATCH], pass, passes = rule->gamma > GS4I_C(0.66) ? 1 : 5;
     gs4i_moduli(l, L, G);
-    for (c = 0; c < 6; c++) GS4I_BATCH_LOOP(b) star[c][b] = y[c][b] = e->s[c][b] + rule->alpha_f * dt * e->rate[c][b];
+    for (c = 0; c < 6; c++)
+        GS4I_BATCH_LOOP(b) star[c][b] = y[c][b] = e->s[c][b] + rule->alpha_f * dt * e->rate[c][b];
     if (rule->afresh) {
         gs4i_elastic_rate(l, G, e->s, L, R, relax, stiff);
-        for (c = 0; c < 6; c++) GS4I_BATCH_LOOP(b) y[c][b] += rule->alpha_f * dt * R[c][b];
+        for (c = 0; c < 6; c++)
+            GS4I_BATCH_LOOP(b) y[c][b] += rule->alpha_f * dt * R[c][b];
     }
     for (pass = 0; pass < passes; pass++) {
         gs4i_elastic_rate(l, G, y, L, R, relax, stiff);
         for (c = 0; c < 6; c++)
             GS4I_BATCH_LOOP(b) {
-                change[c][b] = (R[c][b] + relax[b] * (y[c][b] - star[c][b]) - e->rate[c][b]) / (rule->alpha_m + w * relax[b]);
+                change[c][b] = (R[c][b] + relax[b] * (y[c][b] - star[c][b]) - e->rate[c][b])
+                               / (rule->alpha_m + w * relax[b]);
                 y[c][b] = star[c][b] + w * change[c][b];
             }
     }
@@ -4802,10 +6300,13 @@ static void gs4i_correct_elastic(const gs4i_elastic_laws *l, gs4i_elastic *e, co
             e->rate[c][b] += change[c][b];
         }
     if (gs4i_resolved(G, l->alpha, L, e->s, relax, stiff, rule, ok)) return;
-    for (b = 0; b < n; b++) if (!ok[b]) gs4i_split_one(l, G, L, &old, b, (double)dt, (double)rule->gamma, e->s, e->rate, count);
+    for (b = 0; b < n; b++)
+        if (!ok[b])
+            gs4i_split_one(l, G, L, &old, b, (double)dt, (double)rule->gamma, e->s, e->rate, count);
 }
 
-/* Elastic waves of each particle: density times squared speed at most, 2 G0 c_max, by the largest row sum of c. */
+/* Elastic waves of each particle: density times squared speed at most, 2 G0 c_max, by the
+ * largest row sum of c. */
 static void gs4i_see_elastic(gs4i_lanes G, gs4i_symmetric s, gs4i_lanes stiffness)
 {
     int b, i, j;
@@ -4825,58 +6326,79 @@ static void gs4i_see_elastic(gs4i_lanes G, gs4i_symmetric s, gs4i_lanes stiffnes
     }
 }
 
-/* Stress of n particles from memory, six numbers each and six of the rate where there are rates; and back. */
+/* Stress of n particles from memory, six numbers each and six of the rate where there are rates;
+ * and back. */
 static void gs4i_load_elastic(const gs4_real *from, int reals, int n, gs4i_elastic *e)
 {
-    gs4i_lanes *l = (gs4i_lanes *)(void *)e;                /* 12 in the order of its fields */
-    if (reals == 12) gs4i_numbers_to_lanes(from, 12, n, l);
-    else { gs4i_numbers_to_lanes(from, 6, n, l); memset(l + 6, 0, 6 * sizeof *l); }
+    gs4i_lanes *l = (gs4i_lanes *)(void *)e; /* 12 in the order of its fields */
+    if (reals == 12)
+        gs4i_numbers_to_lanes(from, 12, n, l);
+    else {
+        gs4i_numbers_to_lanes(from, 6, n, l);
+        memset(l + 6, 0, 6 * sizeof *l);
+    }
 }
 
 static void gs4i_store_elastic(gs4_real *to, int reals, int n, gs4i_elastic *e)
 {
     gs4i_lanes *l = (gs4i_lanes *)(void *)e;
-    if (reals == 12) gs4i_lanes_to_numbers(l, 12, n, to);
-    else gs4i_lanes_to_numbers(l, 6, n, to);
+    if (reals == 12)
+        gs4i_lanes_to_numbers(l, 12, n, to);
+    else
+        gs4i_lanes_to_numbers(l, 6, n, to);
 }
 
-/* ==== [[solid]] elastic and plastic solids: neo-Hookean, fixed-corotated =========================== *
+/* ==== [[solid]] elastic and plastic solids: neo-Hookean, fixed-corotated ======================= *
  *
- * F is the elastic part of the deformation gradient, dF/dt = L F while nothing yields; F = V R with a rotation R. Cauchy stress (Pa):
+ * F is the elastic part of the deformation gradient, dF/dt = L F while nothing yields; F = V R
+ * with a rotation R. Cauchy stress (Pa):
  *
  *     neo-Hookean      s = (G/J) dev(B),         B = J^(-2/3) F F^T                         (2021)
- *     fixed-corotated  s = (2 G/J) dev(B - V),   V^2 = B: of the energy G |J^(-1/3) F - R|^2    (2014, 7 and 8)
+ *     fixed-corotated  s = (2 G/J) dev(B - V),   V^2 = B: energy G |J^(-1/3) F - R|^2  (2014, 7, 8)
  *
- * beside the pressure of the particle's J, which alone is the volume: F is scaled to det F = J whenever it is written, and its
- * stress is that of the part that keeps volume. Particles of liquids have F = J^(1/3) I.
- *     What is kept with F is not dF/dt but M = (dF/dt) F^-1, by rule 1 for known grad u, and F goes by the mean of M over the step:
+ * beside the pressure of the particle's J, which alone is the volume: F is scaled to det F = J
+ * whenever it is written, and its stress is that of the part that keeps volume. Particles of
+ * liquids have F = J^(1/3) I.
+ *     What is kept with F is not dF/dt but M = (dF/dt) F^-1, by rule 1 for known grad u, and F goes
+ *     by the mean of M over the step:
  *
- *     dM = (grad u - M) / alpha_m,   X = dt (M + gamma dM),   F <- (I - X/2)^-1 (I + X/2) F,   M += dM
+ *     dM = (grad u - M) / alpha_m,   X = dt (M + gamma dM),   M += dM,
+ *     F <- (I - X/2)^-1 (I + X/2) F
  *     stage: Y = alpha_f dt M + s (L~ - M),   F~ = (I - Y/2)^-1 (I + Y/2) F
  *
- * To first order in X that is rule 1 for F itself, implicit in F at the stage. But a rotation stays one, whatever dt; where |X| > 1 exp(X)
- * takes the place of the fraction, so that det F > 0 after any step; and what happens to F from the right - yielding, F <- F P, or
- * forgetting all strain, F <- J^(1/3) I - leaves M as it is, so that nothing needs to start afresh.
- *     Yield (2014, 5.1), after each step: singular values of F are clamped to [1 - theta_c, 1 + theta_s], then all scaled to det F = J.
- *     Solids also keep how they turn, w (rad/s), with its rate: see S3, and gs4i_correct_turning. */
+ * To first order in X that is rule 1 for F itself, implicit in F at the stage. But a rotation
+ * stays one, whatever dt; where |X| > 1 exp(X) takes the place of the fraction, so that det F >
+ * 0 after any step; and what happens to F from the right - yielding, F <- F P, or forgetting all
+ * strain, F <- J^(1/3) I - leaves M as it is, so that nothing needs to start afresh.
+ *     Yield (2014, 5.1), after each step: singular values of F are clamped to
+ *     [1 - theta_c, 1 + theta_s], then all scaled to det F = J.
+ *     Solids also keep how they turn, w (rad/s), with its rate: S3, gs4i_correct_turning. */
 
-/* Density times squared speed of elastic waves, over G times the largest eigenvalue of B: 4/3 by the acoustic tensor, but the grid, which has less
- * of div dev grad than of div grad, sees 0.83 of it in the measure of sound (tests/test_solid.c). */
+/* Density times squared speed of elastic waves, over G times the largest eigenvalue of B: 4/3 by
+ * the acoustic tensor, but the grid, which has less of div dev grad than of div grad, sees 0.83
+ * of it in the measure of sound (tests/test_solid.c). */
 #define GS4I_SOLID_WAVES GS4I_C(1)
-#define GS4I_MOST_STRAIN GS4I_C(8)              /* |X| of one step; more is refused */
+#define GS4I_MOST_STRAIN GS4I_C(8) /* |X| of one step; more is refused */
 
 /* What the particles of a batch need of their materials. */
 typedef struct gs4i_solid_laws {
     gs4i_lanes modulus /* 0: not solid */, low, high, corotated /* 1 or 0 */;
     const gs4i_law *of[GS4I_BATCH];
-    int present, any_corotated;         /* solids in this batch; fixed-corotated ones among those seen so far */
+    /* solids in this batch; fixed-corotated ones among those seen so far */
+    int present, any_corotated;
 } gs4i_solid_laws;
 
 /* F, M, w and dw/dt of a batch. */
-typedef struct gs4i_deformation { gs4i_matrix F, rate; gs4i_lanes turning[3], turning_rate[3]; } gs4i_deformation;
+typedef struct gs4i_deformation {
+    gs4i_matrix F, rate;
+    gs4i_lanes turning[3], turning_rate[3];
+} gs4i_deformation;
 
-/* How many particles took the exponential, how many had to be bounded; 1 + the last of the batch that could not be done. */
-typedef struct gs4i_solid_count { int split, bounded, failed; } gs4i_solid_count;
+/* How many particles took the exponential, how many had to be bounded; 1 + the last of the batch
+ * that could not be done. */
+typedef struct gs4i_solid_count {
+    int split, bounded, failed;
+} gs4i_solid_count;
 
 /* Is any of the batch solid? */
 static int gs4i_take_solid_laws(const gs4i_batch_laws *laws, gs4i_solid_laws *l)
@@ -4887,16 +6409,22 @@ static int gs4i_take_solid_laws(const gs4i_batch_laws *laws, gs4i_solid_laws *l)
         const gs4i_law *law = laws->of[n];
         l->present |= law->shear_modulus > 0;
         if (law == l->of[n]) continue;
-        l->of[n] = law; l->any_corotated |= law->is.solid == GS4_FIXED_COROTATED;
-        GS4I_NTH(l->modulus, n) = law->shear_modulus; GS4I_NTH(l->low, n) = law->low; GS4I_NTH(l->high, n) = law->high;
+        l->of[n] = law;
+        l->any_corotated |= law->is.solid == GS4_FIXED_COROTATED;
+        GS4I_NTH(l->modulus, n) = law->shear_modulus;
+        GS4I_NTH(l->low, n) = law->low;
+        GS4I_NTH(l->high, n) = law->high;
         GS4I_NTH(l->corotated, n) = GS4I_C(law->is.solid == GS4_FIXED_COROTATED);
     }
     return l->present;
 }
 
-/* --- one particle, in double --------------------------------------------------------------------------- */
+/* --- one particle, in double ------------------------------------------------------------------ */
 
-static double gs4i_dot3(double a[3][3], int i, double b[3][3], int j) { return a[0][i] * b[0][j] + a[1][i] * b[1][j] + a[2][i] * b[2][j]; }
+static double gs4i_dot3(double a[3][3], int i, double b[3][3], int j)
+{
+    return a[0][i] * b[0][j] + a[1][i] * b[1][j] + a[2][i] * b[2][j];
+}
 
 /* Columns p and q of a become c p - s q and s p + c q. */
 static void gs4i_turn_columns(double a[3][3], int p, int q, double cosine, double sine)
@@ -4904,36 +6432,50 @@ static void gs4i_turn_columns(double a[3][3], int p, int q, double cosine, doubl
     int k;
     for (k = 0; k < 3; k++) {
         const double x = a[k][p], y = a[k][q];
-        a[k][p] = cosine * x - sine * y; a[k][q] = sine * x + cosine * y;
+        a[k][p] = cosine * x - sine * y;
+        a[k][q] = sine * x + cosine * y;
     }
 }
 
-/* F = U diag(s) V^T with rotations U and V, s[0] >= s[1] >= |s[2]|, the sign of det F in s[2]; of any finite F, flat ones and zero
- * included. One-sided Jacobi: the columns of F V are made orthogonal, so that small singular values keep their digits. */
+/* F = U diag(s) V^T with rotations U and V, s[0] >= s[1] >= |s[2]|, the sign of det F in s[2];
+ * of any finite F, flat ones and zero included. One-sided Jacobi: the columns of F V are made
+ * orthogonal, so that small singular values keep their digits. */
 static void gs4i_svd(double F[3][3], double U[3][3], double s[3], double V[3][3])
 {
     double A[3][3], size = 0, u[3][3];
     int i, j, p, q, sweep, turned = 1;
-    for (i = 0; i < 3; i++) for (j = 0; j < 3; j++) { size = fmax(size, fabs(F[i][j])); V[i][j] = i == j; }
-    for (i = 0; i < 3; i++) for (j = 0; j < 3; j++) A[i][j] = size > 0 ? F[i][j] / size : 0;
-    for (sweep = 0; sweep < 30 && turned; sweep++)
-        for (turned = 0, p = 0; p < 2; p++) for (q = p + 1; q < 3; q++) {
-            const double a = gs4i_dot3(A, p, A, p), b = gs4i_dot3(A, q, A, q), c = gs4i_dot3(A, p, A, q), zeta = 0.5 * (b - a) / c;
-            double t, cosine;
-            if (!(fabs(c) > 1e-16 * sqrt(a) * sqrt(b)) || !(fabs(zeta) < 1e150)) continue;
-            t = (zeta >= 0 ? 1 : -1) / (fabs(zeta) + sqrt(1 + zeta * zeta));
-            cosine = 1 / sqrt(1 + t * t);
-            gs4i_turn_columns(A, p, q, cosine, cosine * t); gs4i_turn_columns(V, p, q, cosine, cosine * t);
-            turned = 1;
+    for (i = 0; i < 3; i++)
+        for (j = 0; j < 3; j++) {
+            size = fmax(size, fabs(F[i][j]));
+            V[i][j] = i == j;
         }
-    for (sweep = 0; sweep < 3; sweep++)                     /* a quarter turn puts the longer column first */
+    for (i = 0; i < 3; i++)
+        for (j = 0; j < 3; j++) A[i][j] = size > 0 ? F[i][j] / size : 0;
+    for (sweep = 0; sweep < 30 && turned; sweep++)
+        for (turned = 0, p = 0; p < 2; p++)
+            for (q = p + 1; q < 3; q++) {
+                const double a = gs4i_dot3(A, p, A, p), b = gs4i_dot3(A, q, A, q),
+                             c = gs4i_dot3(A, p, A, q), zeta = 0.5 * (b - a) / c;
+                double t, cosine;
+                if (!(fabs(c) > 1e-16 * sqrt(a) * sqrt(b)) || !(fabs(zeta) < 1e150)) continue;
+                t = (zeta >= 0 ? 1 : -1) / (fabs(zeta) + sqrt(1 + zeta * zeta));
+                cosine = 1 / sqrt(1 + t * t);
+                gs4i_turn_columns(A, p, q, cosine, cosine * t);
+                gs4i_turn_columns(V, p, q, cosine, cosine * t);
+                turned = 1;
+            }
+    /* a quarter turn puts the longer column first */
+    for (sweep = 0; sweep < 3; sweep++)
         if (gs4i_dot3(A, sweep % 2, A, sweep % 2) < gs4i_dot3(A, sweep % 2 + 1, A, sweep % 2 + 1)) {
-            gs4i_turn_columns(A, sweep % 2, sweep % 2 + 1, 0, -1); gs4i_turn_columns(V, sweep % 2, sweep % 2 + 1, 0, -1);
+            gs4i_turn_columns(A, sweep % 2, sweep % 2 + 1, 0, -1);
+            gs4i_turn_columns(V, sweep % 2, sweep % 2 + 1, 0, -1);
         }
     for (j = 0; j < 2; j++) {
         double length = sqrt(gs4i_dot3(A, j, A, j)), along;
-        if (length > 1e-150) for (i = 0; i < 3; i++) u[i][j] = A[i][j] / length;
-        else {                                              /* any direction will do: the axis that is farthest from the first */
+        if (length > 1e-150)
+            for (i = 0; i < 3; i++) u[i][j] = A[i][j] / length;
+        /* any direction will do: the axis that is farthest from the first */
+        else {
             const int axis = j == 0 ? 0 : fabs(u[0][0]) < 0.6 ? 0 : fabs(u[1][0]) < 0.75 ? 1 : 2;
             for (i = 0; i < 3; i++) u[i][j] = i == axis;
         }
@@ -4942,13 +6484,15 @@ static void gs4i_svd(double F[3][3], double U[3][3], double s[3], double V[3][3]
         length = sqrt(gs4i_dot3(u, j, u, j));
         for (i = 0; i < 3; i++) u[i][j] /= length;
     }
-    for (i = 0; i < 3; i++) u[i][2] = u[(i + 1) % 3][0] * u[(i + 2) % 3][1] - u[(i + 2) % 3][0] * u[(i + 1) % 3][1];
+    for (i = 0; i < 3; i++)
+        u[i][2] = u[(i + 1) % 3][0] * u[(i + 2) % 3][1] - u[(i + 2) % 3][0] * u[(i + 1) % 3][1];
     for (j = 0; j < 3; j++) s[j] = size * gs4i_dot3(A, j, u, j);
     memcpy(U, u, sizeof u);
 }
 
 /* Deviatoric Cauchy stress, added to sigma, and what gs4i_solid_stress calls stiffness. */
-static void gs4i_solid_stress_one(const gs4i_law *law, double F[3][3], double J, double sigma[6], double *stiffness)
+static void gs4i_solid_stress_one(const gs4i_law *law, double F[3][3], double J, double sigma[6],
+                                  double *stiffness)
 {
     const double q = 1 / cbrt(J), G = (double)law->shear_modulus;
     const int corotated = law->is.solid == GS4_FIXED_COROTATED;
@@ -4958,15 +6502,18 @@ static void gs4i_solid_stress_one(const gs4i_law *law, double F[3][3], double J,
     for (k = 0; k < 3; k++) {
         const double stretch = q * s[k];
         t[k] = corotated ? 2 * stretch * (stretch - 1) : stretch * stretch;
-        mean += t[k] / 3; most = fmax(most, fabs(stretch));
+        mean += t[k] / 3;
+        most = fmax(most, fabs(stretch));
     }
     for (i = 0; i < 3; i++)
         for (j = i; j < 3; j++)
-            for (k = 0; k < 3; k++) sigma[gs4i_place[i][j]] += G / J * (t[k] - mean) * U[i][k] * U[j][k];
+            for (k = 0; k < 3; k++)
+                sigma[gs4i_place[i][j]] += G / J * (t[k] - mean) * U[i][k] * U[j][k];
     *stiffness = (double)GS4I_SOLID_WAVES * G * (corotated ? most * (2 * most - 1) : most * most);
 }
 
-/* Clamp the singular values of F, scale to the determinant that it had. Were any beyond their limits? */
+/* Clamp the singular values of F, scale to the determinant that it had. Were any beyond their
+ * limits? */
 static int gs4i_yield_one(double F[3][3], double low, double high)
 {
     double U[3][3], s[3], V[3][3], clamped[3], scale;
@@ -4977,13 +6524,16 @@ static int gs4i_yield_one(double F[3][3], double low, double high)
     scale = cbrt(s[0] / clamped[0] * (s[1] / clamped[1]) * (s[2] / clamped[2]));
     for (i = 0; i < 3; i++)
         for (j = 0; j < 3; j++)
-            for (F[i][j] = 0, k = 0; k < 3; k++) F[i][j] += U[i][k] * (scale * clamped[k]) * V[j][k];
+            for (F[i][j] = 0, k = 0; k < 3; k++)
+                F[i][j] += U[i][k] * (scale * clamped[k]) * V[j][k];
     return 1;
 }
 
 static double gs4i_determinant(double F[3][3])
 {
-    return F[0][0] * (F[1][1] * F[2][2] - F[1][2] * F[2][1]) + F[0][1] * (F[1][2] * F[2][0] - F[1][0] * F[2][2]) + F[0][2] * (F[1][0] * F[2][1] - F[1][1] * F[2][0]);
+    return F[0][0] * (F[1][1] * F[2][2] - F[1][2] * F[2][1])
+           + F[0][1] * (F[1][2] * F[2][0] - F[1][0] * F[2][2])
+           + F[0][2] * (F[1][0] * F[2][1] - F[1][1] * F[2][0]);
 }
 
 /* F <- exp(X) F. 0 where that is too much for one step. */
@@ -4991,7 +6541,11 @@ static int gs4i_exponential_step(gs4i_matrix X, int n, double F[3][3])
 {
     double x[3][3], E[3][3], squared = 0;
     int i, j;
-    for (i = 0; i < 3; i++) for (j = 0; j < 3; j++) { x[i][j] = (double)GS4I_NTH(X[i][j], n); squared += x[i][j] * x[i][j]; }
+    for (i = 0; i < 3; i++)
+        for (j = 0; j < 3; j++) {
+            x[i][j] = (double)GS4I_NTH(X[i][j], n);
+            squared += x[i][j] * x[i][j];
+        }
     if (!(squared <= (double)(GS4I_MOST_STRAIN * GS4I_MOST_STRAIN))) return 0;
     gs4i_exponential(x, 1, E);
     gs4i_multiply3(E, F, F);
@@ -5010,9 +6564,10 @@ static void gs4i_set_matrix(gs4i_matrix a, int n, double one[3][3])
     for (i = 0; i < 9; i++) GS4I_NTH(a[i / 3][i % 3], n) = GS4I_C(one[i / 3][i % 3]);
 }
 
-/* --- a batch ------------------------------------------------------------------------------------------- */
+/* --- a batch ---------------------------------------------------------------------------------- */
 
-/* Cube root to rounding for 1/20 < x < 20, positive for any positive x: Halley's rule, four times from 1. */
+/* Cube root to rounding for 1/20 < x < 20, positive for any positive x: Halley's rule, four
+ * times from 1. */
 GS4I_INLINE void gs4i_cube_root(const gs4i_wide *x, gs4i_wide *root)
 {
     gs4i_wide y = (*x - *x) + GS4I_C(1);
@@ -5030,18 +6585,23 @@ GS4I_INLINE void gs4i_cofactors(gs4i_wide a[3][3], gs4i_wide c[3][3], gs4i_wide 
     int i, j;
     for (i = 0; i < 3; i++)
         for (j = 0; j < 3; j++)
-            c[i][j] = a[(i + 1) % 3][(j + 1) % 3] * a[(i + 2) % 3][(j + 2) % 3] - a[(i + 1) % 3][(j + 2) % 3] * a[(i + 2) % 3][(j + 1) % 3];
+            c[i][j] = a[(i + 1) % 3][(j + 1) % 3] * a[(i + 2) % 3][(j + 2) % 3]
+                      - a[(i + 1) % 3][(j + 2) % 3] * a[(i + 2) % 3][(j + 1) % 3];
     *determinant = a[0][0] * c[0][0] + a[0][1] * c[0][1] + a[0][2] * c[0][2];
 }
 
-#define GS4I_SMALL_STEP GS4I_C(1)               /* |X|^2 up to which the fraction serves; its pole is at 4 */
+/* |X|^2 up to which the fraction serves; its pole is at 4 */
+#define GS4I_SMALL_STEP GS4I_C(1)
 
 /* Is |X| small for all? */
 static int gs4i_is_small_step(gs4i_matrix X, gs4i_lanes squared)
 {
     int b, small = 1;
     gs4i_gradient_squared(X, squared);
-    GS4I_BATCH_LOOP(b) { const gs4i_wide_mask fine = squared[b] < GS4I_SMALL_STEP; small &= gs4i_all(&fine); }
+    GS4I_BATCH_LOOP(b) {
+        const gs4i_wide_mask fine = squared[b] < GS4I_SMALL_STEP;
+        small &= gs4i_all(&fine);
+    }
     return small;
 }
 
@@ -5055,12 +6615,16 @@ static void gs4i_deform(gs4i_matrix X, gs4i_matrix F, gs4i_matrix now)
             for (j = 0; j < 3; j++) {
                 a[i][j] = GS4I_C(-0.5) * X[i][j][b];
                 if (i == j) a[i][j] += GS4I_C(1);
-                XF[i][j] = X[i][0][b] * F[0][j][b] + X[i][1][b] * F[1][j][b] + X[i][2][b] * F[2][j][b];
+                XF[i][j] =
+                    X[i][0][b] * F[0][j][b] + X[i][1][b] * F[1][j][b] + X[i][2][b] * F[2][j][b];
             }
         gs4i_cofactors(a, C, &inverse);
         inverse = GS4I_C(1) / inverse;
         for (i = 0; i < 3; i++)
-            for (j = 0; j < 3; j++) now[i][j][b] = F[i][j][b] + inverse * (C[0][i] * XF[0][j] + C[1][i] * XF[1][j] + C[2][i] * XF[2][j]);
+            for (j = 0; j < 3; j++)
+                now[i][j][b] =
+                    F[i][j][b]
+                    + inverse * (C[0][i] * XF[0][j] + C[1][i] * XF[1][j] + C[2][i] * XF[2][j]);
     }
 }
 
@@ -5084,25 +6648,33 @@ GS4I_INLINE void gs4i_left_cauchy_green(gs4i_wide F[3][3], gs4i_wide B[6])
 GS4I_INLINE void gs4i_is_positive(const gs4i_wide s[6], gs4i_wide_mask *positive)
 {
     const gs4i_wide minor = s[0] * s[1] - s[3] * s[3];
-    const gs4i_wide det = s[2] * minor - s[4] * (s[4] * s[1] - s[3] * s[5]) - s[5] * (s[0] * s[5] - s[3] * s[4]);
+    const gs4i_wide det =
+        s[2] * minor - s[4] * (s[4] * s[1] - s[3] * s[5]) - s[5] * (s[0] * s[5] - s[3] * s[4]);
     *positive = (s[0] > GS4I_C(0)) & (minor > GS4I_C(0)) & (det > GS4I_C(0));
 }
 
 /* S4: F at the stage, in its place, for n particles of the batch. */
-static void gs4i_stage_solid(const gs4i_solid_laws *l, gs4i_deformation *e, const gs4i_rule *rule, gs4i_gradient L, int n, gs4i_solid_count *count)
+static void gs4i_stage_solid(const gs4i_solid_laws *l, gs4i_deformation *e, const gs4i_rule *rule,
+                             gs4i_gradient L, int n, gs4i_solid_count *count)
 {
     gs4i_matrix Y, old;
     gs4i_lanes squared;
     int b, i, j;
     for (i = 0; i < 3; i++)
         for (j = 0; j < 3; j++)
-            GS4I_BATCH_LOOP(b) Y[i][j][b] = rule->reach.ahead * e->rate[i][j][b] + rule->s * (L[i][j][b] - e->rate[i][j][b]);
-    if (gs4i_is_small_step(Y, squared)) { gs4i_deform(Y, e->F, e->F); return; }
+            GS4I_BATCH_LOOP(b)
+                Y[i][j][b] = rule->reach.ahead * e->rate[i][j][b]
+                             + rule->s * (L[i][j][b] - e->rate[i][j][b]);
+    if (gs4i_is_small_step(Y, squared)) {
+        gs4i_deform(Y, e->F, e->F);
+        return;
+    }
     memcpy(old, e->F, sizeof old);
     gs4i_deform(Y, e->F, e->F);
     for (b = 0; b < n; b++) {
         double F[3][3];
-        if (GS4I_NTH(squared, b) < GS4I_SMALL_STEP || !(GS4I_NTH_CONST(l->modulus, b) > 0)) continue;
+        if (GS4I_NTH(squared, b) < GS4I_SMALL_STEP || !(GS4I_NTH_CONST(l->modulus, b) > 0))
+            continue;
         gs4i_matrix_of(old, b, F);
         if (!gs4i_exponential_step(Y, b, F)) count->failed = b + 1;
         count->split++;
@@ -5110,13 +6682,16 @@ static void gs4i_stage_solid(const gs4i_solid_laws *l, gs4i_deformation *e, cons
     }
 }
 
-/* F of particle n after a step X from `old`, to the volume ratio J, as plasticity and bounds let it be; `now` is what the fraction made of it. */
-static void gs4i_correct_one(const gs4i_law *law, gs4i_matrix X, double squared, gs4i_matrix old, gs4i_matrix now, double J, int n, gs4i_matrix F,
+/* F of particle n after a step X from `old`, to the volume ratio J, as plasticity and bounds let
+ * it be; `now` is what the fraction made of it. */
+static void gs4i_correct_one(const gs4i_law *law, gs4i_matrix X, double squared, gs4i_matrix old,
+                             gs4i_matrix now, double J, int n, gs4i_matrix F,
                              gs4i_solid_count *count)
 {
     double one[3][3], scale;
     int i;
-    if (squared < (double)GS4I_SMALL_STEP) gs4i_matrix_of(now, n, one);
+    if (squared < (double)GS4I_SMALL_STEP)
+        gs4i_matrix_of(now, n, one);
     else {
         gs4i_matrix_of(old, n, one);
         if (!gs4i_exponential_step(X, n, one)) count->failed = n + 1;
@@ -5124,13 +6699,16 @@ static void gs4i_correct_one(const gs4i_law *law, gs4i_matrix X, double squared,
     }
     scale = cbrt(J / gs4i_determinant(one));
     for (i = 0; i < 9; i++) one[i / 3][i % 3] *= scale;
-    if (gs4i_yield_one(one, (double)law->low, (double)law->high)) count->bounded += law->is.yield_compression <= 0 && law->is.yield_stretch <= 0;
+    if (gs4i_yield_one(one, (double)law->low, (double)law->high))
+        count->bounded += law->is.yield_compression <= 0 && law->is.yield_stretch <= 0;
     gs4i_set_matrix(F, n, one);
 }
 
-/* F as it is now, but det F = J; F = J^(1/3) I where there is no solid. Is each within its limits, which F F^T - low^2 and high^2 - F F^T tell, and not so
- * stretched that its determinant would need more digits than there are? */
-static int gs4i_fit_volume(const gs4i_solid_laws *l, gs4i_matrix now, const gs4i_wide *J, gs4i_matrix F, gs4i_lanes verdict)
+/* F as it is now, but det F = J; F = J^(1/3) I where there is no solid. Is each within its
+ * limits, which F F^T - low^2 and high^2 - F F^T tell, and not so stretched that its determinant
+ * would need more digits than there are? */
+static int gs4i_fit_volume(const gs4i_solid_laws *l, gs4i_matrix now, const gs4i_wide *J,
+                           gs4i_matrix F, gs4i_lanes verdict)
 {
     int b, c, i, j, all = 1;
     GS4I_BATCH_LOOP(b) {
@@ -5145,14 +6723,23 @@ static int gs4i_fit_volume(const gs4i_solid_laws *l, gs4i_matrix now, const gs4i
         gs4i_cube_root(&ratio, &scale);
         for (i = 0; i < 3; i++)
             for (j = 0; j < 3; j++) {
-                if (i == j) GS4I_CHOOSE(f[i][j], solid, f[i][j], one); else GS4I_CHOOSE(f[i][j], solid, f[i][j], zero);
-                f[i][j] *= scale; F[i][j][b] = f[i][j];
+                if (i == j)
+                    GS4I_CHOOSE(f[i][j], solid, f[i][j], one);
+                else
+                    GS4I_CHOOSE(f[i][j], solid, f[i][j], zero);
+                f[i][j] *= scale;
+                F[i][j][b] = f[i][j];
             }
         gs4i_left_cauchy_green(f, low);
         for (c = 0; c < 6; c++) high[c] = -low[c];
-        for (c = 0; c < 3; c++) { low[c] -= l->low[b] * l->low[b]; high[c] += l->high[b] * l->high[b]; }
-        gs4i_is_positive(low, &good); gs4i_is_positive(high, &below);
-        good = (good & below & (low[0] + low[1] + low[2] < GS4I_C(64))) | (l->modulus[b] <= GS4I_C(0));
+        for (c = 0; c < 3; c++) {
+            low[c] -= l->low[b] * l->low[b];
+            high[c] += l->high[b] * l->high[b];
+        }
+        gs4i_is_positive(low, &good);
+        gs4i_is_positive(high, &below);
+        good =
+            (good & below & (low[0] + low[1] + low[2] < GS4I_C(64))) | (l->modulus[b] <= GS4I_C(0));
         all &= gs4i_all(&good);
         GS4I_CHOOSE(verdict[b], good, one, zero);
     }
@@ -5165,12 +6752,13 @@ static void gs4i_let_flow(gs4i_gradient L, const gs4i_wide *J, gs4i_deformation 
     int b, i;
     memset(e, 0, sizeof *e);
     memcpy(e->rate, L, sizeof e->rate);
-    for (i = 0; i < 3; i++) GS4I_BATCH_LOOP(b) gs4i_cube_root(&J[b], &e->F[i][i][b]);
+    for (i = 0; i < 3; i++)
+        GS4I_BATCH_LOOP(b) gs4i_cube_root(&J[b], &e->F[i][i][b]);
 }
 
 /* S7: F and M for known grad u = L, to the volume ratio J; n particles of the batch. */
-static void gs4i_correct_solid(const gs4i_solid_laws *l, gs4i_deformation *e, const gs4i_rule *rule, gs4i_gradient L, const gs4i_wide *J, int n,
-                               gs4i_solid_count *count)
+static void gs4i_correct_solid(const gs4i_solid_laws *l, gs4i_deformation *e, const gs4i_rule *rule,
+                               gs4i_gradient L, const gs4i_wide *J, int n, gs4i_solid_count *count)
 {
     const gs4_real inv_alpha_m = 1 / rule->alpha_m;
     gs4i_matrix X, old, now;
@@ -5191,8 +6779,11 @@ static void gs4i_correct_solid(const gs4i_solid_laws *l, gs4i_deformation *e, co
     fits = gs4i_fit_volume(l, now, J, e->F, verdict);
     if (small && fits) return;
     for (b = 0; b < n; b++) {
-        if (!(GS4I_NTH_CONST(l->modulus, b) > 0) || (GS4I_NTH(squared, b) < GS4I_SMALL_STEP && GS4I_NTH(verdict, b) > 0)) continue;
-        gs4i_correct_one(l->of[b], X, (double)GS4I_NTH(squared, b), old, now, (double)GS4I_NTH_CONST(J, b), b, e->F, count);
+        if (!(GS4I_NTH_CONST(l->modulus, b) > 0)
+            || (GS4I_NTH(squared, b) < GS4I_SMALL_STEP && GS4I_NTH(verdict, b) > 0))
+            continue;
+        gs4i_correct_one(l->of[b], X, (double)GS4I_NTH(squared, b), old, now,
+                         (double)GS4I_NTH_CONST(J, b), b, e->F, count);
     }
 }
 
@@ -5201,15 +6792,20 @@ GS4I_INLINE void gs4i_largest_row(const gs4i_wide s[6], gs4i_wide *most)
 {
     gs4i_wide size[6];
     int c, i;
-    for (c = 0; c < 6; c++) { const gs4i_wide minus = -s[c]; GS4I_WIDE_MAX(size[c], s[c], minus); }
+    for (c = 0; c < 6; c++) {
+        const gs4i_wide minus = -s[c];
+        GS4I_WIDE_MAX(size[c], s[c], minus);
+    }
     *most = size[0] - size[0];
     for (i = 0; i < 3; i++) {
-        const gs4i_wide row = size[gs4i_place[i][0]] + size[gs4i_place[i][1]] + size[gs4i_place[i][2]];
+        const gs4i_wide row =
+            size[gs4i_place[i][0]] + size[gs4i_place[i][1]] + size[gs4i_place[i][2]];
         GS4I_WIDE_MAX(*most, row, *most);
     }
 }
 
-/* B - V of the unimodular F = V R, and the largest row sum of V: R by Newton's rule R <- (R + R^-T)/2. Has it converged for all? */
+/* B - V of the unimodular F = V R, and the largest row sum of V: R by Newton's rule R <- (R +
+ * R^-T)/2. Has it converged for all? */
 static int gs4i_corotated_strain(gs4i_matrix F, gs4i_symmetric strain, gs4i_lanes most)
 {
     gs4i_matrix R;
@@ -5226,32 +6822,38 @@ static int gs4i_corotated_strain(gs4i_matrix F, gs4i_symmetric strain, gs4i_lane
             for (i = 0; i < 3; i++)
                 for (j = 0; j < 3; j++) {
                     const gs4i_wide d = GS4I_C(0.5) * (C[i][j] * inverse - r[i][j]);
-                    R[i][j][b] += d; moved += d * d;
+                    R[i][j][b] += d;
+                    moved += d * d;
                 }
-            near_by = moved < GS4I_C(0.1) * GS4I_EPSILON;   /* squared; what is left is half of that */
+            /* squared; what is left is half of that */
+            near_by = moved < GS4I_C(0.1) * GS4I_EPSILON;
             done &= gs4i_all(&near_by);
         }
     }
     GS4I_BATCH_LOOP(b) {
         gs4i_wide f[3][3], r[3][3], B[6], V[6];
-        gs4i_matrix_wide(F, b, f); gs4i_matrix_wide(R, b, r);
+        gs4i_matrix_wide(F, b, f);
+        gs4i_matrix_wide(R, b, r);
         gs4i_left_cauchy_green(f, B);
         for (i = 0; i < 3; i++)
             for (j = i; j < 3; j++)
-                V[gs4i_place[i][j]] = GS4I_C(0.5) * ((f[i][0] * r[j][0] + f[i][1] * r[j][1] + f[i][2] * r[j][2])
-                                                   + (f[j][0] * r[i][0] + f[j][1] * r[i][1] + f[j][2] * r[i][2]));
+                V[gs4i_place[i][j]] =
+                    GS4I_C(0.5)
+                    * ((f[i][0] * r[j][0] + f[i][1] * r[j][1] + f[i][2] * r[j][2])
+                       + (f[j][0] * r[i][0] + f[j][1] * r[i][1] + f[j][2] * r[i][2]));
         for (i = 0; i < 6; i++) strain[i][b] = B[i] - V[i];
         gs4i_largest_row(V, &most[b]);
     }
     return done;
 }
 
-/* Adds the deviatoric stress of F where the volume ratio is J to sigma. `stiffness`: density rho0 times the squared speed of elastic waves,
- * at most; 0 for liquids. */
-static void gs4i_solid_stress(const gs4i_solid_laws *l, gs4i_matrix F, const gs4i_wide *J, gs4i_symmetric sigma, gs4i_lanes stiffness)
+/* Adds the deviatoric stress of F where the volume ratio is J to sigma. `stiffness`: density
+ * rho0 times the squared speed of elastic waves, at most; 0 for liquids. */
+static void gs4i_solid_stress(const gs4i_solid_laws *l, gs4i_matrix F, const gs4i_wide *J,
+                              gs4i_symmetric sigma, gs4i_lanes stiffness)
 {
     gs4i_matrix iso;
-    gs4i_symmetric strain;                                  /* B, or 2 (B - V) */
+    gs4i_symmetric strain; /* B, or 2 (B - V) */
     gs4i_lanes most, verdict;
     int b, c, i, j, fine = 1;
     memset(most, 0, sizeof most);
@@ -5259,7 +6861,8 @@ static void gs4i_solid_stress(const gs4i_solid_laws *l, gs4i_matrix F, const gs4
         gs4i_wide root;
         gs4i_cube_root(&J[b], &root);
         root = GS4I_C(1) / root;
-        for (i = 0; i < 3; i++) for (j = 0; j < 3; j++) iso[i][j][b] = root * F[i][j][b];
+        for (i = 0; i < 3; i++)
+            for (j = 0; j < 3; j++) iso[i][j][b] = root * F[i][j][b];
     }
     if (l->any_corotated) fine = gs4i_corotated_strain(iso, strain, most);
     GS4I_BATCH_LOOP(b) {
@@ -5274,44 +6877,65 @@ static void gs4i_solid_stress(const gs4i_solid_laws *l, gs4i_matrix F, const gs4
         if (l->any_corotated) {
             row = most[b] * (most[b] + most[b] - GS4I_C(1));
             GS4I_CHOOSE(wave, corotated, row, wave);
-            for (c = 0; c < 6; c++) { row = strain[c][b] + strain[c][b]; GS4I_CHOOSE(B[c], corotated, row, B[c]); }
+            for (c = 0; c < 6; c++) {
+                row = strain[c][b] + strain[c][b];
+                GS4I_CHOOSE(B[c], corotated, row, B[c]);
+            }
         }
         mean = (B[0] + B[1] + B[2]) * GS4I_C(1.0 / 3);
-        for (c = 0; c < 3; c++) { strain[c][b] = scale * (B[c] - mean); strain[c + 3][b] = scale * B[c + 3]; }
+        for (c = 0; c < 3; c++) {
+            strain[c][b] = scale * (B[c] - mean);
+            strain[c + 3][b] = scale * B[c + 3];
+        }
         stiffness[b] = GS4I_SOLID_WAVES * l->modulus[b] * wave;
         GS4I_CHOOSE(verdict[b], usual, one, zero);
         fine &= gs4i_all(&usual);
     }
-    for (i = 0; i < GS4I_BATCH && !fine; i++) {             /* crushed, drawn out, or not converged: by singular values */
+    /* crushed, drawn out, or not converged: by singular values */
+    for (i = 0; i < GS4I_BATCH && !fine; i++) {
         double one[3][3], s[6] = { 0, 0, 0, 0, 0, 0 }, stiff;
-        if (!(GS4I_NTH_CONST(l->modulus, i) > 0) || (GS4I_NTH(verdict, i) > 0 && !(GS4I_NTH_CONST(l->corotated, i) > 0))) continue;
+        if (!(GS4I_NTH_CONST(l->modulus, i) > 0)
+            || (GS4I_NTH(verdict, i) > 0 && !(GS4I_NTH_CONST(l->corotated, i) > 0)))
+            continue;
         gs4i_matrix_of(F, i, one);
         gs4i_solid_stress_one(l->of[i], one, (double)GS4I_NTH_CONST(J, i), s, &stiff);
         for (c = 0; c < 6; c++) GS4I_NTH(strain[c], i) = GS4I_C(s[c]);
         GS4I_NTH(stiffness, i) = GS4I_C(stiff);
     }
-    for (c = 0; c < 6; c++) GS4I_BATCH_LOOP(b) sigma[c][b] += strain[c][b];
+    for (c = 0; c < 6; c++)
+        GS4I_BATCH_LOOP(b) sigma[c][b] += strain[c][b];
 }
 
-/* Gradients of what the grid says to particles beside its velocity: acceleration, and what contact took at once. */
-typedef struct gs4i_kicks { gs4i_gradient acc, jump; } gs4i_kicks;
+/* Gradients of what the grid says to particles beside its velocity: acceleration, and what
+ * contact took at once. */
+typedef struct gs4i_kicks {
+    gs4i_gradient acc, jump;
+} gs4i_kicks;
 
-/* S7: w by rule 1. dw/dt is half the curl of acc - L L, which is what the velocity gradient of a particle does; what the grid cannot see of w
- * fades at the rate that of v does, implicit in itself; and contact turns at once. */
-static void gs4i_correct_turning(const gs4i_solid_laws *l, gs4i_deformation *e, const gs4i_rule *rule, gs4i_gradient L, gs4i_kicks *kicks)
+/* S7: w by rule 1. dw/dt is half the curl of acc - L L, which is what the velocity gradient of a
+ * particle does; what the grid cannot see of w fades at the rate that of v does, implicit in
+ * itself; and contact turns at once. */
+static void gs4i_correct_turning(const gs4i_solid_laws *l, gs4i_deformation *e,
+                                 const gs4i_rule *rule, gs4i_gradient L, gs4i_kicks *kicks)
 {
     const gs4_real decay = rule->decay, inv_alpha_m = 1 / rule->alpha_m;
     int b, i;
     for (i = 0; i < 3; i++) {
         const int j = (i + 1) % 3, k = (i + 2) % 3;
         GS4I_BATCH_LOOP(b) {
-            const gs4i_wide w = e->turning[i][b], r = e->turning_rate[i][b], zero = w - w, seen = GS4I_C(0.5) * (L[k][j][b] - L[j][k][b]);
-            const gs4i_wide LL = (L[k][0][b] * L[0][j][b] + L[k][1][b] * L[1][j][b] + L[k][2][b] * L[2][j][b])
-                               - (L[j][0][b] * L[0][k][b] + L[j][1][b] * L[1][k][b] + L[j][2][b] * L[2][k][b]);
-            const gs4i_wide rate = GS4I_C(0.5) * (kicks->acc[k][j][b] - kicks->acc[j][k][b] - LL), at_once = GS4I_C(0.5) * (kicks->jump[k][j][b] - kicks->jump[j][k][b]);
-            const gs4i_wide stage = (rate + decay * (seen - (w + rule->before * r))) * rule->damped, change = (stage - r) * inv_alpha_m;
-            const gs4i_wide all = ((w + rule->dt * r) + rule->gamma * rule->dt * change) + at_once, next_rate = r + change;
-            const gs4i_wide next = all - rule->fading * (w + rule->before * r + rule->s * stage - seen);
+            const gs4i_wide w = e->turning[i][b], r = e->turning_rate[i][b], zero = w - w,
+                            seen = GS4I_C(0.5) * (L[k][j][b] - L[j][k][b]);
+            const gs4i_wide LL =
+                (L[k][0][b] * L[0][j][b] + L[k][1][b] * L[1][j][b] + L[k][2][b] * L[2][j][b])
+                - (L[j][0][b] * L[0][k][b] + L[j][1][b] * L[1][k][b] + L[j][2][b] * L[2][k][b]);
+            const gs4i_wide rate = GS4I_C(0.5) * (kicks->acc[k][j][b] - kicks->acc[j][k][b] - LL),
+                            at_once = GS4I_C(0.5) * (kicks->jump[k][j][b] - kicks->jump[j][k][b]);
+            const gs4i_wide stage = (rate + decay * (seen - (w + rule->before * r))) * rule->damped,
+                            change = (stage - r) * inv_alpha_m;
+            const gs4i_wide all = ((w + rule->dt * r) + rule->gamma * rule->dt * change) + at_once,
+                            next_rate = r + change;
+            const gs4i_wide next =
+                all - rule->fading * (w + rule->before * r + rule->s * stage - seen);
             const gs4i_wide_mask solid = l->modulus[b] > GS4I_C(0);
             GS4I_CHOOSE(e->turning[i][b], solid, next, zero);
             GS4I_CHOOSE(e->turning_rate[i][b], solid, next_rate, zero);
@@ -5322,16 +6946,22 @@ static void gs4i_correct_turning(const gs4i_solid_laws *l, gs4i_deformation *e, 
 /* F, M, w and dw/dt of n particles from memory, F alone where there are no rates; and back. */
 static void gs4i_load_deformation(const gs4_real *from, int reals, int n, gs4i_deformation *e)
 {
-    gs4i_lanes *l = (gs4i_lanes *)(void *)e;                /* 24 in the order of its fields */
-    if (reals == 24) gs4i_numbers_to_lanes(from, 24, n, l);
-    else { gs4i_numbers_to_lanes(from, 9, n, l); memset(l + 9, 0, 15 * sizeof *l); }
+    gs4i_lanes *l = (gs4i_lanes *)(void *)e; /* 24 in the order of its fields */
+    if (reals == 24)
+        gs4i_numbers_to_lanes(from, 24, n, l);
+    else {
+        gs4i_numbers_to_lanes(from, 9, n, l);
+        memset(l + 9, 0, 15 * sizeof *l);
+    }
 }
 
 static void gs4i_store_deformation(gs4_real *to, int reals, int n, gs4i_deformation *e)
 {
     gs4i_lanes *l = (gs4i_lanes *)(void *)e;
-    if (reals == 24) gs4i_lanes_to_numbers(l, 24, n, to);
-    else gs4i_lanes_to_numbers(l, 9, n, to);
+    if (reals == 24)
+        gs4i_lanes_to_numbers(l, 24, n, to);
+    else
+        gs4i_lanes_to_numbers(l, 9, n, to);
 }
 
 /* No strain but that of the volume: F = J^(1/3) I; M = 0, and no turning. */
@@ -5346,41 +6976,53 @@ static void gs4i_set_turning(const gs4i_particles *p, size_t i, gs4_vec3 w)
 {
     gs4_real *turning = p->deformation + (size_t)p->deformation_reals * i + 18;
     if (!p->with_rates) return;
-    turning[0] = w.x; turning[1] = w.y; turning[2] = w.z;
+    turning[0] = w.x;
+    turning[1] = w.y;
+    turning[2] = w.z;
     turning[3] = turning[4] = turning[5] = 0;
 }
 
-/* ==== [[heat]] temperature, melting and heat flux of particles ====================================== *
+/* ==== [[heat]] temperature, melting and heat flux of particles ================================= *
  *
- *     rho c dT/dt + div q = tau : D + sources,   q = -F_T k grad T + q_NL,   q_NL + t (dq_NL/dt - L q_NL) = -(1 - F_T) k grad T
+ *     rho c dT/dt + div q = tau : D + sources,   q = -F_T k grad T + q_NL,
+ *     q_NL + t (dq_NL/dt - L q_NL) = -(1 - F_T) k grad T
  *
- * What a particle holds is enthalpy, H/c = T + (L/c) fraction: as heat comes in T rises to T_m, stays there while the liquid
- * fraction of a material with latent heat goes from 0 to 1, and rises again; back the same way. The phase follows with
- * hysteresis: liquid once the fraction has reached 1, solid once it is 0 again. With L = 0 both switch at T_m.
- * Temperature and flux evolve by rule 1 of the manual. With k_eff = k (F_T t + s) / (t + s) the stage on the nodes is
+ * What a particle holds is enthalpy, H/c = T + (L/c) fraction: as heat comes in T rises to T_m,
+ * stays there while the liquid fraction of a material with latent heat goes from 0 to 1, and
+ * rises again; back the same way. The phase follows with hysteresis: liquid once the fraction
+ * has reached 1, solid once it is 0 again. With L = 0 both switch at T_m. Temperature and flux
+ * evolve by rule 1 of the manual. With k_eff = k (F_T t + s) / (t + s) the stage on the nodes is
  *
- *     (m c)_i (T~_i - T**_i) / s = sum_p [w_ip V tau:D + grad w_ip . V q** t / (t + s)] + (div k_eff grad T~)_i     ([[conduction]])
+ *     (m c)_i (T~_i - T**_i) / s = sum_p [w_ip V tau:D + grad w_ip . V q** t / (t + s)]
+ *                                + (div k_eff grad T~)_i     ([[conduction]])
  *
- * and a particle takes the rate r = sum_i w_ip (R - h^2/4 div grad R)_i, R = (T~ - T**) / s. To nodes and back again a field is smoothed,
- * f + h^2/4 div grad f, and R is made sharper by as much: else modes would decay too slowly, and the stage, T~ = sum w (T + alpha_f dt r) + s (R - r),
- * would have an error of first order in dt. The sharpening moves heat between nodes: what nodes gain particles gain, heat is conserved. */
+ * and a particle takes the rate r = sum_i w_ip (R - h^2/4 div grad R)_i, R = (T~ - T**) / s. To
+ * nodes and back again a field is smoothed, f + h^2/4 div grad f, and R is made sharper by as
+ * much: else modes would decay too slowly, and the stage, T~ = sum w (T + alpha_f dt r) + s (R -
+ * r), would have an error of first order in dt. The sharpening moves heat between nodes: what
+ * nodes gain particles gain, heat is conserved. */
 
-/* What the grid cannot see of the temperature of particles fades at the rate GS4I_MIXING k / (rho c h^2), as conduction over less than a cell has it
- * (with a relaxation time t, the non-local part at most at 1/t), and not in less than flip_decay_time. It is taken from T** itself, T**_p less the
- * gathered T** sharpened, in a form that conserves heat; not sharpened it would cool what the grid does see. */
+/* What the grid cannot see of the temperature of particles fades at the rate GS4I_MIXING k /
+ * (rho c h^2), as conduction over less than a cell has it (with a relaxation time t, the
+ * non-local part at most at 1/t), and not in less than flip_decay_time. It is taken from T**
+ * itself, T**_p less the gathered T** sharpened, in a form that conserves heat; not sharpened it
+ * would cool what the grid does see. */
 #define GS4I_MIXING GS4I_C(4.0)
 
-#define GS4I_INSULATES GS4I_C(1e-15)    /* W/(m K), of what has no conductivity, so that resistances can be added */
+/* W/(m K), of what has no conductivity, so that resistances can be added */
+#define GS4I_INSULATES GS4I_C(1e-15)
 
 typedef struct gs4i_heat_laws {
     gs4i_lanes capacity, conductivity, flux_time, fourier, melting, heating /* 1: by viscosity */;
     const gs4i_law *of[GS4I_BATCH];
-    int melts;                          /* some of those seen so far do */
+    int melts; /* some of those seen so far do */
 } gs4i_heat_laws;
 
-/* Of one batch: temperature (K), fraction, rate of H/c (K/s), what is owed (K): what warms by less than its last digit in a step warms still; non-local
- * flux (W/m^2) and its rate. */
-typedef struct gs4i_heat { gs4i_lanes T, fraction, rate, owed, q[4], q_rate[4]; } gs4i_heat;
+/* Of one batch: temperature (K), fraction, rate of H/c (K/s), what is owed (K): what warms by
+ * less than its last digit in a step warms still; non-local flux (W/m^2) and its rate. */
+typedef struct gs4i_heat {
+    gs4i_lanes T, fraction, rate, owed, q[4], q_rate[4];
+} gs4i_heat;
 
 static void gs4i_take_heat_laws(const gs4i_batch_laws *laws, gs4i_heat_laws *l)
 {
@@ -5388,9 +7030,13 @@ static void gs4i_take_heat_laws(const gs4i_batch_laws *laws, gs4i_heat_laws *l)
     for (n = 0; n < GS4I_BATCH; n++) {
         const gs4i_law *law = laws->of[n];
         if (law == l->of[n]) continue;
-        l->of[n] = law; l->melts |= law->is.can_melt;
-        GS4I_NTH(l->capacity, n) = law->capacity; GS4I_NTH(l->conductivity, n) = law->conductivity;
-        GS4I_NTH(l->flux_time, n) = law->flux_time; GS4I_NTH(l->fourier, n) = law->fourier; GS4I_NTH(l->melting, n) = law->melting;
+        l->of[n] = law;
+        l->melts |= law->is.can_melt;
+        GS4I_NTH(l->capacity, n) = law->capacity;
+        GS4I_NTH(l->conductivity, n) = law->conductivity;
+        GS4I_NTH(l->flux_time, n) = law->flux_time;
+        GS4I_NTH(l->fourier, n) = law->fourier;
+        GS4I_NTH(l->melting, n) = law->melting;
         GS4I_NTH(l->heating, n) = law->is.viscous_heating ? GS4I_C(1) : GS4I_C(0);
     }
 }
@@ -5399,8 +7045,10 @@ GS4I_INLINE void gs4i_load_heat(const gs4i_particles *p, size_t i, int n, gs4i_h
 {
     gs4i_lanes own[4];
     gs4i_to_lanes(p->heat + 4 * i, n, own);
-    memcpy(h->T, own[0], sizeof h->T); memcpy(h->fraction, own[1], sizeof h->fraction);
-    memcpy(h->rate, own[2], sizeof h->rate); memcpy(h->owed, own[3], sizeof h->owed);
+    memcpy(h->T, own[0], sizeof h->T);
+    memcpy(h->fraction, own[1], sizeof h->fraction);
+    memcpy(h->rate, own[2], sizeof h->rate);
+    memcpy(h->owed, own[3], sizeof h->owed);
     if (!p->with_flux) return;
     gs4i_to_lanes(p->flux + 4 * i, n, h->q);
     gs4i_to_lanes(p->flux_rate + 4 * i, n, h->q_rate);
@@ -5423,31 +7071,41 @@ GS4I_INLINE void gs4i_warm_one(const gs4i_law *law, gs4_real rise, gs4_real *T, 
 {
     const gs4_real at = law->melting, warm = *T + rise;
     gs4_real above;
-    if ((*fraction <= 0 && warm <= at) || (*fraction >= 1 && warm >= at)) { *T = warm; return; }
+    if ((*fraction <= 0 && warm <= at) || (*fraction >= 1 && warm >= at)) {
+        *T = warm;
+        return;
+    }
     above = (*T - at) + *fraction * law->latent + rise;
     *fraction = above <= 0 ? GS4I_C(0) : above >= law->latent ? GS4I_C(1) : above / law->latent;
     *T = above <= 0 ? at + above : above >= law->latent ? at + (above - law->latent) : at;
 }
 
 /* The same for a batch. */
-GS4I_INLINE void gs4i_warm(const gs4i_heat_laws *l, gs4i_lanes rise, gs4i_lanes T, gs4i_lanes fraction)
+GS4I_INLINE void gs4i_warm(const gs4i_heat_laws *l, gs4i_lanes rise, gs4i_lanes T,
+                           gs4i_lanes fraction)
 {
     int b, plain = 1;
     GS4I_BATCH_LOOP(b) {
         const gs4i_wide warm = T[b] + rise[b];
-        const gs4i_wide_mask stays = ((fraction[b] <= GS4I_C(0)) & (warm <= l->melting[b])) | ((fraction[b] >= GS4I_C(1)) & (warm >= l->melting[b]));
+        const gs4i_wide_mask stays = ((fraction[b] <= GS4I_C(0)) & (warm <= l->melting[b]))
+                                     | ((fraction[b] >= GS4I_C(1)) & (warm >= l->melting[b]));
         plain &= gs4i_all(&stays);
     }
-    if (plain) { GS4I_BATCH_LOOP(b) T[b] += rise[b]; return; }
+    if (plain) {
+        GS4I_BATCH_LOOP(b) T[b] += rise[b];
+        return;
+    }
     for (b = 0; b < GS4I_BATCH; b++) {
         gs4_real own = GS4I_NTH(T, b), part = GS4I_NTH(fraction, b);
         gs4i_warm_one(l->of[b], GS4I_NTH(rise, b), &own, &part);
-        GS4I_NTH(T, b) = own; GS4I_NTH(fraction, b) = part;
+        GS4I_NTH(T, b) = own;
+        GS4I_NTH(fraction, b) = part;
     }
 }
 
 /* The temperature of H + ahead dH/dt. */
-static void gs4i_temperature_ahead(const gs4i_heat_laws *l, const gs4i_heat *h, gs4_real ahead, gs4i_lanes T)
+static void gs4i_temperature_ahead(const gs4i_heat_laws *l, const gs4i_heat *h, gs4_real ahead,
+                                   gs4i_lanes T)
 {
     gs4i_lanes rise, fraction;
     int b;
@@ -5461,27 +7119,38 @@ static void gs4i_temperature_ahead(const gs4i_heat_laws *l, const gs4i_heat *h, 
 GS4I_INLINE void gs4i_conducts(const gs4i_heat_laws *l, const gs4i_rule *rule, gs4i_lanes k)
 {
     int b;
-    GS4I_BATCH_LOOP(b) k[b] = l->conductivity[b] * ((l->fourier[b] * l->flux_time[b] + rule->s) / (l->flux_time[b] + rule->s));
+    GS4I_BATCH_LOOP(b)
+        k[b] = l->conductivity[b]
+               * ((l->fourier[b] * l->flux_time[b] + rule->s) / (l->flux_time[b] + rule->s));
 }
 
 /* q** + s L q~, with q~ predicted: what the non-local flux brings to the stage. */
-static void gs4i_flux_before(const gs4i_heat *h, const gs4i_rule *rule, gs4i_gradient L, gs4i_lanes q[3])
+static void gs4i_flux_before(const gs4i_heat *h, const gs4i_rule *rule, gs4i_gradient L,
+                             gs4i_lanes q[3])
 {
     const gs4_real ahead = rule->reach.ahead, before = rule->before, s = rule->s;
     gs4i_lanes at[3];
     int b, c;
-    for (c = 0; c < 3; c++) GS4I_BATCH_LOOP(b) at[c][b] = h->q[c][b] + ahead * h->q_rate[c][b];
     for (c = 0; c < 3; c++)
-        GS4I_BATCH_LOOP(b) q[c][b] = (h->q[c][b] + before * h->q_rate[c][b]) + s * (L[c][0][b] * at[0][b] + L[c][1][b] * at[1][b] + L[c][2][b] * at[2][b]);
+        GS4I_BATCH_LOOP(b) at[c][b] = h->q[c][b] + ahead * h->q_rate[c][b];
+    for (c = 0; c < 3; c++)
+        GS4I_BATCH_LOOP(b)
+            q[c][b] = (h->q[c][b] + before * h->q_rate[c][b])
+                      + s * (L[c][0][b] * at[0][b] + L[c][1][b] * at[1][b] + L[c][2][b] * at[2][b]);
 }
 
-/* Heat of a batch on its way to the nodes: (m c, m c T**, V / k_eff, V), and as forces: grad w . V q** t / (t + s), with a flux only, + w P,
- * and w times the heat that mixes, W/K, see [[conduction]]. */
-typedef struct gs4i_heat_sent { gs4_real content[4 * GS4I_BATCH]; gs4i_forces source; } gs4i_heat_sent;
+/* Heat of a batch on its way to the nodes: (m c, m c T**, V / k_eff, V), and as forces: grad w .
+ * V q** t / (t + s), with a flux only, + w P, and w times the heat that mixes, W/K, see
+ * [[conduction]]. */
+typedef struct gs4i_heat_sent {
+    gs4_real content[4 * GS4I_BATCH];
+    gs4i_forces source;
+} gs4i_heat_sent;
 
 /* `power` in W; volumes in m^3. */
-static void gs4i_send_heat(const gs4i_heat_laws *l, const gs4i_heat *h, const gs4i_rule *rule, gs4i_gradient L, const gs4i_wide *mass,
-                           gs4i_lanes volume, gs4i_lanes power, int with_flux, gs4i_heat_sent *to)
+static void gs4i_send_heat(const gs4i_heat_laws *l, const gs4i_heat *h, const gs4i_rule *rule,
+                           gs4i_gradient L, const gs4i_wide *mass, gs4i_lanes volume,
+                           gs4i_lanes power, int with_flux, gs4i_heat_sent *to)
 {
     gs4i_lanes T, capacity, content, resists, mixes, q[3], none;
     const gs4i_wide least = (mass[0] - mass[0]) + GS4I_INSULATES;
@@ -5492,7 +7161,9 @@ static void gs4i_send_heat(const gs4i_heat_laws *l, const gs4i_heat *h, const gs
         capacity[b] = mass[b] * l->capacity[b];
         content[b] = capacity[b] * T[b];
         mixes[b] = GS4I_MIXING * rule->inv_area * l->conductivity[b] * volume[b] / capacity[b];
-        mixes[b] = capacity[b] * mixes[b] * (l->fourier[b] + (GS4I_C(1) - l->fourier[b]) / (GS4I_C(1) + mixes[b] * l->flux_time[b]));
+        mixes[b] = capacity[b] * mixes[b]
+                   * (l->fourier[b]
+                      + (GS4I_C(1) - l->fourier[b]) / (GS4I_C(1) + mixes[b] * l->flux_time[b]));
         GS4I_WIDE_MAX(resists[b], resists[b], least);
         resists[b] = volume[b] / resists[b];
     }
@@ -5501,30 +7172,37 @@ static void gs4i_send_heat(const gs4i_heat_laws *l, const gs4i_heat *h, const gs
     gs4i_from_lanes(power, mixes, none, none, to->source.weight);
     if (!with_flux) return;
     gs4i_flux_before(h, rule, L, q);
-    for (c = 0; c < 3; c++) GS4I_BATCH_LOOP(b) q[c][b] *= volume[b] * (l->flux_time[b] / (l->flux_time[b] + rule->s));
+    for (c = 0; c < 3; c++)
+        GS4I_BATCH_LOOP(b) q[c][b] *= volume[b] * (l->flux_time[b] / (l->flux_time[b] + rule->s));
     gs4i_from_lanes(q[0], none, none, none, to->source.x);
     gs4i_from_lanes(q[1], none, none, none, to->source.y);
     gs4i_from_lanes(q[2], none, none, none, to->source.z);
 }
 
-/* S7: `from` is the sharpened T~ - T**, the rate of mixing, and times the temperature to mix to; `slope` the gradient of T~, and the resistance
- * of the nodes, read with a flux only. Where a worse conductor is near, the non-local flux is that of nodes in series, as between them: more
+/* S7: `from` is the sharpened T~ - T**, the rate of mixing, and times the temperature to mix to;
+ * `slope` the gradient of T~, and the resistance of the nodes, read with a flux only. Where a
+ * worse conductor is near, the non-local flux is that of nodes in series, as between them: more
  * of it than nodes conduct would drive a front that nothing holds. */
-static void gs4i_receive_heat(const gs4i_heat_laws *l, const gs4i_rule *rule, gs4i_lanes from[4], gs4i_lanes slope[4], gs4i_gradient L, int with_flux, gs4i_heat *h)
+static void gs4i_receive_heat(const gs4i_heat_laws *l, const gs4i_rule *rule, gs4i_lanes from[4],
+                              gs4i_lanes slope[4], gs4i_gradient L, int with_flux, gs4i_heat *h)
 {
     gs4i_lanes gain, T, fraction, q[3], drives;
     int b, c;
     gs4i_temperature_ahead(l, h, rule->before, T);
     GS4I_BATCH_LOOP(b) {
-        const gs4i_wide change = ((from[0][b] * (1 / rule->s) - (from[1][b] * T[b] - from[2][b])) - h->rate[b]) * rule->inv_alpha_m;
+        const gs4i_wide change =
+            ((from[0][b] * (1 / rule->s) - (from[1][b] * T[b] - from[2][b])) - h->rate[b])
+            * rule->inv_alpha_m;
         gain[b] = (rule->dt * h->rate[b] + rule->gamma * rule->dt * change) + h->owed[b];
         h->rate[b] += change;
     }
-    memcpy(T, h->T, sizeof T); memcpy(fraction, h->fraction, sizeof fraction);
+    memcpy(T, h->T, sizeof T);
+    memcpy(fraction, h->fraction, sizeof fraction);
     gs4i_warm(l, gain, h->T, h->fraction);
     GS4I_BATCH_LOOP(b) {
         const gs4i_wide zero = gain[b] - gain[b], owed = gain[b] - (h->T[b] - T[b]);
-        const gs4i_wide_mask same = (h->fraction[b] <= fraction[b]) & (h->fraction[b] >= fraction[b]);
+        const gs4i_wide_mask same =
+            (h->fraction[b] <= fraction[b]) & (h->fraction[b] >= fraction[b]);
         GS4I_CHOOSE(h->owed[b], same, owed, zero);
     }
     if (!with_flux) return;
@@ -5540,22 +7218,27 @@ static void gs4i_receive_heat(const gs4i_heat_laws *l, const gs4i_rule *rule, gs
         GS4I_BATCH_LOOP(b) {
             const gs4i_wide before = h->q[c][b] + rule->before * h->q_rate[c][b];
             const gs4i_wide stage = (l->flux_time[b] * q[c][b] - rule->s * drives[b] * slope[c][b])
-                                  / (l->flux_time[b] + rule->s);
-            const gs4i_wide change = ((stage - before) * (1 / rule->s) - h->q_rate[c][b]) * rule->inv_alpha_m;
+                                    / (l->flux_time[b] + rule->s);
+            const gs4i_wide change =
+                ((stage - before) * (1 / rule->s) - h->q_rate[c][b]) * rule->inv_alpha_m;
             h->q[c][b] += rule->dt * h->q_rate[c][b] + rule->gamma * rule->dt * change;
             h->q_rate[c][b] += change;
         }
 }
 
-/* What was solid forgets its strain as F of a liquid is set; what was liquid, its non-local stress: so that freezing and melting release nothing. */
+/* What was solid forgets its strain as F of a liquid is set; what was liquid, its non-local
+ * stress: so that freezing and melting release nothing. */
 static void gs4i_set_phase(const gs4i_particles *p, size_t i, int liquid)
 {
     if (p->liquid[i] == liquid) return;
     p->liquid[i] = (uint8_t)liquid;
-    if (!liquid && p->elastic_reals) memset(p->elastic + (size_t)p->elastic_reals * i, 0, (size_t)p->elastic_reals * sizeof *p->elastic);
+    if (!liquid && p->elastic_reals)
+        memset(p->elastic + (size_t)p->elastic_reals * i, 0,
+               (size_t)p->elastic_reals * sizeof *p->elastic);
 }
 
-/* Fraction and phase that belong to the temperature of particle i; at T_m itself those that are there stay. */
+/* Fraction and phase that belong to the temperature of particle i; at T_m itself those that are
+ * there stay. */
 static void gs4i_settle_phase(const gs4i_particles *p, size_t i, const gs4i_law *law)
 {
     gs4_real *heat = p->heat + 4 * i;
@@ -5568,69 +7251,99 @@ static void gs4i_settle_phase(const gs4i_particles *p, size_t i, const gs4i_law 
 static void gs4i_begin_heat(const gs4i_particles *p, size_t i, const gs4i_law *law, gs4_real T)
 {
     gs4_real *heat = p->heat + 4 * i;
-    heat[0] = T; heat[2] = heat[3] = 0;
+    heat[0] = T;
+    heat[2] = heat[3] = 0;
     p->liquid[i] = !law->is.can_melt && law->is.solid == GS4_NO_SOLID;
     heat[1] = GS4I_C(p->liquid[i]);
     gs4i_settle_phase(p, i, law);
-    if (p->with_flux) { memset(p->flux + 4 * i, 0, 4 * sizeof *p->flux); memset(p->flux_rate + 4 * i, 0, 4 * sizeof *p->flux_rate); }
+    if (p->with_flux) {
+        memset(p->flux + 4 * i, 0, 4 * sizeof *p->flux);
+        memset(p->flux_rate + 4 * i, 0, 4 * sizeof *p->flux_rate);
+    }
 }
 
-/* ==== [[boundary]] walls by images, bodies by nodes, what contact does to velocities =============== *
+/* ==== [[boundary]] walls by images, bodies by nodes, what contact does to velocities =========== *
  *
- * Walls lie on cell faces, so the node pairs  ... -2 -1 | 0 1 ...  mirror each other:  image -1-k <-> k. Mass and momentum
- * that reach an image are folded back onto its mirror node, forces too, with the sign S of the reflection (stick: -1 in
- * all components; slip: -1 in the normal one; periodic: the node a period away, S = 1); afterwards images hold S times
- * the field of their mirror node. Slippery bodies hold the nodes inside of them; sticky ones act by images of particles, see gs4i_place_ghost.
+ * Walls lie on cell faces, so the node pairs  ... -2 -1 | 0 1 ...  mirror each other:  image
+ * -1-k <-> k. Mass and momentum that reach an image are folded back onto its mirror node, forces
+ * too, with the sign S of the reflection (stick: -1 in all components; slip: -1 in the normal
+ * one; periodic: the node a period away, S = 1); afterwards images hold S times the field of
+ * their mirror node. Slippery bodies hold the nodes inside of them; sticky ones act by images of
+ * particles, see gs4i_place_ghost.
  *
- * What contact takes from the velocity of a node at once is no acceleration: it is kept as a jump, which goes to the
- * velocity of the particles directly and never into their rates (METHOD: "contact stays out of the rates"). */
+ * What contact takes from the velocity of a node at once is no acceleration: it is kept as a
+ * jump, which goes to the velocity of the particles directly and never into their rates (METHOD:
+ * "contact stays out of the rates"). */
 
-typedef struct gs4i_image { uint32_t image, mirror; } gs4i_image;      /* node numbers: 64 slot + place in the block */
+/* node numbers: 64 slot + place in the block */
+typedef struct gs4i_image {
+    uint32_t image, mirror;
+} gs4i_image;
 
 /* A body or a mouth: a shape with a pose. World point p is shape point R^T (p - at) + pivot. */
-typedef struct gs4i_field {             /* sampled distance of a mesh: trilinear in n[0] x n[1] x n[2] samples */
-    int n[3]; double low[3], spacing, band;
-    gs4_real *distance; size_t count;
+/* sampled distance of a mesh: trilinear in n[0] x n[1] x n[2] samples */
+typedef struct gs4i_field {
+    int n[3];
+    double low[3], spacing, band;
+    gs4_real *distance;
+    size_t count;
 } gs4i_field;
 
 typedef struct gs4i_body {
-    gs4_collider is;                    /* as described */
-    double at[3], turn[4];              /* where the pivot is now; orientation, unit quaternion w x y z */
-    gs4_real axes[9];                   /* R, row-major */
-    gs4i_field field;                   /* for a mesh */
-    int is_mouth, asleep;               /* of an emitter: holds what is inside at the velocity `flow`; not in use now */
+    gs4_collider is; /* as described */
+    /* where the pivot is now; orientation, unit quaternion w x y z */
+    double at[3], turn[4];
+    gs4_real axes[9]; /* R, row-major */
+    gs4i_field field; /* for a mesh */
+    /* of an emitter: holds what is inside at the velocity `flow`; not in use now */
+    int is_mouth, asleep;
     gs4_vec3 flow;
 } gs4i_body;
 
 /* A particle before a sticky body, and its image behind the surface: see gs4i_place_ghost. */
 typedef struct gs4i_ghost {
-    gs4_real x[4], n[3], v[3], spin[3]; /* place and mass; normal of the surface; the body's velocity at its foot and angular velocity */
-    gs4_real share;                     /* of the odd part of what the particle sees: 1 within half a cell of the surface, 0 from one and a half */
-    gs4_real carried[4][4];             /* to the nodes: momentum at x (Euler: and columns of its affine part); columns of force, and weight */
-    gs4_real seen[2][4][4];             /* from them: velocity and acceleration, value and columns of the gradient */
-    int kind, whole, slot;              /* GS4I_GHOST_*; all its nodes exist; block of x */
+    /* place and mass; normal of the surface; the body's velocity at its foot and angular
+     * velocity */
+    gs4_real x[4], n[3], v[3], spin[3];
+    /* of the odd part of what the particle sees: 1 within half a cell of the surface, 0 from one
+     * and a half */
+    gs4_real share;
+    /* to the nodes: momentum at x (Euler: and columns of its affine part); columns of force, and
+     * weight */
+    gs4_real carried[4][4];
+    /* from them: velocity and acceleration, value and columns of the gradient */
+    gs4_real seen[2][4][4];
+    int kind, whole, slot; /* GS4I_GHOST_*; all its nodes exist; block of x */
 } gs4i_ghost;
 
 typedef struct gs4i_ghosts {
-    int count;                          /* one for each particle of the blocks near sticky bodies; 0: there are none */
-    gs4i_scratch all, of;               /* gs4i_ghost; per occupied block: its first one, or -1 (int32_t) */
-    gs4i_scratch order, first, slots;   /* int32_t: sorted by slot; per slot, where it begins; slots that have some, by colour */
+    /* one for each particle of the blocks near sticky bodies; 0: there are none */
+    int count;
+    /* gs4i_ghost; per occupied block: its first one, or -1 (int32_t) */
+    gs4i_scratch all, of;
+    /* int32_t: sorted by slot; per slot, where it begins; slots that have some, by colour */
+    gs4i_scratch order, first, slots;
     int colour_first[9];
 } gs4i_ghosts;
 
 typedef struct gs4i_boundary {
     gs4_wall walls[6];
-    gs4i_image *images[6]; int image_count[6], image_capacity[6];      /* per wall, while the blocks stay */
-    gs4i_body *bodies; int body_count, body_capacity;
+    /* per wall, while the blocks stay */
+    gs4i_image *images[6];
+    int image_count[6], image_capacity[6];
+    gs4i_body *bodies;
+    int body_count, body_capacity;
     gs4_real h;
 } gs4i_boundary;
 
 static void gs4i_body_orient(gs4i_body *b)
 {
     double w = b->turn[0], x = b->turn[1], y = b->turn[2], z = b->turn[3];
-    const double r[9] = { 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
-                          2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-                          2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y) };
+    const double r[9] = {
+        1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
+        2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+        2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)
+    };
     int i;
     for (i = 0; i < 9; i++) b->axes[i] = GS4I_C(r[i]);
 }
@@ -5642,10 +7355,16 @@ static void gs4i_body_move(gs4i_body *b, double dt)
     const double *t = b->turn;
     int i;
     gs4i_to_double(b->is.angular_velocity, o);
-    rate = sqrt(o[0] * o[0] + o[1] * o[1] + o[2] * o[2]); half = 0.5 * rate * dt;
-    s = rate > 0 ? sin(half) / rate : 0; c = cos(half);
-    x = o[0] * s; y = o[1] * s; z = o[2] * s;
-    b->at[0] += (double)b->is.velocity.x * dt; b->at[1] += (double)b->is.velocity.y * dt; b->at[2] += (double)b->is.velocity.z * dt;
+    rate = sqrt(o[0] * o[0] + o[1] * o[1] + o[2] * o[2]);
+    half = 0.5 * rate * dt;
+    s = rate > 0 ? sin(half) / rate : 0;
+    c = cos(half);
+    x = o[0] * s;
+    y = o[1] * s;
+    z = o[2] * s;
+    b->at[0] += (double)b->is.velocity.x * dt;
+    b->at[1] += (double)b->is.velocity.y * dt;
+    b->at[2] += (double)b->is.velocity.z * dt;
     if (rate <= 0) return;
     q[0] = c * t[0] - x * t[1] - y * t[2] - z * t[3];
     q[1] = c * t[1] + x * t[0] + y * t[3] - z * t[2];
@@ -5671,15 +7390,20 @@ static gs4_real gs4i_field_distance(const gs4i_field *f, gs4_vec3 p)
     int c[3], a, i;
     gs4i_to_double(p, x);
     for (a = 0; a < 3; a++) {
-        double t = (x[a] - f->low[a]) / f->spacing, inside = t < 0 ? 0 : t > f->n[a] - 1 ? f->n[a] - 1 : t;
+        double t = (x[a] - f->low[a]) / f->spacing, inside = t < 0             ? 0
+                                                             : t > f->n[a] - 1 ? f->n[a] - 1
+                                                                               : t;
         out += (t - inside) * (t - inside);
-        c[a] = (int)inside; if (c[a] > f->n[a] - 2) c[a] = f->n[a] - 2;
+        c[a] = (int)inside;
+        if (c[a] > f->n[a] - 2) c[a] = f->n[a] - 2;
         x[a] = inside - c[a];
     }
     for (i = 0; i < 8; i++) {
-        size_t at = ((size_t)(c[2] + (i >> 2)) * (size_t)f->n[1] + (size_t)(c[1] + (i >> 1 & 1))) * (size_t)f->n[0]
-                  + (size_t)(c[0] + (i & 1));
-        value += (double)f->distance[at] * (i & 1 ? x[0] : 1 - x[0]) * (i & 2 ? x[1] : 1 - x[1]) * (i & 4 ? x[2] : 1 - x[2]);
+        size_t at = ((size_t)(c[2] + (i >> 2)) * (size_t)f->n[1] + (size_t)(c[1] + (i >> 1 & 1)))
+                        * (size_t)f->n[0]
+                    + (size_t)(c[0] + (i & 1));
+        value += (double)f->distance[at] * (i & 1 ? x[0] : 1 - x[0]) * (i & 2 ? x[1] : 1 - x[1])
+                 * (i & 4 ? x[2] : 1 - x[2]);
     }
     return GS4I_C(value + sqrt(out) * f->spacing);
 }
@@ -5687,7 +7411,8 @@ static gs4_real gs4i_field_distance(const gs4i_field *f, gs4_vec3 p)
 /* The same in the coordinates of the shape. */
 static gs4_real gs4i_shape_or_field(const gs4i_body *b, gs4_vec3 p)
 {
-    return b->field.distance ? gs4i_field_distance(&b->field, p) : gs4i_shape_distance(&b->is.shape, p);
+    return b->field.distance ? gs4i_field_distance(&b->field, p)
+                             : gs4i_shape_distance(&b->is.shape, p);
 }
 
 /* World point p in the coordinates of the shape. */
@@ -5695,20 +7420,27 @@ static gs4_vec3 gs4i_to_body(const gs4i_body *b, gs4_vec3 p)
 {
     const gs4_real *r = b->axes;
     gs4_vec3 d = gs4i_sub(p, gs4i_vec3(GS4I_C(b->at[0]), GS4I_C(b->at[1]), GS4I_C(b->at[2])));
-    return gs4i_add(gs4i_vec3(r[0] * d.x + r[3] * d.y + r[6] * d.z, r[1] * d.x + r[4] * d.y + r[7] * d.z,
-                              r[2] * d.x + r[5] * d.y + r[8] * d.z), b->is.pivot);
+    return gs4i_add(gs4i_vec3(r[0] * d.x + r[3] * d.y + r[6] * d.z,
+                              r[1] * d.x + r[4] * d.y + r[7] * d.z,
+                              r[2] * d.x + r[5] * d.y + r[8] * d.z),
+                    b->is.pivot);
 }
 
 /* Signed distance (m) from the body's surface to the world point p. */
-static gs4_real gs4i_body_distance(const gs4i_body *b, gs4_vec3 p) { return gs4i_shape_or_field(b, gs4i_to_body(b, p)); }
+static gs4_real gs4i_body_distance(const gs4i_body *b, gs4_vec3 p)
+{
+    return gs4i_shape_or_field(b, gs4i_to_body(b, p));
+}
 
 /* gs4i_shape_is_flat for a body, of world points. */
-static int gs4i_body_is_flat(const gs4i_body *b, gs4_vec3 p, gs4_real reach, gs4_real deep, gs4_vec3 *normal)
+static int gs4i_body_is_flat(const gs4i_body *b, gs4_vec3 p, gs4_real reach, gs4_real deep,
+                             gs4_vec3 *normal)
 {
     const gs4_real *r = b->axes;
     gs4_vec3 n;
     if (!gs4i_shape_is_flat(&b->is.shape, gs4i_to_body(b, p), reach, deep, &n)) return 0;
-    *normal = gs4i_vec3(r[0] * n.x + r[1] * n.y + r[2] * n.z, r[3] * n.x + r[4] * n.y + r[5] * n.z, r[6] * n.x + r[7] * n.y + r[8] * n.z);
+    *normal = gs4i_vec3(r[0] * n.x + r[1] * n.y + r[2] * n.z, r[3] * n.x + r[4] * n.y + r[5] * n.z,
+                        r[6] * n.x + r[7] * n.y + r[8] * n.z);
     return 1;
 }
 
@@ -5717,50 +7449,68 @@ static gs4_vec3 gs4i_body_normal(const gs4i_body *b, gs4_vec3 p, gs4_real step)
 {
     gs4_vec3 g;
     gs4_real length;
-    g.x = gs4i_body_distance(b, gs4i_vec3(p.x + step, p.y, p.z)) - gs4i_body_distance(b, gs4i_vec3(p.x - step, p.y, p.z));
-    g.y = gs4i_body_distance(b, gs4i_vec3(p.x, p.y + step, p.z)) - gs4i_body_distance(b, gs4i_vec3(p.x, p.y - step, p.z));
-    g.z = gs4i_body_distance(b, gs4i_vec3(p.x, p.y, p.z + step)) - gs4i_body_distance(b, gs4i_vec3(p.x, p.y, p.z - step));
+    g.x = gs4i_body_distance(b, gs4i_vec3(p.x + step, p.y, p.z))
+          - gs4i_body_distance(b, gs4i_vec3(p.x - step, p.y, p.z));
+    g.y = gs4i_body_distance(b, gs4i_vec3(p.x, p.y + step, p.z))
+          - gs4i_body_distance(b, gs4i_vec3(p.x, p.y - step, p.z));
+    g.z = gs4i_body_distance(b, gs4i_vec3(p.x, p.y, p.z + step))
+          - gs4i_body_distance(b, gs4i_vec3(p.x, p.y, p.z - step));
     length = gs4i_length(g);
     return length > 0 ? gs4i_scale(g, 1 / length) : gs4i_vec3(0, 0, 0);
 }
 
-/* --- closed triangle meshes ---------------------------------------------------------------------- */
+/* --- closed triangle meshes ------------------------------------------------------------------- */
 
-static const char *const gs4i_mesh_faults[] = { NULL,
-    "has a vertex that is not a finite number", "has a triangle with a vertex index out of range",
-    "is not closed: an edge belongs to one triangle only, or to more than two, or to two that disagree about the outside",
-    "is inside out: its triangles face inwards; swap two vertices of each", "encloses no volume" };
+static const char *const gs4i_mesh_faults[] = {
+    NULL,
+    "has a vertex that is not a finite number",
+    "has a triangle with a vertex index out of range",
+    "is not closed: an edge belongs to one triangle only, or to more than two, or to two that "
+    "disagree about the outside",
+    "is inside out: its triangles face inwards; swap two vertices of each",
+    "encloses no volume"
+};
 
 /* 0 when the surface is closed and faces outwards, the number of its fault, or GS4_ERROR_MEMORY. */
 static int gs4i_mesh_check(gs4i_memory *m, const gs4_shape *s)
 {
     size_t nv = (size_t)s->vertex_count, edges = 3 * (size_t)s->triangle_count, i, k;
-    size_t *first = NULL; int *target = NULL, fault = 0;
+    size_t *first = NULL;
+    int *target = NULL, fault = 0;
     double volume = 0, extent = 0;
     for (i = 0; i < 3 * nv; i++) {
         if (!gs4i_finite(s->vertices[i])) return 1;
         if (fabs((double)s->vertices[i]) > extent) extent = fabs((double)s->vertices[i]);
     }
-    for (i = 0; i < edges; i++) if (s->triangles[i] < 0 || s->triangles[i] >= s->vertex_count) return 2;
+    for (i = 0; i < edges; i++)
+        if (s->triangles[i] < 0 || s->triangles[i] >= s->vertex_count) return 2;
     first = (size_t *)gs4i_alloc(m, nv + 2, sizeof *first);
     target = (int *)gs4i_alloc(m, edges, sizeof *target);
-    if (!first || !target) fault = GS4_ERROR_MEMORY;
+    if (!first || !target)
+        fault = GS4_ERROR_MEMORY;
     else {
         for (i = 0; i < edges; i++) first[s->triangles[i] + 2]++;
         for (i = 2; i < nv + 2; i++) first[i] += first[i - 1];
-        for (i = 0; i < edges; i++)                         /* directed edge i: triangles[i] -> next corner */
+        /* directed edge i: triangles[i] -> next corner */
+        for (i = 0; i < edges; i++)
             target[first[s->triangles[i] + 1]++] = s->triangles[i % 3 == 2 ? i - 2 : i + 1];
-        for (i = 0; i < edges && !fault; i++) {             /* each edge once, its reverse once */
-            int from = s->triangles[i], to = s->triangles[i % 3 == 2 ? i - 2 : i + 1], same = 0, reverse = 0;
+        for (i = 0; i < edges && !fault; i++) { /* each edge once, its reverse once */
+            int from = s->triangles[i], to = s->triangles[i % 3 == 2 ? i - 2 : i + 1], same = 0,
+                reverse = 0;
             for (k = first[from]; k < first[from + 1]; k++) same += target[k] == to;
             for (k = first[to]; k < first[to + 1]; k++) reverse += target[k] == from;
             if (same != 1 || reverse != 1) fault = 3;
         }
         for (i = 0; i < edges; i += 3) {
-            const gs4_real *a = s->vertices + 3 * (size_t)s->triangles[i], *b = s->vertices + 3 * (size_t)s->triangles[i + 1];
+            const gs4_real *a = s->vertices + 3 * (size_t)s->triangles[i],
+                           *b = s->vertices + 3 * (size_t)s->triangles[i + 1];
             const gs4_real *c = s->vertices + 3 * (size_t)s->triangles[i + 2];
-            const double p[9] = { (double)a[0], (double)a[1], (double)a[2], (double)b[0], (double)b[1], (double)b[2], (double)c[0], (double)c[1], (double)c[2] };
-            volume += (p[0] * (p[4] * p[8] - p[5] * p[7]) + p[1] * (p[5] * p[6] - p[3] * p[8]) + p[2] * (p[3] * p[7] - p[4] * p[6])) / 6;
+            const double p[9] = { (double)a[0], (double)a[1], (double)a[2],
+                                  (double)b[0], (double)b[1], (double)b[2],
+                                  (double)c[0], (double)c[1], (double)c[2] };
+            volume += (p[0] * (p[4] * p[8] - p[5] * p[7]) + p[1] * (p[5] * p[6] - p[3] * p[8])
+                       + p[2] * (p[3] * p[7] - p[4] * p[6]))
+                      / 6;
         }
         if (!fault && fabs(volume) <= 1e-12 * extent * extent * extent) fault = 5;
         if (!fault && volume < 0) fault = 4;
@@ -5771,38 +7521,72 @@ static int gs4i_mesh_check(gs4i_memory *m, const gs4_shape *s)
 }
 
 /* Squared distance of p to triangle abc: Voronoi regions of corners, edges and face. */
-static double gs4i_triangle_distance2(const double p[3], const double a[3], const double b[3], const double c[3])
+static double gs4i_triangle_distance2(const double p[3], const double a[3], const double b[3],
+                                      const double c[3])
 {
-    double ab[3], ac[3], ap[3], q[3], d1 = 0, d2 = 0, d3, d4, d5, d6, va, vb, vc, u = 0, v = 0, bb = 0, bc = 0, cc = 0, r = 0;
+    double ab[3], ac[3], ap[3], q[3], d1 = 0, d2 = 0, d3, d4, d5, d6, va, vb, vc, u = 0, v = 0,
+                                      bb = 0, bc = 0, cc = 0, r = 0;
     int i;
     for (i = 0; i < 3; i++) {
-        ab[i] = b[i] - a[i]; ac[i] = c[i] - a[i]; ap[i] = p[i] - a[i];
-        d1 += ab[i] * ap[i]; d2 += ac[i] * ap[i];
-        bb += ab[i] * ab[i]; bc += ab[i] * ac[i]; cc += ac[i] * ac[i];
+        ab[i] = b[i] - a[i];
+        ac[i] = c[i] - a[i];
+        ap[i] = p[i] - a[i];
+        d1 += ab[i] * ap[i];
+        d2 += ac[i] * ap[i];
+        bb += ab[i] * ab[i];
+        bc += ab[i] * ac[i];
+        cc += ac[i] * ac[i];
     }
-    d3 = d1 - bb; d4 = d2 - bc; d5 = d1 - bc; d6 = d2 - cc;             /* the same from b and from c */
-    va = d3 * d6 - d5 * d4; vb = d5 * d2 - d1 * d6; vc = d1 * d4 - d3 * d2;
-    if (d1 <= 0 && d2 <= 0) { u = 0; v = 0; }
-    else if (d3 >= 0 && d4 <= d3) { u = 1; v = 0; }
-    else if (d6 >= 0 && d5 <= d6) { u = 0; v = 1; }
-    else if (vc <= 0 && d1 >= 0 && d3 <= 0) { u = d1 / (d1 - d3); v = 0; }
-    else if (vb <= 0 && d2 >= 0 && d6 <= 0) { u = 0; v = d2 / (d2 - d6); }
-    else if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) { v = (d4 - d3) / ((d4 - d3) + (d5 - d6)); u = 1 - v; }
-    else if (va + vb + vc > 0) { u = vb / (va + vb + vc); v = vc / (va + vb + vc); }
-    for (i = 0; i < 3; i++) { q[i] = a[i] + u * ab[i] + v * ac[i] - p[i]; r += q[i] * q[i]; }
+    /* the same from b and from c */
+    d3 = d1 - bb;
+    d4 = d2 - bc;
+    d5 = d1 - bc;
+    d6 = d2 - cc;
+    va = d3 * d6 - d5 * d4;
+    vb = d5 * d2 - d1 * d6;
+    vc = d1 * d4 - d3 * d2;
+    if (d1 <= 0 && d2 <= 0) {
+        u = 0;
+        v = 0;
+    } else if (d3 >= 0 && d4 <= d3) {
+        u = 1;
+        v = 0;
+    } else if (d6 >= 0 && d5 <= d6) {
+        u = 0;
+        v = 1;
+    } else if (vc <= 0 && d1 >= 0 && d3 <= 0) {
+        u = d1 / (d1 - d3);
+        v = 0;
+    } else if (vb <= 0 && d2 >= 0 && d6 <= 0) {
+        u = 0;
+        v = d2 / (d2 - d6);
+    } else if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
+        v = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+        u = 1 - v;
+    } else if (va + vb + vc > 0) {
+        u = vb / (va + vb + vc);
+        v = vc / (va + vb + vc);
+    }
+    for (i = 0; i < 3; i++) {
+        q[i] = a[i] + u * ab[i] + v * ac[i] - p[i];
+        r += q[i] * q[i];
+    }
     return r;
 }
 
-/* Which side of edge ij of the projection to (y, z) the point is on: the same number for both triangles of the edge. */
+/* Which side of edge ij of the projection to (y, z) the point is on: the same number for both
+ * triangles of the edge. */
 static int gs4i_edge_side(const gs4_shape *s, int i, int j, double y, double z)
 {
     int low = i < j ? i : j, high = i < j ? j : i, positive;
     const gs4_real *a = s->vertices + 3 * (size_t)low, *b = s->vertices + 3 * (size_t)high;
-    positive = ((double)b[1] - y) * ((double)a[2] - z) - ((double)a[1] - y) * ((double)b[2] - z) > 0;
+    positive =
+        ((double)b[1] - y) * ((double)a[2] - z) - ((double)a[1] - y) * ((double)b[2] - z) > 0;
     return (i < j) == positive;
 }
 
-/* Distances exact within `band` of the surface, +-band beyond; inside by counting crossings along rows of x. */
+/* Distances exact within `band` of the surface, +-band beyond; inside by counting crossings
+ * along rows of x. */
 static void gs4i_field_sample(gs4i_field *f, const gs4_shape *s)
 {
     int t, a, i, j, k;
@@ -5819,41 +7603,60 @@ static void gs4i_field_sample(gs4i_field *f, const gs4_shape *s)
                 if (corner[c][a] < mn) mn = corner[c][a];
                 if (corner[c][a] > mx) mx = corner[c][a];
             }
-            lo[a] = (int)ceil((mn - f->band - f->low[a]) / f->spacing); if (lo[a] < 0) lo[a] = 0;
-            hi[a] = (int)floor((mx + f->band - f->low[a]) / f->spacing); if (hi[a] > f->n[a] - 1) hi[a] = f->n[a] - 1;
+            lo[a] = (int)ceil((mn - f->band - f->low[a]) / f->spacing);
+            if (lo[a] < 0) lo[a] = 0;
+            hi[a] = (int)floor((mx + f->band - f->low[a]) / f->spacing);
+            if (hi[a] > f->n[a] - 1) hi[a] = f->n[a] - 1;
         }
-        for (k = lo[2]; k <= hi[2]; k++) for (j = lo[1]; j <= hi[1]; j++) for (i = lo[0]; i <= hi[0]; i++) {
-            gs4_real *d = f->distance + ((size_t)k * (size_t)f->n[1] + (size_t)j) * (size_t)f->n[0] + (size_t)i;
-            double p[3], r2;
-            p[0] = f->low[0] + i * f->spacing; p[1] = f->low[1] + j * f->spacing; p[2] = f->low[2] + k * f->spacing;
-            r2 = gs4i_triangle_distance2(p, corner[0], corner[1], corner[2]);
-            if (r2 < (double)*d * (double)*d) *d = GS4I_C(sqrt(r2));
-        }
+        for (k = lo[2]; k <= hi[2]; k++)
+            for (j = lo[1]; j <= hi[1]; j++)
+                for (i = lo[0]; i <= hi[0]; i++) {
+                    gs4_real *d = f->distance
+                                  + ((size_t)k * (size_t)f->n[1] + (size_t)j) * (size_t)f->n[0]
+                                  + (size_t)i;
+                    double p[3], r2;
+                    p[0] = f->low[0] + i * f->spacing;
+                    p[1] = f->low[1] + j * f->spacing;
+                    p[2] = f->low[2] + k * f->spacing;
+                    r2 = gs4i_triangle_distance2(p, corner[0], corner[1], corner[2]);
+                    if (r2 < (double)*d * (double)*d) *d = GS4I_C(sqrt(r2));
+                }
     }
-    for (t = 0; t < s->triangle_count; t++) {               /* each crossing flips the sign of all samples behind it */
+    /* each crossing flips the sign of all samples behind it */
+    for (t = 0; t < s->triangle_count; t++) {
         const int *v = s->triangles + 3 * (size_t)t;
-        double q[3][3];                                     /* the corners */
+        double q[3][3]; /* the corners */
         int j0, j1, k0, k1;
-        for (i = 0; i < 9; i++) q[i / 3][i % 3] = (double)s->vertices[3 * (size_t)v[i / 3] + (size_t)(i % 3)];
+        for (i = 0; i < 9; i++)
+            q[i / 3][i % 3] = (double)s->vertices[3 * (size_t)v[i / 3] + (size_t)(i % 3)];
         j0 = (int)floor((fmin(q[0][1], fmin(q[1][1], q[2][1])) - f->low[1]) / f->spacing);
         j1 = (int)ceil((fmax(q[0][1], fmax(q[1][1], q[2][1])) - f->low[1]) / f->spacing);
         k0 = (int)floor((fmin(q[0][2], fmin(q[1][2], q[2][2])) - f->low[2]) / f->spacing);
         k1 = (int)ceil((fmax(q[0][2], fmax(q[1][2], q[2][2])) - f->low[2]) / f->spacing);
-        for (k = k0 < 0 ? 0 : k0; k <= k1 && k < f->n[2]; k++) for (j = j0 < 0 ? 0 : j0; j <= j1 && j < f->n[1]; j++) {
-            double y = f->low[1] + j * f->spacing, z = f->low[2] + k * f->spacing, area, w1, w2, x;
-            int side = gs4i_edge_side(s, v[0], v[1], y, z), from;
-            if (side != gs4i_edge_side(s, v[1], v[2], y, z) || side != gs4i_edge_side(s, v[2], v[0], y, z)) continue;
-            area = (q[1][1] - q[0][1]) * (q[2][2] - q[0][2]) - (q[2][1] - q[0][1]) * (q[1][2] - q[0][2]);
-            if (area == 0) continue;
-            w1 = ((y - q[0][1]) * (q[2][2] - q[0][2]) - (q[2][1] - q[0][1]) * (z - q[0][2])) / area;
-            w2 = ((q[1][1] - q[0][1]) * (z - q[0][2]) - (y - q[0][1]) * (q[1][2] - q[0][2])) / area;
-            x = q[0][0] + w1 * (q[1][0] - q[0][0]) + w2 * (q[2][0] - q[0][0]);
-            from = (int)ceil((x - f->low[0]) / f->spacing);
-            for (i = from < 0 ? 0 : from; i < f->n[0]; i++) {
-                gs4_real *d = f->distance + ((size_t)k * (size_t)f->n[1] + (size_t)j) * (size_t)f->n[0] + (size_t)i;
-                *d = -*d;
+        for (k = k0 < 0 ? 0 : k0; k <= k1 && k < f->n[2]; k++)
+            for (j = j0 < 0 ? 0 : j0; j <= j1 && j < f->n[1]; j++) {
+                double y = f->low[1] + j * f->spacing, z = f->low[2] + k * f->spacing, area, w1, w2,
+                       x;
+                int side = gs4i_edge_side(s, v[0], v[1], y, z), from;
+                if (side != gs4i_edge_side(s, v[1], v[2], y, z)
+                    || side != gs4i_edge_side(s, v[2], v[0], y, z))
+                    continue;
+                area = (q[1][1] - q[0][1]) * (q[2][2] - q[0][2])
+                       - (q[2][1] - q[0][1]) * (q[1][2] - q[0][2]);
+                if (area == 0) continue;
+                w1 = ((y - q[0][1]) * (q[2][2] - q[0][2]) - (q[2][1] - q[0][1]) * (z - q[0][2]))
+                     / area;
+                w2 = ((q[1][1] - q[0][1]) * (z - q[0][2]) - (y - q[0][1]) * (q[1][2] - q[0][2]))
+                     / area;
+                x = q[0][0] + w1 * (q[1][0] - q[0][0]) + w2 * (q[2][0] - q[0][0]);
+                from = (int)ceil((x - f->low[0]) / f->spacing);
+                for (i = from < 0 ? 0 : from; i < f->n[0]; i++) {
+                    gs4_real *d = f->distance
+                                  + ((size_t)k * (size_t)f->n[1] + (size_t)j) * (size_t)f->n[0]
+                                  + (size_t)i;
+                    *d = -*d;
+                }
             }
-        }
     }
 }
 
@@ -5864,10 +7667,16 @@ static int gs4i_field_create(gs4i_memory *m, gs4i_field *f, const gs4_shape *s, 
     double lo[3], hi[3], extent = 1;
     int a;
     gs4i_shape_bounds(s, &low, &high);
-    gs4i_to_double(low, lo); gs4i_to_double(high, hi);
+    gs4i_to_double(low, lo);
+    gs4i_to_double(high, hi);
     for (a = 0; a < 3; a++) extent *= (hi[a] - lo[a]) / spacing + 14;
-    while (extent * sizeof(gs4_real) > 12e6) { spacing *= 1.1; for (extent = 1, a = 0; a < 3; a++) extent *= (hi[a] - lo[a]) / spacing + 14; }
-    f->spacing = spacing; f->band = 6 * spacing; f->count = 1;
+    while (extent * sizeof(gs4_real) > 12e6) {
+        spacing *= 1.1;
+        for (extent = 1, a = 0; a < 3; a++) extent *= (hi[a] - lo[a]) / spacing + 14;
+    }
+    f->spacing = spacing;
+    f->band = 6 * spacing;
+    f->count = 1;
     for (a = 0; a < 3; a++) {
         f->low[a] = lo[a] - 6.49 * spacing;
         f->n[a] = (int)ceil((hi[a] - lo[a]) / spacing) + 14;
@@ -5885,7 +7694,7 @@ static void gs4i_field_free(gs4i_memory *m, gs4i_field *f)
     f->distance = NULL;
 }
 
-/* --- images of the walls --------------------------------------------------------------------------- */
+/* --- images of the walls ---------------------------------------------------------------------- */
 
 /* Mirror of node `at` (which is outside 0 .. n-1) at its wall. */
 GS4I_INLINE int gs4i_mirror(gs4_wall wall, int at, int n)
@@ -5901,13 +7710,14 @@ static int gs4i_list_images(gs4i_memory *m, gs4i_boundary *b, const gs4i_grid *g
     for (wall = 0; wall < 6; wall++) {
         int axis = wall / 2, n = g->cells[axis], count = 0;
         if (b->walls[wall] == GS4_WALL_OPEN) continue;
-        for (pass = 0; pass < 2; pass++) {                  /* count, then fill */
+        for (pass = 0; pass < 2; pass++) { /* count, then fill */
             if (pass && count > b->image_capacity[wall]) {
                 int wanted = count + count / 4;
                 gs4i_image *list = (gs4i_image *)gs4i_alloc(m, (size_t)wanted, sizeof *list);
                 if (!list) return GS4_ERROR_MEMORY;
                 gs4i_free(m, b->images[wall], (size_t)b->image_capacity[wall], sizeof *list);
-                b->images[wall] = list; b->image_capacity[wall] = wanted;
+                b->images[wall] = list;
+                b->image_capacity[wall] = wanted;
             }
             count = 0;
             for (s = 0; s < g->active; s++) {
@@ -5918,13 +7728,20 @@ static int gs4i_list_images(gs4i_memory *m, gs4i_boundary *b, const gs4i_grid *g
                 for (i = 0; i < GS4I_BLOCK_NODES; i++) {
                     int x[3], mirror;
                     ptrdiff_t to;
-                    x[0] = 4 * (at[0] - 1) + (i & 3); x[1] = 4 * (at[1] - 1) + (i >> 2 & 3); x[2] = 4 * (at[2] - 1) + (i >> 4);
-                    if (wall & 1 ? x[axis] < n || x[axis] > n + 1 : x[axis] > -1 || x[axis] < -2) continue;
+                    x[0] = 4 * (at[0] - 1) + (i & 3);
+                    x[1] = 4 * (at[1] - 1) + (i >> 2 & 3);
+                    x[2] = 4 * (at[2] - 1) + (i >> 4);
+                    if (wall & 1 ? x[axis] < n || x[axis] > n + 1 : x[axis] > -1 || x[axis] < -2)
+                        continue;
                     mirror = gs4i_mirror(b->walls[wall], x[axis], n);
                     x[axis] = mirror;
                     to = gs4i_node_at(g, x[0], x[1], x[2]);
                     if (to < 0) continue;
-                    if (pass) { gs4i_image *p = &b->images[wall][count]; p->image = (uint32_t)(64 * s + i); p->mirror = (uint32_t)(to / 4); }
+                    if (pass) {
+                        gs4i_image *p = &b->images[wall][count];
+                        p->image = (uint32_t)(64 * s + i);
+                        p->mirror = (uint32_t)(to / 4);
+                    }
                     count++;
                 }
             }
@@ -5934,23 +7751,29 @@ static int gs4i_list_images(gs4i_memory *m, gs4i_boundary *b, const gs4i_grid *g
     return GS4_OK;
 }
 
-/* How far in front of a sticky body nodes are held that images do not serve, in cells: a plane of nodes just in front would leave liquid
- * next to no node to stick to. */
+/* How far in front of a sticky body nodes are held that images do not serve, in cells: a plane
+ * of nodes just in front would leave liquid next to no node to stick to. */
 #define GS4I_STICKY_REACH GS4I_C(0.75)
-#define GS4I_GHOST_REACH GS4I_C(3)      /* particles that have images are within so many cells of a surface; nodes that see one within GHOST_NODES */
+/* particles that have images are within so many cells of a surface; nodes that see one within
+ * GHOST_NODES */
+#define GS4I_GHOST_REACH GS4I_C(3)
 #define GS4I_GHOST_NODES GS4I_C(1.5)
 
 static gs4_vec3 gs4i_block_midst(const gs4i_grid *g, uint32_t block)
 {
     int at[3];
     gs4i_block_coordinates(g, block, at);
-    return gs4i_add(g->origin, gs4i_scale(gs4i_vec3(GS4I_C(4 * at[0] - 2), GS4I_C(4 * at[1] - 2), GS4I_C(4 * at[2] - 2)), g->h));
+    return gs4i_add(g->origin, gs4i_scale(gs4i_vec3(GS4I_C(4 * at[0] - 2), GS4I_C(4 * at[1] - 2),
+                                                    GS4I_C(4 * at[2] - 2)),
+                                          g->h));
 }
 
-/* Can a body hold any node of a block? By its distance from the midst: half the diagonal of the block's nodes, and its reach. */
+/* Can a body hold any node of a block? By its distance from the midst: half the diagonal of the
+ * block's nodes, and its reach. */
 static int gs4i_body_is_near(const gs4i_body *b, const gs4i_grid *g, int slot)
 {
-    return gs4i_body_distance(b, gs4i_block_midst(g, g->block[slot])) < (GS4I_C(2.7) + GS4I_GHOST_NODES) * g->h;
+    return gs4i_body_distance(b, gs4i_block_midst(g, g->block[slot]))
+           < (GS4I_C(2.7) + GS4I_GHOST_NODES) * g->h;
 }
 
 /* Give a place for jumps to the blocks that touch a wall or a body. */
@@ -5964,8 +7787,10 @@ static int gs4i_place_jumps(gs4i_memory *m, const gs4i_boundary *b, gs4i_grid *g
             g->jump_of[b->images[wall][i].mirror / 64] = 1;
         }
     for (i = 0; i < b->body_count; i++)
-        for (s = 0; s < g->active; s++) g->jump_of[s] = g->jump_of[s] || gs4i_body_is_near(&b->bodies[i], g, s);
-    for (s = 0; s < g->active; s++) if (g->jump_of[s]) g->jump_of[s] = ++n;
+        for (s = 0; s < g->active; s++)
+            g->jump_of[s] = g->jump_of[s] || gs4i_body_is_near(&b->bodies[i], g, s);
+    for (s = 0; s < g->active; s++)
+        if (g->jump_of[s]) g->jump_of[s] = ++n;
     g->jump_count = n;
     if (n > g->jump_capacity) {
         int wanted = n + n / 4;
@@ -5978,14 +7803,17 @@ static int gs4i_place_jumps(gs4i_memory *m, const gs4i_boundary *b, gs4i_grid *g
         }
         gs4i_free(m, g->jump, (size_t)g->jump_capacity, GS4I_NODE_REALS * sizeof *jump);
         gs4i_free(m, g->contact, (size_t)g->jump_capacity, GS4I_BLOCK_NODES);
-        g->jump = jump; g->contact = contact; g->jump_capacity = wanted;
+        g->jump = jump;
+        g->contact = contact;
+        g->jump_capacity = wanted;
     }
     return GS4_OK;
 }
 
 GS4I_INLINE gs4_real *gs4i_jump_at(const gs4i_grid *g, uint32_t node)
 {
-    return g->jump + GS4I_NODE_REALS * (size_t)(g->jump_of[node / 64] - 1) + 4 * (size_t)(node % 64);
+    return g->jump + GS4I_NODE_REALS * (size_t)(g->jump_of[node / 64] - 1)
+           + 4 * (size_t)(node % 64);
 }
 
 /* Contact of a node: bit a: an image that folds along axis a; and those below. */
@@ -5994,26 +7822,33 @@ GS4I_INLINE uint8_t *gs4i_contact_at(const gs4i_grid *g, uint32_t node)
     return g->contact + (size_t)GS4I_BLOCK_NODES * (size_t)(g->jump_of[node / 64] - 1) + node % 64;
 }
 
-#define GS4I_PRESSED 8                  /* material pressed on the wall there */
-#define GS4I_IMAGED 16                  /* images of particles behind a sticky body reach the node */
-#define GS4I_UNIMAGED 32                /* a particle near a sticky body does, that has none */
+#define GS4I_PRESSED 8 /* material pressed on the wall there */
+/* images of particles behind a sticky body reach the node */
+#define GS4I_IMAGED 16
+#define GS4I_UNIMAGED 32 /* a particle near a sticky body does, that has none */
 
 GS4I_INLINE void gs4i_reflection(gs4_wall wall, int axis, gs4_real sign[3])
 {
     int a;
-    for (a = 0; a < 3; a++) sign[a] = GS4I_C(wall == GS4_WALL_PERIODIC || (wall != GS4_WALL_STICK && a != axis) ? 1 : -1);
+    for (a = 0; a < 3; a++)
+        sign[a] =
+            GS4I_C(wall == GS4_WALL_PERIODIC || (wall != GS4_WALL_STICK && a != axis) ? 1 : -1);
 }
 
-/* Is this image of a separating wall in contact? While material moves into the wall, or pressed on it in the last step. */
+/* Is this image of a separating wall in contact? While material moves into the wall, or pressed
+ * on it in the last step. */
 static int gs4i_wall_touches(const gs4i_grid *g, const gs4i_image *pair, int wall)
 {
     int axis = wall / 2;
     gs4_real outward = wall & 1 ? GS4I_C(1) : GS4I_C(-1);
-    gs4_real into = (g->momentum[4 * (size_t)pair->image + (size_t)axis] + g->momentum[4 * (size_t)pair->mirror + (size_t)axis]) * outward;
+    gs4_real into = (g->momentum[4 * (size_t)pair->image + (size_t)axis]
+                     + g->momentum[4 * (size_t)pair->mirror + (size_t)axis])
+                    * outward;
     return into > 0 || (g->memory && g->memory[4 * (size_t)pair->image + 3] >= 2);
 }
 
-/* Fold mass and momentum back from images; the fourth number of the jump is 1 where one did, `contact` has along which axes. */
+/* Fold mass and momentum back from images; the fourth number of the jump is 1 where one did,
+ * `contact` has along which axes. */
 static void gs4i_fold_momentum(const gs4i_boundary *b, const gs4i_grid *g)
 {
     int wall, i, a;
@@ -6035,9 +7870,11 @@ static void gs4i_fold_momentum(const gs4i_boundary *b, const gs4i_grid *g)
     }
 }
 
-GS4I_INLINE int gs4i_is_folded(const gs4i_boundary *b, const gs4i_grid *g, const gs4i_image *pair, int wall)
+GS4I_INLINE int gs4i_is_folded(const gs4i_boundary *b, const gs4i_grid *g, const gs4i_image *pair,
+                               int wall)
 {
-    return b->walls[wall] == GS4_WALL_PERIODIC || (*gs4i_contact_at(g, pair->image) >> (wall / 2) & 1);
+    return b->walls[wall] == GS4_WALL_PERIODIC
+           || (*gs4i_contact_at(g, pair->image) >> (wall / 2) & 1);
 }
 
 /* Fold forces; where `stress` is among them, what pushes out presses on the wall. */
@@ -6052,8 +7889,10 @@ static void gs4i_fold_force(const gs4i_boundary *b, const gs4i_grid *g, int stre
             const gs4_real *from = g->force + 4 * (size_t)pair->image;
             gs4_real *to = g->force + 4 * (size_t)pair->mirror;
             int folded = gs4i_is_folded(b, g, pair, wall);
-            if (stress && b->walls[wall] == GS4_WALL_SEPARATE && from[wall / 2] * outward > 0) *gs4i_contact_at(g, pair->image) |= GS4I_PRESSED;
-            if (folded) for (a = 0; a < 3; a++) to[a] += sign[a] * from[a];
+            if (stress && b->walls[wall] == GS4_WALL_SEPARATE && from[wall / 2] * outward > 0)
+                *gs4i_contact_at(g, pair->image) |= GS4I_PRESSED;
+            if (folded)
+                for (a = 0; a < 3; a++) to[a] += sign[a] * from[a];
         }
     }
 }
@@ -6068,8 +7907,11 @@ static void gs4i_fill_images(const gs4i_boundary *b, const gs4i_grid *g, gs4_rea
         for (i = 0; i < b->image_count[wall]; i++) {
             const gs4i_image *pair = &b->images[wall][i];
             if (!gs4i_is_folded(b, g, pair, wall)) continue;
-            for (a = 0; a < 3; a++) field[4 * (size_t)pair->image + (size_t)a] = sign[a] * field[4 * (size_t)pair->mirror + (size_t)a];
-            if (b->walls[wall] == GS4_WALL_PERIODIC && field == g->momentum) field[4 * (size_t)pair->image + 3] = field[4 * (size_t)pair->mirror + 3];
+            for (a = 0; a < 3; a++)
+                field[4 * (size_t)pair->image + (size_t)a] =
+                    sign[a] * field[4 * (size_t)pair->mirror + (size_t)a];
+            if (b->walls[wall] == GS4_WALL_PERIODIC && field == g->momentum)
+                field[4 * (size_t)pair->image + 3] = field[4 * (size_t)pair->mirror + 3];
         }
     }
 }
@@ -6085,7 +7927,8 @@ static void gs4i_fill_fullness(const gs4i_boundary *b, const gs4i_grid *g)
         }
 }
 
-/* Images that fold carry their weight alone: their other forces are folded already. The fourth number of a force is the mass. */
+/* Images that fold carry their weight alone: their other forces are folded already. The fourth
+ * number of a force is the mass. */
 static void gs4i_weigh_images(const gs4i_boundary *b, const gs4i_grid *g, gs4_vec3 gravity)
 {
     int wall, i;
@@ -6094,124 +7937,197 @@ static void gs4i_weigh_images(const gs4i_boundary *b, const gs4i_grid *g, gs4_ve
             const gs4i_image *pair = &b->images[wall][i];
             gs4_real *f = g->force + 4 * (size_t)pair->image;
             if (!gs4i_is_folded(b, g, pair, wall)) continue;
-            f[0] = f[3] * gravity.x; f[1] = f[3] * gravity.y; f[2] = f[3] * gravity.z;
+            f[0] = f[3] * gravity.x;
+            f[1] = f[3] * gravity.y;
+            f[2] = f[3] * gravity.z;
         }
 }
 
-/* What body `b` does to a node at p that would go with velocity v and acceleration acc over the time dt: both become
- * those of the body in the components that contact holds. Returns whether it holds any. */
-static int gs4i_body_hold(const gs4i_body *b, gs4_vec3 p, gs4_real h, gs4_real dt, gs4_real v[3], gs4_real acc[3])
+/* What body `b` does to a node at p that would go with velocity v and acceleration acc over the
+ * time dt: both become those of the body in the components that contact holds. Returns whether
+ * it holds any. */
+static int gs4i_body_hold(const gs4i_body *b, gs4_vec3 p, gs4_real h, gs4_real dt, gs4_real v[3],
+                          gs4_real acc[3])
 {
     gs4_vec3 own, n, rel, side;
     gs4_real into, push, slip, bite, a_side;
-    if (gs4i_body_distance(b, p) >= (b->is.contact == GS4_WALL_STICK && !b->is_mouth ? GS4I_STICKY_REACH * h : GS4I_C(0))) return 0;
+    if (gs4i_body_distance(b, p)
+        >= (b->is.contact == GS4_WALL_STICK && !b->is_mouth ? GS4I_STICKY_REACH * h : GS4I_C(0)))
+        return 0;
     own = gs4i_body_velocity(b, p);
     if (b->is.contact == GS4_WALL_STICK) {
-        v[0] = own.x; v[1] = own.y; v[2] = own.z; acc[0] = acc[1] = acc[2] = 0;
+        v[0] = own.x;
+        v[1] = own.y;
+        v[2] = own.z;
+        acc[0] = acc[1] = acc[2] = 0;
         return 1;
     }
     n = gs4i_body_normal(b, p, GS4I_C(0.5) * h);
     rel = gs4i_sub(gs4i_vec3(v[0], v[1], v[2]), own);
-    into = -gs4i_dot(rel, n);                               /* > 0: velocity into the body */
-    push = -(acc[0] * n.x + acc[1] * n.y + acc[2] * n.z);   /* > 0: acceleration into it */
+    into = -gs4i_dot(rel, n);                             /* > 0: velocity into the body */
+    push = -(acc[0] * n.x + acc[1] * n.y + acc[2] * n.z); /* > 0: acceleration into it */
     if (into + dt * push <= 0) return 0;
-    side = gs4i_add(rel, gs4i_scale(n, into));              /* tangential velocity */
+    side = gs4i_add(rel, gs4i_scale(n, into)); /* tangential velocity */
     slip = gs4i_length(side);
     if (b->is.contact == GS4_WALL_SEPARATE && b->is.friction > 0) {
         gs4_vec3 ta = gs4i_add(gs4i_vec3(acc[0], acc[1], acc[2]), gs4i_scale(n, push));
         gs4_vec3 along = slip > 0 ? gs4i_scale(side, 1 / slip) : gs4i_vec3(0, 0, 0);
-        bite = gs4i_min(b->is.friction * gs4i_max(into, 0), slip);          /* Coulomb, on the impact */
+        /* Coulomb, on the impact */
+        bite = gs4i_min(b->is.friction * gs4i_max(into, 0), slip);
         side = gs4i_sub(side, gs4i_scale(along, bite));
-        if (slip - bite <= 0) { a_side = gs4i_length(ta); along = a_side > 0 ? gs4i_scale(ta, 1 / a_side) : along; }
-        else a_side = GS4I_HUGE;
-        bite = gs4i_min(b->is.friction * gs4i_max(push, 0), a_side);        /* and on the steady load */
-        acc[0] -= along.x * bite; acc[1] -= along.y * bite; acc[2] -= along.z * bite;
+        if (slip - bite <= 0) {
+            a_side = gs4i_length(ta);
+            along = a_side > 0 ? gs4i_scale(ta, 1 / a_side) : along;
+        } else
+            a_side = GS4I_HUGE;
+        /* and on the steady load */
+        bite = gs4i_min(b->is.friction * gs4i_max(push, 0), a_side);
+        acc[0] -= along.x * bite;
+        acc[1] -= along.y * bite;
+        acc[2] -= along.z * bite;
     }
-    v[0] = own.x + side.x; v[1] = own.y + side.y; v[2] = own.z + side.z;
-    acc[0] += n.x * push; acc[1] += n.y * push; acc[2] += n.z * push;
+    v[0] = own.x + side.x;
+    v[1] = own.y + side.y;
+    v[2] = own.z + side.z;
+    acc[0] += n.x * push;
+    acc[1] += n.y * push;
+    acc[2] += n.z * push;
     return 1;
 }
 
-/* Put a particle that ended inside a body, or behind a closed wall, back on its surface; the part of its velocity
- * that leads further in is lost. */
+/* Put a particle that ended inside a body, or behind a closed wall, back on its surface; the
+ * part of its velocity that leads further in is lost. */
 static void gs4i_put_back(const gs4i_boundary *b, const gs4i_grid *g, gs4_real x[3], gs4_real v[3])
 {
     int i, a, pass, moved = 1;
-    for (pass = 0; pass < 2 && moved; pass++)               /* two bodies may meet */
+    for (pass = 0; pass < 2 && moved; pass++) /* two bodies may meet */
         for (moved = 0, i = 0; i < b->body_count; i++) {
             const gs4i_body *body = &b->bodies[i];
             gs4_vec3 p = gs4i_vec3(x[0], x[1], x[2]), n, rel;
             gs4_real d = body->is_mouth ? GS4I_C(0) : gs4i_body_distance(body, p), into;
             if (!(d < 0)) continue;
             moved = 1;
-            d = gs4i_max(d, -2 * g->h);                     /* no farther than that in a step */
+            d = gs4i_max(d, -2 * g->h); /* no farther than that in a step */
             n = gs4i_body_normal(body, p, GS4I_C(0.1) * g->h);
             rel = gs4i_sub(gs4i_vec3(v[0], v[1], v[2]), gs4i_body_velocity(body, p));
             into = gs4i_min(gs4i_dot(rel, n), 0);
-            x[0] -= d * n.x; x[1] -= d * n.y; x[2] -= d * n.z;
-            v[0] -= into * n.x; v[1] -= into * n.y; v[2] -= into * n.z;
+            x[0] -= d * n.x;
+            x[1] -= d * n.y;
+            x[2] -= d * n.z;
+            v[0] -= into * n.x;
+            v[1] -= into * n.y;
+            v[2] -= into * n.z;
         }
     for (a = 0; a < 3; a++) {
-        gs4_real low = a == 0 ? g->origin.x : a == 1 ? g->origin.y : g->origin.z, size = GS4I_C(g->cells[a]) * g->h;
+        gs4_real low = a == 0   ? g->origin.x
+                       : a == 1 ? g->origin.y
+                                : g->origin.z,
+                 size = GS4I_C(g->cells[a]) * g->h;
         gs4_real high = low + size - 4 * GS4I_EPSILON * (gs4i_abs(low) + size);
         if (b->walls[2 * a] == GS4_WALL_PERIODIC) {
             if (x[a] < low) x[a] += size;
             if (x[a] >= low + size) x[a] -= size;
-            if (x[a] < low || x[a] > high) x[a] = x[a] < low ? low : high;      /* rounding of the shift */
+            /* rounding of the shift */
+            if (x[a] < low || x[a] > high) x[a] = x[a] < low ? low : high;
             continue;
         }
-        if (x[a] < low && b->walls[2 * a] != GS4_WALL_OPEN) { x[a] = low; if (v[a] < 0) v[a] = 0; }
-        if (x[a] > high && b->walls[2 * a + 1] != GS4_WALL_OPEN) { x[a] = high; if (v[a] > 0) v[a] = 0; }
+        if (x[a] < low && b->walls[2 * a] != GS4_WALL_OPEN) {
+            x[a] = low;
+            if (v[a] < 0) v[a] = 0;
+        }
+        if (x[a] > high && b->walls[2 * a + 1] != GS4_WALL_OPEN) {
+            x[a] = high;
+            if (v[a] > 0) v[a] = 0;
+        }
     }
 }
 
-/* In the mouth of an emitter a particle goes with the flow: at its velocity, uncompressed, without rates. The mouth, NULL outside of all. */
-static const gs4i_body *gs4i_hold_in_mouth(const gs4i_boundary *b, const gs4_real x[3], gs4_real v[4])
+/* In the mouth of an emitter a particle goes with the flow: at its velocity, uncompressed,
+ * without rates. The mouth, NULL outside of all. */
+static const gs4i_body *gs4i_hold_in_mouth(const gs4i_boundary *b, const gs4_real x[3],
+                                           gs4_real v[4])
 {
     const gs4i_body *mouth = NULL;
     int i;
     for (i = 0; i < b->body_count; i++) {
         const gs4i_body *body = &b->bodies[i];
-        if (body->is_mouth && !body->asleep && gs4i_body_distance(body, gs4i_vec3(x[0], x[1], x[2])) < 0) mouth = body;
+        if (body->is_mouth && !body->asleep
+            && gs4i_body_distance(body, gs4i_vec3(x[0], x[1], x[2])) < 0)
+            mouth = body;
     }
-    if (mouth) { v[0] = mouth->flow.x; v[1] = mouth->flow.y; v[2] = mouth->flow.z; v[3] = 1; }
+    if (mouth) {
+        v[0] = mouth->flow.x;
+        v[1] = mouth->flow.y;
+        v[2] = mouth->flow.z;
+        v[3] = 1;
+    }
     return mouth;
 }
 
-/* ==== [[state]] what a simulation is =============================================================== */
+/* ==== [[state]] what a simulation is ========================================================== */
 
-/* What a block of particles reports of a pass; extremes only, so that the order of blocks cannot matter. */
+/* What a block of particles reports of a pass; extremes only, so that the order of blocks cannot
+ * matter. */
 typedef struct gs4i_report {
     gs4_real max_speed, max_gradient, min_J, max_J, max_viscosity /* kinematic */, max_sound;
-    int strayed;                        /* particles outside of the tile: sort and try again */
-    gs4_real max_stiffness;             /* elastic, over density: squared speed of elastic waves */
-    int hard, split, bounded;           /* particles that need the robust local integrator; that took it; whose stretch was bounded */
-    uint64_t rows;                      /* of the tile that its particles touch */
-    int left;                           /* particles that went out through an open wall */
-    int bad; uint32_t bad_id;           /* a particle that cannot be trusted, 1 + reason */
+    int strayed;            /* particles outside of the tile: sort and try again */
+    gs4_real max_stiffness; /* elastic, over density: squared speed of elastic waves */
+    /* particles that need the robust local integrator; that took it; whose stretch was bounded */
+    int hard, split, bounded;
+    uint64_t rows; /* of the tile that its particles touch */
+    int left;      /* particles that went out through an open wall */
+    int bad;
+    uint32_t bad_id; /* a particle that cannot be trusted, 1 + reason */
 } gs4i_report;
 
 typedef struct gs4i_emitter {
     gs4_emitter is;
-    int body;                           /* its mouth among the bodies */
-    double drift[3], looked[3];         /* how far the lattice has moved through the mouth; and when last looked at */
+    int body; /* its mouth among the bodies */
+    /* how far the lattice has moved through the mouth; and when last looked at */
+    double drift[3], looked[3];
     int begun;
 } gs4i_emitter;
 
 /* Heat on nodes: only while a step is made, see [[conduction]]. */
-enum { GS4I_HEAT_T, GS4I_HEAT_K, GS4I_HEAT_FILL, GS4I_HEAT_HOLDS, GS4I_HEAT_MIX, GS4I_HEAT_DIAGONAL, GS4I_HEAT_RHS, GS4I_HEAT_X, GS4I_HEAT_FACES, GS4I_HEAT_FIELDS = GS4I_HEAT_FACES + 3 };
+enum {
+    GS4I_HEAT_T,
+    GS4I_HEAT_K,
+    GS4I_HEAT_FILL,
+    GS4I_HEAT_HOLDS,
+    GS4I_HEAT_MIX,
+    GS4I_HEAT_DIAGONAL,
+    GS4I_HEAT_RHS,
+    GS4I_HEAT_X,
+    GS4I_HEAT_FACES,
+    GS4I_HEAT_FIELDS = GS4I_HEAT_FACES + 3
+};
 typedef struct gs4i_conduction {
-    gs4_real *content, *source; int slots;  /* 4 a node: m c, m c T**, V / k_eff, V -> what gs4i_heat_back says; source (W), mixing (W/K), 0, 0 -> the same; NULL where there is none */
-    int heats;                          /* some material is heated by viscosity */
-    int low[3], size[3];                /* the box: its first node, and how many there are along each axis */
-    uint8_t *kind; gs4_real *field[GS4I_HEAT_FIELDS]; size_t room;  /* T**; K; m^3 of material per m^3; J/(m^3 K); W/(m^3 K) of mixing; diagonal, J/(m^3 K); J/m^3; T~ - T**; faces of each axis */
-    int exposed, linked;                /* air or a body is isothermal; or a wall */
-    double *outer;                      /* with periodic walls: x, r, p, A p, see gs4i_solve_periodic */
+    /* 4 a node: m c, m c T**, V / k_eff, V -> what gs4i_heat_back says; source (W), mixing
+     * (W/K), 0, 0 -> the same; NULL where there is none */
+    gs4_real *content, *source;
+    int slots;
+    int heats; /* some material is heated by viscosity */
+    /* the box: its first node, and how many there are along each axis */
+    int low[3], size[3];
+    /* T**; K; m^3 of material per m^3; J/(m^3 K); W/(m^3 K) of mixing; diagonal, J/(m^3 K);
+     * J/m^3; T~ - T**; faces of each axis */
+    uint8_t *kind;
+    gs4_real *field[GS4I_HEAT_FIELDS];
+    size_t room;
+    int exposed, linked; /* air or a body is isothermal; or a wall */
+    /* with periodic walls: x, r, p, A p, see gs4i_solve_periodic */
+    double *outer;
     gs4i_solver solver;
-    int iterations; double residual;    /* of the last solve */
+    int iterations;
+    double residual; /* of the last solve */
 } gs4i_conduction;
 
-typedef enum gs4i_clock { GS4I_CLOCK_SORT, GS4I_CLOCK_SOLVE, GS4I_CLOCK_TOTAL, GS4I_CLOCKS } gs4i_clock;
+typedef enum gs4i_clock {
+    GS4I_CLOCK_SORT,
+    GS4I_CLOCK_SOLVE,
+    GS4I_CLOCK_TOTAL,
+    GS4I_CLOCKS
+} gs4i_clock;
 
 struct gs4_sim {
     gs4_sim_desc desc;
@@ -6222,25 +8138,38 @@ struct gs4_sim {
     gs4i_boundary boundary;
     gs4i_ghosts ghosts;
     gs4i_conduction conduction;
-    gs4i_law *laws, *frozen; int material_count, material_capacity, frozen_capacity;    /* of each material; of its solid phase */
-    gs4i_emitter *emitters; int emitter_count, emitter_capacity;
-    gs4i_report *reports; int report_capacity;      /* per occupied block */
-    gs4i_report worst;                  /* extremes of the present state, as far as steps have seen them */
-    gs4i_rule rule, warm;               /* of this step; the same for heat */
+    /* of each material; of its solid phase */
+    gs4i_law *laws, *frozen;
+    int material_count, material_capacity, frozen_capacity;
+    gs4i_emitter *emitters;
+    int emitter_count, emitter_capacity;
+    gs4i_report *reports;
+    int report_capacity; /* per occupied block */
+    /* extremes of the present state, as far as steps have seen them */
+    gs4i_report worst;
+    gs4i_rule rule, warm; /* of this step; the same for heat */
     double time, last_dt, seconds[GS4I_CLOCKS];
-    uint64_t steps, split, bounded;     /* stress integrated robustly, bounded: particles and steps so far */
+    /* stress integrated robustly, bounded: particles and steps so far */
+    uint64_t steps, split, bounded;
     uint32_t next_id;
-    gs4_real min_mass;                  /* of any particle so far */
-    gs4_real fastest;                   /* any speed that was ever set: chooses a sound speed where none is given */
-    gs4_real shift;                     /* of the rates of positions, left by the last step */
-    int afresh, unsorted, unseen;       /* start rates anew; sort before the next step; `worst` is out of date */
-    gs4_real stage_limit;               /* stable dt by what the stage of the last step saw; 0: it did not get there */
-    int edited;                         /* by hand, not checked yet */
-    int unturned;                       /* velocities were set by hand: how solids turn must be found out */
+    gs4_real min_mass; /* of any particle so far */
+    /* any speed that was ever set: chooses a sound speed where none is given */
+    gs4_real fastest;
+    gs4_real shift; /* of the rates of positions, left by the last step */
+    /* start rates anew; sort before the next step; `worst` is out of date */
+    int afresh, unsorted, unseen;
+    /* stable dt by what the stage of the last step saw; 0: it did not get there */
+    gs4_real stage_limit;
+    int edited; /* by hand, not checked yet */
+    /* velocities were set by hand: how solids turn must be found out */
+    int unturned;
     char error[320];
 };
 
-static double gs4i_now(const gs4_sim *sim) { return sim->desc.now ? sim->desc.now(sim->desc.now_user) : 0; }
+static double gs4i_now(const gs4_sim *sim)
+{
+    return sim->desc.now ? sim->desc.now(sim->desc.now_user) : 0;
+}
 
 static void gs4i_report_clear(gs4i_report *r)
 {
@@ -6258,9 +8187,14 @@ static void gs4i_report_merge(gs4i_report *into, const gs4i_report *r)
     into->max_viscosity = gs4i_max(into->max_viscosity, r->max_viscosity);
     into->max_sound = gs4i_max(into->max_sound, r->max_sound);
     into->max_stiffness = gs4i_max(into->max_stiffness, r->max_stiffness);
-    into->split += r->split; into->bounded += r->bounded;
-    into->strayed += r->strayed; into->left += r->left;
-    if (r->bad && !into->bad) { into->bad = r->bad; into->bad_id = r->bad_id; }
+    into->split += r->split;
+    into->bounded += r->bounded;
+    into->strayed += r->strayed;
+    into->left += r->left;
+    if (r->bad && !into->bad) {
+        into->bad = r->bad;
+        into->bad_id = r->bad_id;
+    }
 }
 
 /* The law of a particle in its phase. */
@@ -6270,39 +8204,53 @@ GS4I_INLINE const gs4i_law *gs4i_law_of(const gs4_sim *sim, size_t i)
     return p->liquid && !p->liquid[i] ? &sim->frozen[p->material[i]] : &sim->laws[p->material[i]];
 }
 
-/* --- errors in words ------------------------------------------------------------------------------------ */
+/* --- errors in words -------------------------------------------------------------------------- */
 
 static int gs4i_fail(gs4_sim *sim, int code, const char *what)
 {
     gs4i_text t;
-    t.at = sim->error; t.left = sizeof sim->error;
+    t.at = sim->error;
+    t.left = sizeof sim->error;
     gs4i_put(&t, what);
     if (sim->desc.log) sim->desc.log(2, sim->error, sim->desc.log_user);
     return code;
 }
 
 /* "<before><value><after>" */
-static int gs4i_fail_value(gs4_sim *sim, int code, const char *before, double value, const char *after)
+static int gs4i_fail_value(gs4_sim *sim, int code, const char *before, double value,
+                           const char *after)
 {
     char line[320];
     gs4i_text t;
-    t.at = line; t.left = sizeof line;
-    gs4i_put(&t, before); gs4i_put_real(&t, value); gs4i_put(&t, after);
+    t.at = line;
+    t.left = sizeof line;
+    gs4i_put(&t, before);
+    gs4i_put_real(&t, value);
+    gs4i_put(&t, after);
     return gs4i_fail(sim, code, line);
 }
 
-static int gs4i_fail_memory(gs4_sim *sim) { return gs4i_fail(sim, GS4_ERROR_MEMORY, "out of memory; nothing has changed"); }
+static int gs4i_fail_memory(gs4_sim *sim)
+{
+    return gs4i_fail(sim, GS4_ERROR_MEMORY, "out of memory; nothing has changed");
+}
 
-/* --- passes over nodes ----------------------------------------------------------------------------------- */
+/* --- passes over nodes ------------------------------------------------------------------------ */
 
 /* The velocities of nodes whose gradients particles see. */
-GS4I_INLINE const gs4_real *gs4i_seen_nodes(const gs4i_grid *g) { return g->with_sharp ? g->sharp : g->momentum; }
+GS4I_INLINE const gs4_real *gs4i_seen_nodes(const gs4i_grid *g)
+{
+    return g->with_sharp ? g->sharp : g->momentum;
+}
 
-enum { GS4I_GROUP = 16 };               /* blocks a task */
+enum {
+    GS4I_GROUP = 16
+}; /* blocks a task */
 
 typedef struct gs4i_node_pass {
     gs4_sim *sim;
-    gs4_real lightest;                  /* nodes with less mass are empty: what they hold is below rounding */
+    /* nodes with less mass are empty: what they hold is below rounding */
+    gs4_real lightest;
 } gs4i_node_pass;
 
 GS4I_INLINE int gs4i_group_end(const gs4i_grid *g, int index)
@@ -6310,19 +8258,33 @@ GS4I_INLINE int gs4i_group_end(const gs4i_grid *g, int index)
     return (index + 1) * GS4I_GROUP < g->active ? (index + 1) * GS4I_GROUP : g->active;
 }
 
-static int gs4i_groups(const gs4_sim *sim) { return (sim->grid.active + GS4I_GROUP - 1) / GS4I_GROUP; }
+static int gs4i_groups(const gs4_sim *sim)
+{
+    return (sim->grid.active + GS4I_GROUP - 1) / GS4I_GROUP;
+}
 
-/* ==== [[transfer]] particles to nodes and back ===================================================== *
+/* ==== [[transfer]] particles to nodes and back ================================================= *
  *
- * Each kernel does one occupied block, batch after batch: load, predict, weights; then 27 nodes a particle, one particle
- * after another; what particles do by themselves in between goes in lanes. Kernels that scatter run colour by colour, so
- * that no two tiles in work share a node; sums within a block run in the order of its particles. */
+ * Each kernel does one occupied block, batch after batch: load, predict, weights; then 27 nodes
+ * a particle, one particle after another; what particles do by themselves in between goes in
+ * lanes. Kernels that scatter run colour by colour, so that no two tiles in work share a node;
+ * sums within a block run in the order of its particles. */
 
-#define GS4I_J_LOW GS4I_C(0.0625)       /* a volume ratio outside of this range is refused */
+#define GS4I_J_LOW GS4I_C(0.0625) /* a volume ratio outside of this range is refused */
 #define GS4I_J_HIGH GS4I_C(16)
-enum { GS4I_BAD_VOLUME = 1, GS4I_BAD_MOTION, GS4I_BAD_VISCOSITY, GS4I_BAD_STRESS, GS4I_BAD_DEFORMATION };
+enum {
+    GS4I_BAD_VOLUME = 1,
+    GS4I_BAD_MOTION,
+    GS4I_BAD_VISCOSITY,
+    GS4I_BAD_STRESS,
+    GS4I_BAD_DEFORMATION
+};
 
-typedef struct gs4i_pass { gs4_sim *sim; const int32_t *blocks; int count; } gs4i_pass;
+typedef struct gs4i_pass {
+    gs4_sim *sim;
+    const int32_t *blocks;
+    int count;
+} gs4i_pass;
 
 GS4I_INLINE gs4i_frame gs4i_tile_frame(const gs4i_grid *g, uint32_t block)
 {
@@ -6330,12 +8292,16 @@ GS4I_INLINE gs4i_frame gs4i_tile_frame(const gs4i_grid *g, uint32_t block)
     int at[3], a;
     gs4i_block_coordinates(g, block, at);
     for (a = 0; a < 3; a++) f.first[a] = GS4I_C(4 * at[a] - 6);
-    f.origin[0] = g->origin.x; f.origin[1] = g->origin.y; f.origin[2] = g->origin.z; f.inv_h = g->inv_h;
+    f.origin[0] = g->origin.x;
+    f.origin[1] = g->origin.y;
+    f.origin[2] = g->origin.z;
+    f.inv_h = g->inv_h;
     return f;
 }
 
 /* S2: a batch and its weights at the predicted positions. */
-GS4I_INLINE void gs4i_stage_batch(const gs4i_particles *p, size_t i, int n, gs4i_reach reach, const gs4i_frame *f, gs4i_batch *q, gs4i_stencils *s)
+GS4I_INLINE void gs4i_stage_batch(const gs4i_particles *p, size_t i, int n, gs4i_reach reach,
+                                  const gs4i_frame *f, gs4i_batch *q, gs4i_stencils *s)
 {
     gs4i_lanes x[3];
     gs4i_load_batch(p, i, n, reach, q);
@@ -6343,9 +8309,11 @@ GS4I_INLINE void gs4i_stage_batch(const gs4i_particles *p, size_t i, int n, gs4i
     gs4i_stencils_at(s, f, x);
 }
 
-/* --- what a pass sees, for its report ---------------------------------------------------------------- */
+/* --- what a pass sees, for its report --------------------------------------------------------- */
 
-typedef struct gs4i_seen { gs4i_lanes min_J, max_J, max_viscosity, max_sound, max_stiffness, speed2, gradient2; } gs4i_seen;
+typedef struct gs4i_seen {
+    gs4i_lanes min_J, max_J, max_viscosity, max_sound, max_stiffness, speed2, gradient2;
+} gs4i_seen;
 
 GS4I_INLINE void gs4i_see_nothing(gs4i_seen *r)
 {
@@ -6354,12 +8322,16 @@ GS4I_INLINE void gs4i_see_nothing(gs4i_seen *r)
     GS4I_BATCH_LOOP(b) r->min_J[b] += GS4I_HUGE;
 }
 
-GS4I_INLINE void gs4i_see_liquids(gs4i_seen *r, const gs4i_batch_laws *l, const gs4i_wide *J, const gs4i_wide *mu)
+GS4I_INLINE void gs4i_see_liquids(gs4i_seen *r, const gs4i_batch_laws *l, const gs4i_wide *J,
+                                  const gs4i_wide *mu)
 {
     int b;
     GS4I_BATCH_LOOP(b) {
-        const gs4i_wide viscosity = mu[b] * l->inv_density[b], sound = l->sound_speed[b] / (J[b] * J[b] * J[b]);     /* by (3) */
-        GS4I_WIDE_MIN(r->min_J[b], r->min_J[b], J[b]); GS4I_WIDE_MAX(r->max_J[b], r->max_J[b], J[b]);
+        /* by (3) */
+        const gs4i_wide viscosity = mu[b] * l->inv_density[b],
+                        sound = l->sound_speed[b] / (J[b] * J[b] * J[b]);
+        GS4I_WIDE_MIN(r->min_J[b], r->min_J[b], J[b]);
+        GS4I_WIDE_MAX(r->max_J[b], r->max_J[b], J[b]);
         GS4I_WIDE_MAX(r->max_viscosity[b], r->max_viscosity[b], viscosity);
         GS4I_WIDE_MAX(r->max_sound[b], r->max_sound[b], sound);
     }
@@ -6372,7 +8344,10 @@ GS4I_INLINE void gs4i_see_motion(gs4i_seen *r, gs4i_lanes v[3], gs4i_gradient L)
     int b, i;
     gs4i_gradient_squared(L, squared);
     GS4I_BATCH_LOOP(b) {
-        for (i = 0; i < 3; i++) { const gs4i_wide v2 = v[i][b] * v[i][b]; GS4I_WIDE_MAX(r->speed2[b], r->speed2[b], v2); }
+        for (i = 0; i < 3; i++) {
+            const gs4i_wide v2 = v[i][b] * v[i][b];
+            GS4I_WIDE_MAX(r->speed2[b], r->speed2[b], v2);
+        }
         GS4I_WIDE_MAX(r->gradient2[b], r->gradient2[b], squared[b]);
     }
 }
@@ -6389,26 +8364,35 @@ static void gs4i_report_liquids(gs4i_report *r, const gs4i_seen *s)
 {
     int n;
     for (n = 0; n < GS4I_BATCH; n++) r->min_J = gs4i_min(r->min_J, GS4I_NTH_CONST(s->min_J, n));
-    r->max_J = gs4i_largest(s->max_J); r->max_viscosity = gs4i_largest(s->max_viscosity); r->max_sound = gs4i_largest(s->max_sound);
+    r->max_J = gs4i_largest(s->max_J);
+    r->max_viscosity = gs4i_largest(s->max_viscosity);
+    r->max_sound = gs4i_largest(s->max_sound);
     r->max_stiffness = gs4i_largest(s->max_stiffness);
 }
 
 static void gs4i_report_motion(gs4i_report *r, const gs4i_seen *s)
 {
-    r->max_speed = gs4i_largest(s->speed2); r->max_gradient = gs4i_largest(s->gradient2);
+    r->max_speed = gs4i_largest(s->speed2);
+    r->max_gradient = gs4i_largest(s->gradient2);
 }
 
 GS4I_INLINE void gs4i_see_bad(gs4i_report *r, int reason, uint32_t id)
 {
-    if (!r->bad) { r->bad = reason; r->bad_id = id; }
+    if (!r->bad) {
+        r->bad = reason;
+        r->bad_id = id;
+    }
 }
 
-/* Volume ratios and viscosities that cannot be trusted: seen at once in lanes, looked for one by one only when there are some. */
-GS4I_INLINE void gs4i_check_liquids(gs4i_report *r, gs4i_lanes J, gs4i_lanes mu, const uint32_t *id, int n)
+/* Volume ratios and viscosities that cannot be trusted: seen at once in lanes, looked for one by
+ * one only when there are some. */
+GS4I_INLINE void gs4i_check_liquids(gs4i_report *r, gs4i_lanes J, gs4i_lanes mu, const uint32_t *id,
+                                    int n)
 {
     int b, good = 1;
     GS4I_BATCH_LOOP(b) {
-        const gs4i_wide_mask fine = (J[b] > GS4I_J_LOW) & (J[b] < GS4I_J_HIGH) & (mu[b] >= GS4I_C(0)) & (mu[b] < GS4I_HUGE);
+        const gs4i_wide_mask fine =
+            (J[b] > GS4I_J_LOW) & (J[b] < GS4I_J_HIGH) & (mu[b] >= GS4I_C(0)) & (mu[b] < GS4I_HUGE);
         good &= gs4i_all(&fine);
     }
     for (b = 0; b < n && !good; b++) {
@@ -6418,13 +8402,18 @@ GS4I_INLINE void gs4i_check_liquids(gs4i_report *r, gs4i_lanes J, gs4i_lanes mu,
     }
 }
 
-/* --- stress with a memory -------------------------------------------------------------------------------- */
+/* --- stress with a memory --------------------------------------------------------------------- */
 
 /* Laws of materials whose stress depends on what was before. */
-typedef struct gs4i_history_laws { gs4i_elastic_laws elastic; gs4i_solid_laws solid; } gs4i_history_laws;
+typedef struct gs4i_history_laws {
+    gs4i_elastic_laws elastic;
+    gs4i_solid_laws solid;
+} gs4i_history_laws;
 
 /* What is stiff: squared speed of elastic waves, and particles where it is no number. */
-static void gs4i_see_stiffness(const gs4i_particles *p, size_t i, int n, const gs4i_batch_laws *laws, gs4i_lanes stiffness, gs4i_seen *seen, gs4i_report *report)
+static void gs4i_see_stiffness(const gs4i_particles *p, size_t i, int n,
+                               const gs4i_batch_laws *laws, gs4i_lanes stiffness, gs4i_seen *seen,
+                               gs4i_report *report)
 {
     int b, good = 1;
     GS4I_BATCH_LOOP(b) {
@@ -6433,12 +8422,16 @@ static void gs4i_see_stiffness(const gs4i_particles *p, size_t i, int n, const g
         GS4I_WIDE_MAX(seen->max_stiffness[b], seen->max_stiffness[b], speed2);
         good &= gs4i_all(&fine);
     }
-    for (b = 0; b < n && !good; b++) if (!(GS4I_NTH(stiffness, b) < GS4I_HUGE)) gs4i_see_bad(report, GS4I_BAD_STRESS, p->id[i + (size_t)b]);
+    for (b = 0; b < n && !good; b++)
+        if (!(GS4I_NTH(stiffness, b) < GS4I_HUGE))
+            gs4i_see_bad(report, GS4I_BAD_STRESS, p->id[i + (size_t)b]);
 }
 
-/* Adds the non-local stress of the stage (GS4) or of now (Euler) to sigma, for particles i to i + n. */
-static void gs4i_add_elastic(const gs4i_particles *p, size_t i, int n, const gs4i_rule *rule, const gs4i_batch_laws *laws, gs4i_elastic_laws *l,
-                             gs4i_gradient L, gs4i_symmetric sigma, gs4i_seen *seen, gs4i_report *report)
+/* Adds the non-local stress of the stage (GS4) or of now (Euler) to sigma, for particles i to i
+ * + n. */
+static void gs4i_add_elastic(const gs4i_particles *p, size_t i, int n, const gs4i_rule *rule,
+                             const gs4i_batch_laws *laws, gs4i_elastic_laws *l, gs4i_gradient L,
+                             gs4i_symmetric sigma, gs4i_seen *seen, gs4i_report *report)
 {
     gs4i_elastic e;
     gs4i_elastic_count count = { 0, 0, 0 };
@@ -6448,9 +8441,12 @@ static void gs4i_add_elastic(const gs4i_particles *p, size_t i, int n, const gs4
     gs4i_take_elastic_laws(laws, l);
     gs4i_moduli(l, L, G);
     gs4i_load_elastic(p->elastic + (size_t)p->elastic_reals * i, p->elastic_reals, n, &e);
-    if (p->with_rates) gs4i_stage_elastic(l, G, &e, rule, L, n, s, &count);
-    else memcpy(s, e.s, sizeof s);
-    for (c = 0; c < 6; c++) GS4I_BATCH_LOOP(b) sigma[c][b] += s[c][b];
+    if (p->with_rates)
+        gs4i_stage_elastic(l, G, &e, rule, L, n, s, &count);
+    else
+        memcpy(s, e.s, sizeof s);
+    for (c = 0; c < 6; c++)
+        GS4I_BATCH_LOOP(b) sigma[c][b] += s[c][b];
     gs4i_see_elastic(G, s, stiffness);
     gs4i_see_stiffness(p, i, n, laws, stiffness, seen, report);
     if (count.failed) gs4i_see_bad(report, GS4I_BAD_STRESS, p->id[i + (size_t)count.failed - 1]);
@@ -6458,8 +8454,9 @@ static void gs4i_add_elastic(const gs4i_particles *p, size_t i, int n, const gs4
 }
 
 /* S7 of the non-local stress; with `commit` 0 only whether it can be done. */
-static void gs4i_advance_elastic(const gs4i_particles *p, size_t i, int n, const gs4i_rule *rule, const gs4i_batch_laws *laws, gs4i_elastic_laws *l,
-                                 gs4i_gradient L, gs4i_report *report, int commit)
+static void gs4i_advance_elastic(const gs4i_particles *p, size_t i, int n, const gs4i_rule *rule,
+                                 const gs4i_batch_laws *laws, gs4i_elastic_laws *l, gs4i_gradient L,
+                                 gs4i_report *report, int commit)
 {
     gs4i_elastic e;
     gs4i_elastic_count count = { 0, 0, 0 };
@@ -6467,60 +8464,75 @@ static void gs4i_advance_elastic(const gs4i_particles *p, size_t i, int n, const
     gs4i_rule euler = *rule;
     gs4i_take_elastic_laws(laws, l);
     gs4i_load_elastic(at, p->elastic_reals, n, &e);
-    euler.alpha_m = euler.alpha_f = euler.gamma = 1; euler.afresh = 0;
+    euler.alpha_m = euler.alpha_f = euler.gamma = 1;
+    euler.afresh = 0;
     gs4i_correct_elastic(l, &e, p->with_rates ? rule : &euler, L, n, &count);
     if (count.failed) gs4i_see_bad(report, GS4I_BAD_STRESS, p->id[i + (size_t)count.failed - 1]);
     if (!commit) return;
-    report->split += count.split; report->bounded += count.bounded;
+    report->split += count.split;
+    report->bounded += count.bounded;
     gs4i_store_elastic(at, p->elastic_reals, n, &e);
 }
 
 /* The same of solids: their stress at the stage, where the volume ratio is J, or now. */
-static void gs4i_add_solid(const gs4i_particles *p, size_t i, int n, const gs4i_rule *rule, const gs4i_batch_laws *laws, gs4i_solid_laws *l,
-                           gs4i_gradient L, const gs4i_wide *J, gs4i_symmetric sigma, gs4i_seen *seen, gs4i_report *report)
+static void gs4i_add_solid(const gs4i_particles *p, size_t i, int n, const gs4i_rule *rule,
+                           const gs4i_batch_laws *laws, gs4i_solid_laws *l, gs4i_gradient L,
+                           const gs4i_wide *J, gs4i_symmetric sigma, gs4i_seen *seen,
+                           gs4i_report *report)
 {
     gs4i_deformation e;
     gs4i_solid_count count = { 0, 0, 0 };
     gs4i_lanes stiffness;
     if (!gs4i_take_solid_laws(laws, l)) return;
-    gs4i_load_deformation(p->deformation + (size_t)p->deformation_reals * i, p->deformation_reals, n, &e);
+    gs4i_load_deformation(p->deformation + (size_t)p->deformation_reals * i, p->deformation_reals,
+                          n, &e);
     if (p->with_rates) gs4i_stage_solid(l, &e, rule, L, n, &count);
     gs4i_solid_stress(l, e.F, J, sigma, stiffness);
     gs4i_see_stiffness(p, i, n, laws, stiffness, seen, report);
-    if (count.failed) gs4i_see_bad(report, GS4I_BAD_DEFORMATION, p->id[i + (size_t)count.failed - 1]);
+    if (count.failed)
+        gs4i_see_bad(report, GS4I_BAD_DEFORMATION, p->id[i + (size_t)count.failed - 1]);
 }
 
-/* S7 of F, to the volume ratio J, and of w, but for Euler; with `commit` 0 only whether it can be done. */
-static void gs4i_advance_solid(const gs4i_particles *p, size_t i, int n, const gs4i_rule *rule, const gs4i_batch_laws *laws, gs4i_solid_laws *l,
-                               gs4i_gradient L, gs4i_kicks *kicks, const gs4i_wide *J, gs4i_report *report, int commit)
+/* S7 of F, to the volume ratio J, and of w, but for Euler; with `commit` 0 only whether it can
+ * be done. */
+static void gs4i_advance_solid(const gs4i_particles *p, size_t i, int n, const gs4i_rule *rule,
+                               const gs4i_batch_laws *laws, gs4i_solid_laws *l, gs4i_gradient L,
+                               gs4i_kicks *kicks, const gs4i_wide *J, gs4i_report *report,
+                               int commit)
 {
     gs4i_deformation e;
     gs4i_solid_count count = { 0, 0, 0 };
     gs4_real *at = p->deformation + (size_t)p->deformation_reals * i;
     gs4i_rule euler = *rule;
-    if (!gs4i_take_solid_laws(laws, l)) gs4i_let_flow(L, J, &e);
+    if (!gs4i_take_solid_laws(laws, l))
+        gs4i_let_flow(L, J, &e);
     else {
         gs4i_load_deformation(at, p->deformation_reals, n, &e);
-        euler.alpha_m = euler.alpha_f = euler.gamma = 1; euler.afresh = 0;
+        euler.alpha_m = euler.alpha_f = euler.gamma = 1;
+        euler.afresh = 0;
         gs4i_correct_solid(l, &e, p->with_rates ? rule : &euler, L, J, n, &count);
         if (p->with_rates) gs4i_correct_turning(l, &e, rule, L, kicks);
     }
-    if (count.failed) gs4i_see_bad(report, GS4I_BAD_DEFORMATION, p->id[i + (size_t)count.failed - 1]);
+    if (count.failed)
+        gs4i_see_bad(report, GS4I_BAD_DEFORMATION, p->id[i + (size_t)count.failed - 1]);
     if (!commit) return;
-    report->split += count.split; report->bounded += count.bounded;
+    report->split += count.split;
+    report->bounded += count.bounded;
     gs4i_store_deformation(at, p->deformation_reals, n, &e);
 }
 
-/* --- S3 ---------------------------------------------------------------------------------------------- */
+/* --- S3 --------------------------------------------------------------------------------------- */
 
 /* tile += w_ij q, for particle n of a batch */
-GS4I_INLINE void gs4i_scatter_quad(gs4_real *tile, const gs4i_stencils *s, int n, const gs4_real *from)
+GS4I_INLINE void gs4i_scatter_quad(gs4_real *tile, const gs4i_stencils *s, int n,
+                                   const gs4_real *from)
 {
     gs4i_row w, p, r, t;
     gs4i_quad q;
     int j, k;
     GS4I_LOAD(q, from);
-    gs4i_row_of_nodes(&w, GS4I_NTH_CONST(s->w[0][0], n), GS4I_NTH_CONST(s->w[0][1], n), GS4I_NTH_CONST(s->w[0][2], n));
+    gs4i_row_of_nodes(&w, GS4I_NTH_CONST(s->w[0][0], n), GS4I_NTH_CONST(s->w[0][1], n),
+                      GS4I_NTH_CONST(s->w[0][2], n));
     gs4i_row_of_quad(&p, &q);
     GS4I_ROW_MUL(p, w, p);
     for (k = 0; k < 3; k++) {
@@ -6534,23 +8546,41 @@ GS4I_INLINE void gs4i_scatter_quad(gs4_real *tile, const gs4i_stencils *s, int n
     }
 }
 
-/* Momentum of a batch on its way to the nodes: m v at the node in the middle, and what changes by one node along each axis. */
-typedef struct gs4i_affine_forces { gs4_real middle[4 * GS4I_BATCH], x[4 * GS4I_BATCH], y[4 * GS4I_BATCH], z[4 * GS4I_BATCH]; } gs4i_affine_forces;
+/* Momentum of a batch on its way to the nodes: m v at the node in the middle, and what changes
+ * by one node along each axis. */
+typedef struct gs4i_affine_forces {
+    gs4_real middle[4 * GS4I_BATCH], x[4 * GS4I_BATCH], y[4 * GS4I_BATCH], z[4 * GS4I_BATCH];
+} gs4i_affine_forces;
 
 /* tile += w_ij (B + (i - 1) Qx + (j - 1) Qy + (k - 1) Qz), for particle n of a batch */
-GS4I_INLINE void gs4i_scatter_affine(gs4_real *tile, const gs4i_stencils *s, int n, const gs4i_affine_forces *f)
+GS4I_INLINE void gs4i_scatter_affine(gs4_real *tile, const gs4i_stencils *s, int n,
+                                     const gs4i_affine_forces *f)
 {
     gs4i_row w, wx, v, p0, p1, p2, side[3], r, t;
     gs4i_quad q;
     int j, k;
-    gs4i_row_of_nodes(&w, GS4I_NTH_CONST(s->w[0][0], n), GS4I_NTH_CONST(s->w[0][1], n), GS4I_NTH_CONST(s->w[0][2], n));
+    gs4i_row_of_nodes(&w, GS4I_NTH_CONST(s->w[0][0], n), GS4I_NTH_CONST(s->w[0][1], n),
+                      GS4I_NTH_CONST(s->w[0][2], n));
     gs4i_row_of_nodes(&wx, -GS4I_NTH_CONST(s->w[0][0], n), 0, GS4I_NTH_CONST(s->w[0][2], n));
-    GS4I_LOAD(q, f->middle + 4 * n); gs4i_row_of_quad(&v, &q); GS4I_ROW_MUL(p0, w, v);
-    GS4I_LOAD(q, f->x + 4 * n);      gs4i_row_of_quad(&v, &q); GS4I_ROW_MAD(p0, wx, v);
-    GS4I_LOAD(q, f->y + 4 * n);      gs4i_row_of_quad(&v, &q); GS4I_ROW_MUL(p1, w, v);
-    GS4I_LOAD(q, f->z + 4 * n);      gs4i_row_of_quad(&v, &q); GS4I_ROW_MUL(p2, w, v);
+    GS4I_LOAD(q, f->middle + 4 * n);
+    gs4i_row_of_quad(&v, &q);
+    GS4I_ROW_MUL(p0, w, v);
+    GS4I_LOAD(q, f->x + 4 * n);
+    gs4i_row_of_quad(&v, &q);
+    GS4I_ROW_MAD(p0, wx, v);
+    GS4I_LOAD(q, f->y + 4 * n);
+    gs4i_row_of_quad(&v, &q);
+    GS4I_ROW_MUL(p1, w, v);
+    GS4I_LOAD(q, f->z + 4 * n);
+    gs4i_row_of_quad(&v, &q);
+    GS4I_ROW_MUL(p2, w, v);
     for (j = 0; j < 3; j++) {
-        if (j == 0) GS4I_ROW_DIFFERENCE(side[1], p0, p1); else if (j == 1) side[1] = p0; else GS4I_ROW_SUM(side[1], p0, p1);
+        if (j == 0)
+            GS4I_ROW_DIFFERENCE(side[1], p0, p1);
+        else if (j == 1)
+            side[1] = p0;
+        else
+            GS4I_ROW_SUM(side[1], p0, p1);
         GS4I_ROW_SPLAT_MUL(side[1], GS4I_NTH_CONST(s->w[1][j], n), side[1]);
         GS4I_ROW_SPLAT_MUL(t, GS4I_NTH_CONST(s->w[1][j], n), p2);
         GS4I_ROW_DIFFERENCE(side[0], side[1], t);
@@ -6577,11 +8607,14 @@ GS4I_INLINE void gs4i_affine_bound(gs4i_gradient C, gs4_real dt, gs4i_lanes boun
         bound[b] = (squared[b] - squared[b]) + GS4I_C(1);
     }
     for (b = 0; b < GS4I_BATCH && !good; b++)
-        if (GS4I_NTH(squared, b) > limit) GS4I_NTH(bound, b) = GS4I_SQRT(limit / GS4I_NTH(squared, b));
+        if (GS4I_NTH(squared, b) > limit)
+            GS4I_NTH(bound, b) = GS4I_SQRT(limit / GS4I_NTH(squared, b));
 }
 
-/* Solids turn about their particles too: m v~ + m w~ x (x_i - x~) for particles i to i + n. 0 where none of them turns. */
-static int gs4i_turning_momentum(const gs4i_particles *p, size_t i, int n, const gs4i_stencils *s, gs4_real h, const gs4i_rule *rule, const gs4i_wide *mass,
+/* Solids turn about their particles too: m v~ + m w~ x (x_i - x~) for particles i to i + n. 0
+ * where none of them turns. */
+static int gs4i_turning_momentum(const gs4i_particles *p, size_t i, int n, const gs4i_stencils *s,
+                                 gs4_real h, const gs4i_rule *rule, const gs4i_wide *mass,
                                  gs4i_lanes mv[3], gs4i_affine_forces *f)
 {
     gs4_real own[4 * GS4I_BATCH], any = 0;
@@ -6589,20 +8622,32 @@ static int gs4i_turning_momentum(const gs4i_particles *p, size_t i, int n, const
     gs4i_gradient Q;
     int a, b, c;
     for (b = 0; b < n; b++) {
-        const gs4_real *turning = p->deformation + (size_t)p->deformation_reals * (i + (size_t)b) + 18;
-        for (a = 0; a < 3; a++) { own[4 * b + a] = turning[a] + rule->reach.ahead * turning[a + 3]; any += gs4i_abs(own[4 * b + a]); }
+        const gs4_real *turning =
+            p->deformation + (size_t)p->deformation_reals * (i + (size_t)b) + 18;
+        for (a = 0; a < 3; a++) {
+            own[4 * b + a] = turning[a] + rule->reach.ahead * turning[a + 3];
+            any += gs4i_abs(own[4 * b + a]);
+        }
         own[4 * b + 3] = 0;
     }
     if (!(any > 0)) return 0;
     gs4i_to_lanes(own, n, w);
     memset(Q, 0, sizeof Q);
-    for (c = 0; c < 3; c++) {                               /* w x r as a matrix: Q_ji = w_k, Q_ij = -w_k for i, j, k in turn */
+    /* w x r as a matrix: Q_ji = w_k, Q_ij = -w_k for i, j, k in turn */
+    for (c = 0; c < 3; c++) {
         const int j = (c + 1) % 3, k = (c + 2) % 3;
-        GS4I_BATCH_LOOP(b) { Q[j][c][b] = w[k][b]; Q[c][j][b] = -w[k][b]; }
+        GS4I_BATCH_LOOP(b) {
+            Q[j][c][b] = w[k][b];
+            Q[c][j][b] = -w[k][b];
+        }
     }
     gs4i_affine_bound(Q, rule->dt, bound);
-    for (a = 0; a < 9; a++) GS4I_BATCH_LOOP(b) Q[a / 3][a % 3][b] *= bound[b] * (h * mass[b]);
-    for (c = 0; c < 3; c++) GS4I_BATCH_LOOP(b) mv[c][b] -= Q[c][0][b] * s->xi[0][b] + Q[c][1][b] * s->xi[1][b] + Q[c][2][b] * s->xi[2][b];
+    for (a = 0; a < 9; a++)
+        GS4I_BATCH_LOOP(b) Q[a / 3][a % 3][b] *= bound[b] * (h * mass[b]);
+    for (c = 0; c < 3; c++)
+        GS4I_BATCH_LOOP(b)
+            mv[c][b] -=
+                Q[c][0][b] * s->xi[0][b] + Q[c][1][b] * s->xi[1][b] + Q[c][2][b] * s->xi[2][b];
     gs4i_from_lanes(mv[0], mv[1], mv[2], mass, f->middle);
     gs4i_from_lanes(Q[0][0], Q[1][0], Q[2][0], w[3], f->x);
     gs4i_from_lanes(Q[0][1], Q[1][1], Q[2][1], w[3], f->y);
@@ -6615,7 +8660,7 @@ static void gs4i_scatter_momentum(int index, void *context)
 {
     const gs4i_pass *pass = (const gs4i_pass *)context;
     gs4_sim *sim = pass->sim;
-    const gs4i_particles p = sim->particles;               /* a copy: stores cannot alias it */
+    const gs4i_particles p = sim->particles; /* a copy: stores cannot alias it */
     const gs4i_reach reach = sim->rule.reach;
     const int o = pass->blocks[index];
     const gs4i_frame frame = gs4i_tile_frame(&sim->grid, sim->grid.occupied_block[o]);
@@ -6636,14 +8681,22 @@ static void gs4i_scatter_momentum(int index, void *context)
         int b, c, turns;
         gs4i_tile_prefetch(&sim->grid, o, row, sim->grid.momentum);
         gs4i_stage_batch(&p, i, n, reach, &frame, &q, &s);
-        for (c = 0; c < 3; c++) GS4I_BATCH_LOOP(b) mv[c][b] = q.x[3][b] * (q.v[c][b] + reach.ahead * q.a[c][b]);
+        for (c = 0; c < 3; c++)
+            GS4I_BATCH_LOOP(b) mv[c][b] = q.x[3][b] * (q.v[c][b] + reach.ahead * q.a[c][b]);
         gs4i_from_lanes(mv[0], mv[1], mv[2], q.x[3], momentum);
-        turns = p.deformation_reals && gs4i_turning_momentum(&p, i, n, &s, sim->grid.h, &sim->rule, q.x[3], mv, &turning);
+        turns =
+            p.deformation_reals
+            && gs4i_turning_momentum(&p, i, n, &s, sim->grid.h, &sim->rule, q.x[3], mv, &turning);
         for (b = 0; b < n; b++) {
-            if (s.base[b] < 0) { strayed++; continue; }
+            if (s.base[b] < 0) {
+                strayed++;
+                continue;
+            }
             rows |= gs4i_touched_rows(s.base[b]);
-            if (turns) gs4i_scatter_affine(tile, &s, b, &turning);
-            else gs4i_scatter_quad(tile, &s, b, momentum + 4 * b);
+            if (turns)
+                gs4i_scatter_affine(tile, &s, b, &turning);
+            else
+                gs4i_scatter_quad(tile, &s, b, momentum + 4 * b);
         }
     }
     sim->reports[o].strayed = strayed;
@@ -6674,39 +8727,57 @@ static void gs4i_see_turning_task(int index, void *context)
             if (!(gs4i_law_of(sim, i + (size_t)b)->shear_modulus > 0)) continue;
             gs4i_x_weights(&s, b, &w, &d);
             gs4i_gather_local(nodes + 4 * s.base[b], &s, b, &w, &d, &v);
-            gs4i_set_turning(&p, i + (size_t)b, gs4i_scale(gs4i_vec3(v.dy[4 * b + 2] - v.dz[4 * b + 1], v.dz[4 * b] - v.dx[4 * b + 2],
-                                                                     v.dx[4 * b + 1] - v.dy[4 * b]), GS4I_C(0.5)));
+            gs4i_set_turning(
+                &p, i + (size_t)b,
+                gs4i_scale(gs4i_vec3(v.dy[4 * b + 2] - v.dz[4 * b + 1],
+                                     v.dz[4 * b] - v.dx[4 * b + 2], v.dx[4 * b + 1] - v.dy[4 * b]),
+                           GS4I_C(0.5)));
         }
     }
 }
 
-/* --- S4, S5 ------------------------------------------------------------------------------------------ */
+/* --- S4, S5 ----------------------------------------------------------------------------------- */
 
-/* tau:D (W) of particles that viscosity heats: the stress without the pressure, whose work compression gives back. */
-static void gs4i_take_power(const gs4i_heat_laws *h, const gs4i_batch_laws *l, const gs4i_wide *J, gs4i_gradient L, gs4i_symmetric sigma, gs4i_lanes volume, gs4i_lanes power)
+/* tau:D (W) of particles that viscosity heats: the stress without the pressure, whose work
+ * compression gives back. */
+static void gs4i_take_power(const gs4i_heat_laws *h, const gs4i_batch_laws *l, const gs4i_wide *J,
+                            gs4i_gradient L, gs4i_symmetric sigma, gs4i_lanes volume,
+                            gs4i_lanes power)
 {
     int b;
     GS4I_BATCH_LOOP(b) {
         gs4i_wide p;
         gs4i_pressure(&l->tait[b], &J[b], &p);
-        power[b] = h->heating[b] * volume[b] * ((sigma[0][b] + p) * L[0][0][b] + (sigma[1][b] + p) * L[1][1][b] + (sigma[2][b] + p) * L[2][2][b]
-                 + sigma[3][b] * (L[0][1][b] + L[1][0][b]) + sigma[4][b] * (L[0][2][b] + L[2][0][b]) + sigma[5][b] * (L[1][2][b] + L[2][1][b]));
+        power[b] =
+            h->heating[b] * volume[b]
+            * ((sigma[0][b] + p) * L[0][0][b] + (sigma[1][b] + p) * L[1][1][b]
+               + (sigma[2][b] + p) * L[2][2][b] + sigma[3][b] * (L[0][1][b] + L[1][0][b])
+               + sigma[4][b] * (L[0][2][b] + L[2][0][b]) + sigma[5][b] * (L[1][2][b] + L[2][1][b]));
     }
 }
 
-/* What a kernel needs on top in a scene with heat, on the stack of such scenes alone; the kernels get NULL in others. One tile has what goes to the
- * nodes or comes from them, the other the sources, or what gives gradients for the flux: as in gs4i_conduction. */
-typedef struct gs4i_warmth { gs4i_heat_laws laws; gs4i_heat h; gs4i_heat_sent sent; const gs4i_rule *rule; gs4_real content[GS4I_TILE_REALS], source[GS4I_TILE_REALS]; } gs4i_warmth;
+/* What a kernel needs on top in a scene with heat, on the stack of such scenes alone; the
+ * kernels get NULL in others. One tile has what goes to the nodes or comes from them, the other
+ * the sources, or what gives gradients for the flux: as in gs4i_conduction. */
+typedef struct gs4i_warmth {
+    gs4i_heat_laws laws;
+    gs4i_heat h;
+    gs4i_heat_sent sent;
+    const gs4i_rule *rule;
+    gs4_real content[GS4I_TILE_REALS], source[GS4I_TILE_REALS];
+} gs4i_warmth;
 
 /* Laws see the temperature of the stage (Euler: of now). */
-static void gs4i_begin_warmth(const gs4i_particles *p, size_t i, int n, gs4_real ahead, gs4i_batch_laws *l, gs4i_warmth *w)
+static void gs4i_begin_warmth(const gs4i_particles *p, size_t i, int n, gs4_real ahead,
+                              gs4i_batch_laws *l, gs4i_warmth *w)
 {
     gs4i_load_heat(p, i, n, &w->h);
     gs4i_take_heat_laws(l, &w->laws);
     if (l->callbacks) gs4i_temperature_ahead(&w->laws, &w->h, ahead, l->temperature);
 }
 
-static void gs4i_send_warmth(const gs4i_batch_laws *l, const gs4i_wide *mass, const gs4i_wide *J, gs4i_gradient L, gs4i_symmetric sigma, int with_flux, gs4i_warmth *w)
+static void gs4i_send_warmth(const gs4i_batch_laws *l, const gs4i_wide *mass, const gs4i_wide *J,
+                             gs4i_gradient L, gs4i_symmetric sigma, int with_flux, gs4i_warmth *w)
 {
     gs4i_lanes volume, power;
     int b;
@@ -6715,10 +8786,14 @@ static void gs4i_send_warmth(const gs4i_batch_laws *l, const gs4i_wide *mass, co
     gs4i_send_heat(&w->laws, &w->h, w->rule, L, mass, volume, power, with_flux, &w->sent);
 }
 
-/* Volume and stress at the stage, J~ by rule 1, implicit in itself for known div v: (J~ - J**) / s = J~ div v. */
-GS4I_INLINE void gs4i_stage_forces(const gs4i_particles *p, size_t i, int n, const gs4i_batch *q, const gs4i_batch_laws *l, gs4i_history_laws *past,
-                                   const gs4i_rule *rule, gs4i_gradient L, const gs4_real gravity[3], int with_sharp, gs4i_forces *f, gs4i_lanes J, gs4i_lanes mu,
-                                   gs4i_seen *seen, gs4i_report *report, gs4i_warmth *warmth)
+/* Volume and stress at the stage, J~ by rule 1, implicit in itself for known div v: (J~ - J**) /
+ * s = J~ div v. */
+GS4I_INLINE void gs4i_stage_forces(const gs4i_particles *p, size_t i, int n, const gs4i_batch *q,
+                                   const gs4i_batch_laws *l, gs4i_history_laws *past,
+                                   const gs4i_rule *rule, gs4i_gradient L,
+                                   const gs4_real gravity[3], int with_sharp, gs4i_forces *f,
+                                   gs4i_lanes J, gs4i_lanes mu, gs4i_seen *seen,
+                                   gs4i_report *report, gs4i_warmth *warmth)
 {
     gs4i_symmetric sigma;
     gs4i_lanes g[3], none;
@@ -6728,11 +8803,15 @@ GS4I_INLINE void gs4i_stage_forces(const gs4i_particles *p, size_t i, int n, con
         J[b] = (q->v[3][b] + rule->before * q->a[3][b]) / (GS4I_C(1) - rule->s * div);
     }
     gs4i_liquid_stress(l, J, L, sigma, mu);
-    if (p->elastic_reals) gs4i_add_elastic(p, i, n, rule, l, &past->elastic, L, sigma, seen, report);
-    if (p->deformation_reals) gs4i_add_solid(p, i, n, rule, l, &past->solid, L, J, sigma, seen, report);
+    if (p->elastic_reals)
+        gs4i_add_elastic(p, i, n, rule, l, &past->elastic, L, sigma, seen, report);
+    if (p->deformation_reals)
+        gs4i_add_solid(p, i, n, rule, l, &past->solid, L, J, sigma, seen, report);
     if (warmth) gs4i_send_warmth(l, q->x[3], J, L, sigma, p->with_flux, warmth);
-    for (c = 0; c < 6; c++) GS4I_BATCH_LOOP(b) sigma[c][b] *= -q->x[3][b] * l->inv_density[b] * J[b];
-    for (c = 0; c < 3; c++) GS4I_BATCH_LOOP(b) g[c][b] = q->x[3][b] * gravity[c];
+    for (c = 0; c < 6; c++)
+        GS4I_BATCH_LOOP(b) sigma[c][b] *= -q->x[3][b] * l->inv_density[b] * J[b];
+    for (c = 0; c < 3; c++)
+        GS4I_BATCH_LOOP(b) g[c][b] = q->x[3][b] * gravity[c];
     memset(none, 0, sizeof none);
     gs4i_from_lanes(sigma[0], sigma[3], sigma[4], none, f->x);
     gs4i_from_lanes(sigma[3], sigma[1], sigma[5], none, f->y);
@@ -6741,20 +8820,30 @@ GS4I_INLINE void gs4i_stage_forces(const gs4i_particles *p, size_t i, int n, con
 }
 
 /* tile += (-V sigma) grad w + w m g, for particle n of a batch */
-GS4I_INLINE void gs4i_scatter_force(gs4_real *tile, const gs4i_stencils *s, int n, const gs4i_forces *f)
+GS4I_INLINE void gs4i_scatter_force(gs4_real *tile, const gs4i_stencils *s, int n,
+                                    const gs4i_forces *f)
 {
     gs4i_row p0, p1, p2, r, w, d;
     gs4i_quad q;
     gs4i_x_weights(s, n, &w, &d);
-    GS4I_LOAD(q, f->x + 4 * n);      gs4i_row_of_quad(&r, &q); GS4I_ROW_MUL(p0, d, r);
-    GS4I_LOAD(q, f->weight + 4 * n); gs4i_row_of_quad(&r, &q); GS4I_ROW_MAD(p0, w, r);
-    GS4I_LOAD(q, f->y + 4 * n);      gs4i_row_of_quad(&r, &q); GS4I_ROW_MUL(p1, w, r);
-    GS4I_LOAD(q, f->z + 4 * n);      gs4i_row_of_quad(&r, &q); GS4I_ROW_MUL(p2, w, r);
+    GS4I_LOAD(q, f->x + 4 * n);
+    gs4i_row_of_quad(&r, &q);
+    GS4I_ROW_MUL(p0, d, r);
+    GS4I_LOAD(q, f->weight + 4 * n);
+    gs4i_row_of_quad(&r, &q);
+    GS4I_ROW_MAD(p0, w, r);
+    GS4I_LOAD(q, f->y + 4 * n);
+    gs4i_row_of_quad(&r, &q);
+    GS4I_ROW_MUL(p1, w, r);
+    GS4I_LOAD(q, f->z + 4 * n);
+    gs4i_row_of_quad(&r, &q);
+    GS4I_ROW_MUL(p2, w, r);
     gs4i_scatter_rows(tile + 4 * s->base[n], &p0, &p1, &p2, s, n);
 }
 
 /* Run a scattering kernel over blocks, colour after colour. */
-static void gs4i_scatter_by_colour(gs4_sim *sim, const int32_t *blocks, const int first[9], gs4_task_fn kernel)
+static void gs4i_scatter_by_colour(gs4_sim *sim, const int32_t *blocks, const int first[9],
+                                   gs4_task_fn kernel)
 {
     gs4i_pass pass;
     int colour;
@@ -6766,26 +8855,46 @@ static void gs4i_scatter_by_colour(gs4_sim *sim, const int32_t *blocks, const in
     }
 }
 
-/* --- images behind sticky bodies ----------------------------------------------------------------------
+/* --- images behind sticky bodies -----------------------------------------------------------------
  *
- * Particles within three cells of the surface of a sticky body have an image behind it, x' = x - 2 d n, that gives the nodes what a field
- * odd about the surface needs: momentum m (2 v_body - v), stress -sigma R and weight -m g, with R = I - 2 n n. Near the surface particles see
- * the odd part of what the nodes have, u = v_body + (u(x) - u(x'))/2, and its gradient. So a body is a wall of second order wherever its surface
- * lies, as far as particles fill the space before it. Where it is too thin or too crooked for images, nodes are held: gs4i_body_hold. */
+ * Particles within three cells of the surface of a sticky body have an image behind it, x' = x -
+ * 2 d n, that gives the nodes what a field odd about the surface needs: momentum m (2 v_body -
+ * v), stress -sigma R and weight -m g, with R = I - 2 n n. Near the surface particles see the
+ * odd part of what the nodes have, u = v_body + (u(x) - u(x'))/2, and its gradient. So a body is
+ * a wall of second order wherever its surface lies, as far as particles fill the space before
+ * it. Where it is too thin or too crooked for images, nodes are held: gs4i_body_hold. */
 
-enum { GS4I_GHOST_NONE, GS4I_GHOST_IMAGE, GS4I_GHOST_HELD /* no image can be had */ };
-enum { GS4I_GHOST_MARK, GS4I_GHOST_MOMENTUM, GS4I_GHOST_AFFINE, GS4I_GHOST_FORCE };    /* what is scattered; first of all marks */
+enum {
+    GS4I_GHOST_NONE,
+    GS4I_GHOST_IMAGE,
+    GS4I_GHOST_HELD /* no image can be had */
+};
+/* what is scattered; first of all marks */
+enum {
+    GS4I_GHOST_MARK,
+    GS4I_GHOST_MOMENTUM,
+    GS4I_GHOST_AFFINE,
+    GS4I_GHOST_FORCE
+};
 
-static int gs4i_is_sticky(const gs4i_body *b) { return b->is.contact == GS4_WALL_STICK && !b->is_mouth && !b->asleep; }
+static int gs4i_is_sticky(const gs4i_body *b)
+{
+    return b->is.contact == GS4_WALL_STICK && !b->is_mouth && !b->asleep;
+}
 
 /* The sticky body nearest to p, if one is nearer than `within`; and how far it is. */
-static const gs4i_body *gs4i_nearest_sticky(const gs4i_boundary *b, gs4_vec3 p, gs4_real within, gs4_real *distance)
+static const gs4i_body *gs4i_nearest_sticky(const gs4i_boundary *b, gs4_vec3 p, gs4_real within,
+                                            gs4_real *distance)
 {
     const gs4i_body *found = NULL;
     int i;
     for (i = 0; i < b->body_count; i++) {
-        const gs4_real d = gs4i_is_sticky(&b->bodies[i]) ? gs4i_body_distance(&b->bodies[i], p) : within;
-        if (d < within) { *distance = within = d; found = &b->bodies[i]; }
+        const gs4_real d =
+            gs4i_is_sticky(&b->bodies[i]) ? gs4i_body_distance(&b->bodies[i], p) : within;
+        if (d < within) {
+            *distance = within = d;
+            found = &b->bodies[i];
+        }
     }
     return found;
 }
@@ -6804,76 +8913,112 @@ static int gs4i_slot_of(const gs4i_grid *g, const gs4_real p[3])
 }
 
 /* A flat surface near a block: all of the sticky bodies that its particles are near. */
-typedef struct gs4i_face { const gs4i_body *body; gs4_vec3 at, n; gs4_real d; } gs4i_face;     /* distance d at the midst of the block; body NULL: none */
+/* distance d at the midst of the block; body NULL: none */
+typedef struct gs4i_face {
+    const gs4i_body *body;
+    gs4_vec3 at, n;
+    gs4_real d;
+} gs4i_face;
 
-#define GS4I_BLOCK_REACH GS4I_C(5.2)    /* cells: half the diagonal of a block, and a cell that particles may be outside of it */
+/* cells: half the diagonal of a block, and a cell that particles may be outside of it */
+#define GS4I_BLOCK_REACH GS4I_C(5.2)
 
 static gs4i_face gs4i_find_face(const gs4_sim *sim, int o)
 {
     const gs4_real h = sim->grid.h, reach = GS4I_BLOCK_REACH * h, deep = GS4I_GHOST_NODES * h;
     gs4i_face f;
     int i, near = 0;
-    memset(&f, 0, sizeof f);                                /* gs4i_place_ghost reads d and n */
+    memset(&f, 0, sizeof f); /* gs4i_place_ghost reads d and n */
     f.at = gs4i_block_midst(&sim->grid, sim->grid.occupied_block[o]);
     for (i = 0; i < sim->boundary.body_count; i++) {
         const gs4i_body *b = &sim->boundary.bodies[i];
         const gs4_real d = gs4i_is_sticky(b) ? gs4i_body_distance(b, f.at) : GS4I_HUGE;
-        if (d < reach + GS4I_GHOST_REACH * h) { near++; f.d = d; f.body = b; }
+        if (d < reach + GS4I_GHOST_REACH * h) {
+            near++;
+            f.d = d;
+            f.body = b;
+        }
     }
     if (near != 1 || !gs4i_body_is_flat(f.body, f.at, reach, deep, &f.n)) f.body = NULL;
     return f;
 }
 
-/* The sticky body near p, NULL if there is none, how far p is from it and its outward normal there. */
+/* The sticky body near p, NULL if there is none, how far p is from it and its outward normal
+ * there. */
 static const gs4i_body *gs4i_find_surface(const gs4_sim *sim, gs4_vec3 p, gs4_real *d, gs4_vec3 *n)
 {
     const gs4_real step = GS4I_C(0.1) * sim->grid.h;
-    const gs4i_body *body = gs4i_nearest_sticky(&sim->boundary, p, GS4I_GHOST_REACH * sim->grid.h, d);
+    const gs4i_body *body =
+        gs4i_nearest_sticky(&sim->boundary, p, GS4I_GHOST_REACH * sim->grid.h, d);
     if (!body) return NULL;
-    *n = gs4i_vec3(gs4i_body_distance(body, gs4i_vec3(p.x + step, p.y, p.z)) - *d, gs4i_body_distance(body, gs4i_vec3(p.x, p.y + step, p.z)) - *d,
+    *n = gs4i_vec3(gs4i_body_distance(body, gs4i_vec3(p.x + step, p.y, p.z)) - *d,
+                   gs4i_body_distance(body, gs4i_vec3(p.x, p.y + step, p.z)) - *d,
                    gs4i_body_distance(body, gs4i_vec3(p.x, p.y, p.z + step)) - *d);
     if (!(gs4i_length(*n) > 0)) return NULL;
     *n = gs4i_scale(*n, 1 / gs4i_length(*n));
     return body;
 }
 
-/* The image of a particle at p. It can be had where the body is flat and thick enough: a point as deep behind the surface, at most one and a half
- * cells, is as deep in the body, within a quarter of a cell. One that would stick out on the far side is left out. */
+/* The image of a particle at p. It can be had where the body is flat and thick enough: a point
+ * as deep behind the surface, at most one and a half cells, is as deep in the body, within a
+ * quarter of a cell. One that would stick out on the far side is left out. */
 static void gs4i_place_ghost(const gs4_sim *sim, gs4_vec3 p, const gs4i_face *face, gs4i_ghost *g)
 {
     const gs4_real h = sim->grid.h, deep = GS4I_GHOST_NODES * h;
     gs4_real d = face->d + gs4i_dot(face->n, gs4i_sub(p, face->at));
     gs4_vec3 n = face->n, foot, image, v;
     const int flat = face->body && d > -deep;
-    const gs4i_body *body = !flat ? gs4i_find_surface(sim, p, &d, &n) : d < GS4I_GHOST_REACH * h ? face->body : NULL;
-    g->kind = GS4I_GHOST_NONE; g->whole = 0;
+    const gs4i_body *body = !flat                      ? gs4i_find_surface(sim, p, &d, &n)
+                            : d < GS4I_GHOST_REACH * h ? face->body
+                                                       : NULL;
+    g->kind = GS4I_GHOST_NONE;
+    g->whole = 0;
     if (!body) return;
     foot = gs4i_sub(p, gs4i_scale(n, d));
     image = gs4i_sub(foot, gs4i_scale(n, d));
     v = gs4i_body_velocity(body, foot);
-    g->x[0] = image.x; g->x[1] = image.y; g->x[2] = image.z;
-    g->n[0] = n.x; g->n[1] = n.y; g->n[2] = n.z;
-    g->v[0] = v.x; g->v[1] = v.y; g->v[2] = v.z;
-    g->spin[0] = body->is.angular_velocity.x; g->spin[1] = body->is.angular_velocity.y; g->spin[2] = body->is.angular_velocity.z;
+    g->x[0] = image.x;
+    g->x[1] = image.y;
+    g->x[2] = image.z;
+    g->n[0] = n.x;
+    g->n[1] = n.y;
+    g->n[2] = n.z;
+    g->v[0] = v.x;
+    g->v[1] = v.y;
+    g->v[2] = v.z;
+    g->spin[0] = body->is.angular_velocity.x;
+    g->spin[1] = body->is.angular_velocity.y;
+    g->spin[2] = body->is.angular_velocity.z;
     g->share = gs4i_max(gs4i_min(GS4I_GHOST_NODES - d * sim->grid.inv_h, 1), 0);
-    if (d > -GS4I_C(0.5) * h && (flat || gs4i_abs(gs4i_body_distance(body, gs4i_sub(foot, gs4i_scale(n, deep))) + deep) < GS4I_C(0.25) * h)) {
+    if (d > -GS4I_C(0.5) * h
+        && (flat
+            || gs4i_abs(gs4i_body_distance(body, gs4i_sub(foot, gs4i_scale(n, deep))) + deep)
+                   < GS4I_C(0.25) * h)) {
         const gs4_real nearer[3] = { image.x + h * n.x, image.y + h * n.y, image.z + h * n.z };
         g->slot = gs4i_slot_of(&sim->grid, g->x);
-        if (g->slot < 0) g->slot = gs4i_slot_of(&sim->grid, nearer);    /* a tile has room for a cell around its block */
-        if (g->slot >= 0 && (flat || d < deep || gs4i_body_distance(body, image) < 0)) g->kind = GS4I_GHOST_IMAGE;
+        /* a tile has room for a cell around its block */
+        if (g->slot < 0) g->slot = gs4i_slot_of(&sim->grid, nearer);
+        if (g->slot >= 0 && (flat || d < deep || gs4i_body_distance(body, image) < 0))
+            g->kind = GS4I_GHOST_IMAGE;
         return;
     }
-    if (d > (GS4I_STICKY_REACH + GS4I_GHOST_NODES) * h) return;     /* of nodes that would be held it sees next to nothing */
-    g->x[0] = p.x; g->x[1] = p.y; g->x[2] = p.z;
+    /* of nodes that would be held it sees next to nothing */
+    if (d > (GS4I_STICKY_REACH + GS4I_GHOST_NODES) * h) return;
+    g->x[0] = p.x;
+    g->x[1] = p.y;
+    g->x[2] = p.z;
     g->slot = gs4i_slot_of(&sim->grid, g->x);
     if (g->slot >= 0) g->kind = GS4I_GHOST_HELD;
 }
 
-/* The ghosts of occupied block o, NULL where it is near no sticky body; that of its particle i is the (i - first)th. */
+/* The ghosts of occupied block o, NULL where it is near no sticky body; that of its particle i
+ * is the (i - first)th. */
 GS4I_INLINE gs4i_ghost *gs4i_ghosts_of(const gs4_sim *sim, int o)
 {
     const gs4i_ghosts *g = &sim->ghosts;
-    return g->count && ((const int32_t *)g->of.data)[o] >= 0 ? (gs4i_ghost *)g->all.data + ((const int32_t *)g->of.data)[o] : NULL;
+    return g->count && ((const int32_t *)g->of.data)[o] >= 0
+               ? (gs4i_ghost *)g->all.data + ((const int32_t *)g->of.data)[o]
+               : NULL;
 }
 
 static void gs4i_place_ghosts(int index, void *context)
@@ -6894,10 +9039,13 @@ static void gs4i_place_ghosts(int index, void *context)
         gs4i_load_batch(p, i, n, sim->rule.reach, &q);
         gs4i_predict_positions(&q, sim->rule.reach, x);
         for (b = 0; b < n; b++, g++) {
-            gs4i_place_ghost(sim, gs4i_vec3(GS4I_NTH(x[0], b), GS4I_NTH(x[1], b), GS4I_NTH(x[2], b)), &face, g);
+            gs4i_place_ghost(
+                sim, gs4i_vec3(GS4I_NTH(x[0], b), GS4I_NTH(x[1], b), GS4I_NTH(x[2], b)), &face, g);
             g->x[3] = GS4I_NTH(q.x[3], b);
             memset(g->carried, 0, sizeof g->carried);
-            for (c = 0; c < 3; c++) g->carried[0][c] = g->x[3] * (2 * g->v[c] - GS4I_NTH(q.v[c], b) - ahead * GS4I_NTH(q.a[c], b));
+            for (c = 0; c < 3; c++)
+                g->carried[0][c] =
+                    g->x[3] * (2 * g->v[c] - GS4I_NTH(q.v[c], b) - ahead * GS4I_NTH(q.a[c], b));
             g->carried[0][3] = g->x[3];
         }
     }
@@ -6909,20 +9057,27 @@ static int gs4i_sort_ghosts(gs4_sim *sim)
     gs4i_ghosts *g = &sim->ghosts;
     const gs4i_ghost *all = (const gs4i_ghost *)g->all.data;
     const int active = sim->grid.active;
-    int32_t *order = (int32_t *)gs4i_scratch_reserve(&sim->memory, &g->order, (size_t)g->count * sizeof *order, 0);
-    int32_t *first = (int32_t *)gs4i_scratch_reserve(&sim->memory, &g->first, (size_t)(active + 1) * sizeof *first, 0);
-    int32_t *slots = (int32_t *)gs4i_scratch_reserve(&sim->memory, &g->slots, (size_t)active * sizeof *slots, 0);
+    int32_t *order = (int32_t *)gs4i_scratch_reserve(&sim->memory, &g->order,
+                                                     (size_t)g->count * sizeof *order, 0);
+    int32_t *first = (int32_t *)gs4i_scratch_reserve(&sim->memory, &g->first,
+                                                     (size_t)(active + 1) * sizeof *first, 0);
+    int32_t *slots =
+        (int32_t *)gs4i_scratch_reserve(&sim->memory, &g->slots, (size_t)active * sizeof *slots, 0);
     int k, s, colour, n = 0;
     if (!order || !first || !slots) return gs4i_fail_memory(sim);
     memset(first, 0, (size_t)(active + 1) * sizeof *first);
-    for (k = 0; k < g->count; k++) if (all[k].kind) first[all[k].slot + 1]++;
+    for (k = 0; k < g->count; k++)
+        if (all[k].kind) first[all[k].slot + 1]++;
     for (colour = 0; colour < 8; colour++) {
         g->colour_first[colour] = n;
-        for (s = 0; s < active; s++) if (first[s + 1] && gs4i_block_colour(&sim->grid, sim->grid.block[s]) == colour) slots[n++] = s;
+        for (s = 0; s < active; s++)
+            if (first[s + 1] && gs4i_block_colour(&sim->grid, sim->grid.block[s]) == colour)
+                slots[n++] = s;
     }
     g->colour_first[8] = n;
     for (s = 0; s < active; s++) first[s + 1] += first[s];
-    for (k = 0; k < g->count; k++) if (all[k].kind) order[first[all[k].slot]++] = k;
+    for (k = 0; k < g->count; k++)
+        if (all[k].kind) order[first[all[k].slot]++] = k;
     for (s = active; s > 0; s--) first[s] = first[s - 1];
     first[0] = 0;
     return GS4_OK;
@@ -6937,25 +9092,37 @@ static int gs4i_find_ghosts(gs4_sim *sim)
     int32_t *of;
     int i, o, sticky = 0;
     g->count = 0;
-    for (i = 0; i < sim->boundary.body_count; i++) sticky |= gs4i_is_sticky(&sim->boundary.bodies[i]);
+    for (i = 0; i < sim->boundary.body_count; i++)
+        sticky |= gs4i_is_sticky(&sim->boundary.bodies[i]);
     if (!sticky) return GS4_OK;
-    of = (int32_t *)gs4i_scratch_reserve(&sim->memory, &g->of, (size_t)grid->occupied * sizeof *of, 0);
+    of = (int32_t *)gs4i_scratch_reserve(&sim->memory, &g->of, (size_t)grid->occupied * sizeof *of,
+                                         0);
     if (!of) return gs4i_fail_memory(sim);
     for (o = 0; o < grid->occupied; o++) {
         gs4_real d;
-        of[o] = gs4i_nearest_sticky(&sim->boundary, gs4i_block_midst(grid, grid->occupied_block[o]), (GS4I_BLOCK_REACH + GS4I_GHOST_REACH) * grid->h, &d) ? g->count : -1;
+        of[o] = gs4i_nearest_sticky(&sim->boundary, gs4i_block_midst(grid, grid->occupied_block[o]),
+                                    (GS4I_BLOCK_REACH + GS4I_GHOST_REACH) * grid->h, &d)
+                    ? g->count
+                    : -1;
         if (of[o] >= 0) g->count += grid->first[o + 1] - grid->first[o];
     }
     if (!g->count) return GS4_OK;
-    if (!gs4i_scratch_reserve(&sim->memory, &g->all, (size_t)g->count * sizeof(gs4i_ghost), 0)) { g->count = 0; return gs4i_fail_memory(sim); }
+    if (!gs4i_scratch_reserve(&sim->memory, &g->all, (size_t)g->count * sizeof(gs4i_ghost), 0)) {
+        g->count = 0;
+        return gs4i_fail_memory(sim);
+    }
     memset(&pass, 0, sizeof pass);
     pass.sim = sim;
     gs4i_parallel_for(&sim->tasks, grid->occupied, gs4i_place_ghosts, &pass);
     return gs4i_sort_ghosts(sim);
 }
 
-/* Where the nodes of the 27 blocks around a slot are, negative where there are none; and its frame. */
-typedef struct gs4i_ghost_tile { ptrdiff_t at[27]; gs4i_frame frame; } gs4i_ghost_tile;
+/* Where the nodes of the 27 blocks around a slot are, negative where there are none; and its
+ * frame. */
+typedef struct gs4i_ghost_tile {
+    ptrdiff_t at[27];
+    gs4i_frame frame;
+} gs4i_ghost_tile;
 
 static void gs4i_ghost_tile_of(const gs4i_grid *g, int slot, gs4i_ghost_tile *t)
 {
@@ -6963,8 +9130,10 @@ static void gs4i_ghost_tile_of(const gs4i_grid *g, int slot, gs4i_ghost_tile *t)
     gs4i_block_coordinates(g, g->block[slot], at);
     for (i = 0; i < 27; i++) {
         const int x = at[0] + i % 3 - 1, y = at[1] + i / 3 % 3 - 1, z = at[2] + i / 9 - 1;
-        const int there = x >= 0 && y >= 0 && z >= 0 && x < g->blocks[0] && y < g->blocks[1] && z < g->blocks[2];
-        t->at[i] = there ? (ptrdiff_t)(g->table[gs4i_block_number(g, x, y, z)] - 1) * GS4I_NODE_REALS : -1;
+        const int there =
+            x >= 0 && y >= 0 && z >= 0 && x < g->blocks[0] && y < g->blocks[1] && z < g->blocks[2];
+        t->at[i] =
+            there ? (ptrdiff_t)(g->table[gs4i_block_number(g, x, y, z)] - 1) * GS4I_NODE_REALS : -1;
     }
     t->frame = gs4i_tile_frame(g, g->block[slot]);
 }
@@ -6977,12 +9146,16 @@ GS4I_INLINE ptrdiff_t gs4i_ghost_node(const gs4i_ghost_tile *t, int x, int y, in
 }
 
 /* The next n ghosts of a slot and their weights. */
-static void gs4i_load_ghosts(gs4i_ghost *all, const int32_t *order, int n, const gs4i_ghost_tile *t, gs4i_ghost *g[GS4I_BATCH], gs4i_stencils *s)
+static void gs4i_load_ghosts(gs4i_ghost *all, const int32_t *order, int n, const gs4i_ghost_tile *t,
+                             gs4i_ghost *g[GS4I_BATCH], gs4i_stencils *s)
 {
     gs4_real four[4 * GS4I_BATCH];
     gs4i_lanes x[4];
     int b;
-    for (b = 0; b < n; b++) { g[b] = all + order[b]; memcpy(four + 4 * b, g[b]->x, 4 * sizeof *four); }
+    for (b = 0; b < n; b++) {
+        g[b] = all + order[b];
+        memcpy(four + 4 * b, g[b]->x, 4 * sizeof *four);
+    }
     gs4i_to_lanes(four, n, x);
     gs4i_stencils_at(s, &t->frame, x);
 }
@@ -6992,38 +9165,49 @@ static void gs4i_mark_unimaged(const gs4i_grid *grid, const gs4i_ghost_tile *t, 
 {
     int i;
     for (i = 0; i < 27; i++) {
-        const ptrdiff_t at = gs4i_ghost_node(t, base % GS4I_TILE + i % 3, base / GS4I_TILE % GS4I_TILE + i / 3 % 3, base / (GS4I_TILE * GS4I_TILE) + i / 9);
-        if (at >= 0 && grid->jump_of[at / GS4I_NODE_REALS]) *gs4i_contact_at(grid, (uint32_t)(at / 4)) |= GS4I_UNIMAGED;
+        const ptrdiff_t at =
+            gs4i_ghost_node(t, base % GS4I_TILE + i % 3, base / GS4I_TILE % GS4I_TILE + i / 3 % 3,
+                            base / (GS4I_TILE * GS4I_TILE) + i / 9);
+        if (at >= 0 && grid->jump_of[at / GS4I_NODE_REALS])
+            *gs4i_contact_at(grid, (uint32_t)(at / 4)) |= GS4I_UNIMAGED;
     }
 }
 
 /* Do all nodes around a particle exist? Three in a row lie in two blocks at most. */
 static int gs4i_is_whole(const gs4i_ghost_tile *t, int base)
 {
-    const int x = base % GS4I_TILE, y = base / GS4I_TILE % GS4I_TILE, z = base / (GS4I_TILE * GS4I_TILE);
+    const int x = base % GS4I_TILE, y = base / GS4I_TILE % GS4I_TILE,
+              z = base / (GS4I_TILE * GS4I_TILE);
     int i, whole = 1;
-    for (i = 0; i < 8; i++) whole &= gs4i_ghost_node(t, x + 2 * (i & 1), y + (i & 2), z + 2 * (i >> 2)) >= 0;
+    for (i = 0; i < 8; i++)
+        whole &= gs4i_ghost_node(t, x + 2 * (i & 1), y + (i & 2), z + 2 * (i >> 2)) >= 0;
     return whole;
 }
 
 /* Add the tile to the nodes that exist and are not held; those that get momentum are marked. */
-static void gs4i_ghost_tile_add(const gs4i_grid *grid, const gs4i_ghost_tile *t, const gs4_real *tile, gs4_real *field)
+static void gs4i_ghost_tile_add(const gs4i_grid *grid, const gs4i_ghost_tile *t,
+                                const gs4_real *tile, gs4_real *field)
 {
     int x, y, z, c;
-    for (z = 0; z < GS4I_TILE; z++) for (y = 0; y < GS4I_TILE; y++) for (x = 0; x < GS4I_TILE; x++, tile += 4) {
-        const ptrdiff_t at = gs4i_ghost_node(t, x, y, z);
-        uint8_t *contact = at >= 0 && grid->jump_of[at / GS4I_NODE_REALS] ? gs4i_contact_at(grid, (uint32_t)(at / 4)) : NULL;
-        if (at < 0 || (contact && (*contact & GS4I_UNIMAGED))) continue;
-        for (c = 0; c < 4; c++) field[at + c] += tile[c];
-        if (contact && field == grid->momentum && tile[3] > 0) *contact |= GS4I_IMAGED;
-    }
+    for (z = 0; z < GS4I_TILE; z++)
+        for (y = 0; y < GS4I_TILE; y++)
+            for (x = 0; x < GS4I_TILE; x++, tile += 4) {
+                const ptrdiff_t at = gs4i_ghost_node(t, x, y, z);
+                uint8_t *contact = at >= 0 && grid->jump_of[at / GS4I_NODE_REALS]
+                                       ? gs4i_contact_at(grid, (uint32_t)(at / 4))
+                                       : NULL;
+                if (at < 0 || (contact && (*contact & GS4I_UNIMAGED))) continue;
+                for (c = 0; c < 4; c++) field[at + c] += tile[c];
+                if (contact && field == grid->momentum && tile[3] > 0) *contact |= GS4I_IMAGED;
+            }
 }
 
 static void gs4i_scatter_ghosts_of(const gs4i_pass *pass, int index, int what)
 {
     gs4_sim *sim = pass->sim;
     const int slot = pass->blocks[index];
-    const int32_t *first = (const int32_t *)sim->ghosts.first.data, *order = (const int32_t *)sim->ghosts.order.data;
+    const int32_t *first = (const int32_t *)sim->ghosts.first.data,
+                  *order = (const int32_t *)sim->ghosts.order.data;
     gs4_real tile[GS4I_TILE_REALS];
     gs4i_ghost_tile t;
     int k, b, c;
@@ -7037,43 +9221,71 @@ static void gs4i_scatter_ghosts_of(const gs4i_pass *pass, int index, int what)
         gs4i_affine_forces m;
         gs4i_load_ghosts((gs4i_ghost *)sim->ghosts.all.data, order + k, n, &t, g, &s);
         for (b = 0; b < n; b++) {
-            gs4_real (*from)[4] = g[b]->carried;
+            gs4_real(*from)[4] = g[b]->carried;
             const size_t four = 4 * sizeof *tile;
             if (s.base[b] < 0) continue;
-            if (what == GS4I_GHOST_MARK && g[b]->kind == GS4I_GHOST_HELD) gs4i_mark_unimaged(&sim->grid, &t, s.base[b]);
+            if (what == GS4I_GHOST_MARK && g[b]->kind == GS4I_GHOST_HELD)
+                gs4i_mark_unimaged(&sim->grid, &t, s.base[b]);
             if (what == GS4I_GHOST_MARK) g[b]->whole = gs4i_is_whole(&t, s.base[b]);
             if (what == GS4I_GHOST_MARK || g[b]->kind == GS4I_GHOST_HELD) continue;
-            if (what == GS4I_GHOST_MOMENTUM) gs4i_scatter_quad(tile, &s, b, from[0]);
+            if (what == GS4I_GHOST_MOMENTUM)
+                gs4i_scatter_quad(tile, &s, b, from[0]);
             else if (what == GS4I_GHOST_FORCE) {
-                memcpy(f.x + 4 * b, from[0], four); memcpy(f.y + 4 * b, from[1], four); memcpy(f.z + 4 * b, from[2], four);
+                memcpy(f.x + 4 * b, from[0], four);
+                memcpy(f.y + 4 * b, from[1], four);
+                memcpy(f.z + 4 * b, from[2], four);
                 memcpy(f.weight + 4 * b, from[3], four);
                 gs4i_scatter_force(tile, &s, b, &f);
             } else {
                 memcpy(m.middle + 4 * b, from[0], four);
-                memcpy(m.x + 4 * b, from[1], four); memcpy(m.y + 4 * b, from[2], four); memcpy(m.z + 4 * b, from[3], four);
-                for (c = 0; c < 3; c++) m.middle[4 * b + c] -= from[1][c] * GS4I_NTH(s.xi[0], b) + from[2][c] * GS4I_NTH(s.xi[1], b) + from[3][c] * GS4I_NTH(s.xi[2], b);
+                memcpy(m.x + 4 * b, from[1], four);
+                memcpy(m.y + 4 * b, from[2], four);
+                memcpy(m.z + 4 * b, from[3], four);
+                for (c = 0; c < 3; c++)
+                    m.middle[4 * b + c] -= from[1][c] * GS4I_NTH(s.xi[0], b)
+                                           + from[2][c] * GS4I_NTH(s.xi[1], b)
+                                           + from[3][c] * GS4I_NTH(s.xi[2], b);
                 gs4i_scatter_affine(tile, &s, b, &m);
             }
         }
     }
-    if (what != GS4I_GHOST_MARK) gs4i_ghost_tile_add(&sim->grid, &t, tile, what == GS4I_GHOST_FORCE ? sim->grid.force : sim->grid.momentum);
+    if (what != GS4I_GHOST_MARK)
+        gs4i_ghost_tile_add(&sim->grid, &t, tile,
+                            what == GS4I_GHOST_FORCE ? sim->grid.force : sim->grid.momentum);
 }
 
-static void gs4i_mark_ghosts(int index, void *context) { gs4i_scatter_ghosts_of((const gs4i_pass *)context, index, GS4I_GHOST_MARK); }
-static void gs4i_scatter_ghost_momentum(int index, void *context) { gs4i_scatter_ghosts_of((const gs4i_pass *)context, index, GS4I_GHOST_MOMENTUM); }
-static void gs4i_scatter_ghost_affine(int index, void *context) { gs4i_scatter_ghosts_of((const gs4i_pass *)context, index, GS4I_GHOST_AFFINE); }
-static void gs4i_scatter_ghost_force(int index, void *context) { gs4i_scatter_ghosts_of((const gs4i_pass *)context, index, GS4I_GHOST_FORCE); }
+static void gs4i_mark_ghosts(int index, void *context)
+{
+    gs4i_scatter_ghosts_of((const gs4i_pass *)context, index, GS4I_GHOST_MARK);
+}
+static void gs4i_scatter_ghost_momentum(int index, void *context)
+{
+    gs4i_scatter_ghosts_of((const gs4i_pass *)context, index, GS4I_GHOST_MOMENTUM);
+}
+static void gs4i_scatter_ghost_affine(int index, void *context)
+{
+    gs4i_scatter_ghosts_of((const gs4i_pass *)context, index, GS4I_GHOST_AFFINE);
+}
+static void gs4i_scatter_ghost_force(int index, void *context)
+{
+    gs4i_scatter_ghosts_of((const gs4i_pass *)context, index, GS4I_GHOST_FORCE);
+}
 
 static void gs4i_scatter_ghosts(gs4_sim *sim, gs4_task_fn kernel)
 {
-    if (sim->ghosts.count) gs4i_scatter_by_colour(sim, (const int32_t *)sim->ghosts.slots.data, sim->ghosts.colour_first, kernel);
+    if (sim->ghosts.count)
+        gs4i_scatter_by_colour(sim, (const int32_t *)sim->ghosts.slots.data,
+                               sim->ghosts.colour_first, kernel);
 }
 
 /* What nodes give to particle n beside velocity; a batch with solids wants its gradient too. */
-GS4I_INLINE void gs4i_gather_kick(int solids, const gs4_real *at, const gs4i_stencils *s, int n, const gs4i_row *w, const gs4i_row *d, gs4i_gathered *g)
+GS4I_INLINE void gs4i_gather_kick(int solids, const gs4_real *at, const gs4i_stencils *s, int n,
+                                  const gs4i_row *w, const gs4i_row *d, gs4i_gathered *g)
 {
-    if (solids) gs4i_gather_local(at, s, n, w, d, g);
-    else gs4i_gather_value(at, s, n, w, g->value);
+    if (solids)
+        gs4i_gather_local(at, s, n, w, d, g);
+    else
+        gs4i_gather_value(at, s, n, w, g->value);
 }
 
 /* What the nodes have of a field at the images, velocity (what 0) or acceleration (1). */
@@ -7081,16 +9293,19 @@ static void gs4i_gather_ghosts_of(const gs4i_pass *pass, int index, int what)
 {
     gs4_sim *sim = pass->sim;
     const int slot = pass->blocks[index];
-    const int32_t *first = (const int32_t *)sim->ghosts.first.data, *order = (const int32_t *)sim->ghosts.order.data;
+    const int32_t *first = (const int32_t *)sim->ghosts.first.data,
+                  *order = (const int32_t *)sim->ghosts.order.data;
     const gs4_real *field = what ? sim->grid.force : gs4i_seen_nodes(&sim->grid);
     gs4_real tile[GS4I_TILE_REALS], *to = tile;
     gs4i_ghost_tile t;
     int x, y, z, k, b, c;
     gs4i_ghost_tile_of(&sim->grid, slot, &t);
-    for (z = 0; z < GS4I_TILE; z++) for (y = 0; y < GS4I_TILE; y++) for (x = 0; x < GS4I_TILE; x++, to += 4) {
-        const ptrdiff_t at = gs4i_ghost_node(&t, x, y, z);
-        for (c = 0; c < 4; c++) to[c] = at < 0 ? 0 : field[at + c];
-    }
+    for (z = 0; z < GS4I_TILE; z++)
+        for (y = 0; y < GS4I_TILE; y++)
+            for (x = 0; x < GS4I_TILE; x++, to += 4) {
+                const ptrdiff_t at = gs4i_ghost_node(&t, x, y, z);
+                for (c = 0; c < 4; c++) to[c] = at < 0 ? 0 : field[at + c];
+            }
     memset(to, 0, 16 * sizeof *to);
     for (k = first[slot]; k < first[slot + 1]; k += GS4I_BATCH) {
         const int n = first[slot + 1] - k < GS4I_BATCH ? first[slot + 1] - k : GS4I_BATCH;
@@ -7102,8 +9317,11 @@ static void gs4i_gather_ghosts_of(const gs4i_pass *pass, int index, int what)
             gs4i_row w, d;
             if (s.base[b] < 0 || !g[b]->whole || !(g[b]->share > 0)) continue;
             gs4i_x_weights(&s, b, &w, &d);
-            if (what) gs4i_gather_kick(sim->particles.deformation_reals, tile + 4 * s.base[b], &s, b, &w, &d, &u);
-            else gs4i_gather_local(tile + 4 * s.base[b], &s, b, &w, &d, &u);
+            if (what)
+                gs4i_gather_kick(sim->particles.deformation_reals, tile + 4 * s.base[b], &s, b, &w,
+                                 &d, &u);
+            else
+                gs4i_gather_local(tile + 4 * s.base[b], &s, b, &w, &d, &u);
             memcpy(g[b]->seen[what][0], u.value + 4 * b, 4 * sizeof *tile);
             if (what && !sim->particles.deformation_reals) continue;
             memcpy(g[b]->seen[what][1], u.dx + 4 * b, 4 * sizeof *tile);
@@ -7113,8 +9331,14 @@ static void gs4i_gather_ghosts_of(const gs4i_pass *pass, int index, int what)
     }
 }
 
-static void gs4i_gather_ghost_velocity(int index, void *context) { gs4i_gather_ghosts_of((const gs4i_pass *)context, index, 0); }
-static void gs4i_gather_ghost_acceleration(int index, void *context) { gs4i_gather_ghosts_of((const gs4i_pass *)context, index, 1); }
+static void gs4i_gather_ghost_velocity(int index, void *context)
+{
+    gs4i_gather_ghosts_of((const gs4i_pass *)context, index, 0);
+}
+static void gs4i_gather_ghost_acceleration(int index, void *context)
+{
+    gs4i_gather_ghosts_of((const gs4i_pass *)context, index, 1);
+}
 
 static void gs4i_gather_ghosts(gs4_sim *sim, gs4_task_fn kernel)
 {
@@ -7131,22 +9355,29 @@ GS4I_INLINE void gs4i_ghost_turn(const gs4i_ghost *g, gs4_real turn[3][3])
 {
     const gs4_real *w = g->spin, *n = g->n;
     const gs4_real columns[3][3] = { { 0, w[2], -w[1] }, { -w[2], 0, w[0] }, { w[1], -w[0], 0 } };
-    const gs4_real across[3] = { w[1] * n[2] - w[2] * n[1], w[2] * n[0] - w[0] * n[2], w[0] * n[1] - w[1] * n[0] };
+    const gs4_real across[3] = { w[1] * n[2] - w[2] * n[1], w[2] * n[0] - w[0] * n[2],
+                                 w[0] * n[1] - w[1] * n[0] };
     int a, c;
-    for (a = 0; a < 3; a++) for (c = 0; c < 3; c++) turn[a][c] = columns[a][c] - across[c] * n[a];
+    for (a = 0; a < 3; a++)
+        for (c = 0; c < 3; c++) turn[a][c] = columns[a][c] - across[c] * n[a];
 }
 
 /* Has a particle an odd part to take? */
-GS4I_INLINE int gs4i_is_odd(const gs4i_ghost *g) { return g->kind == GS4I_GHOST_IMAGE && g->whole && g->share > 0; }
+GS4I_INLINE int gs4i_is_odd(const gs4i_ghost *g)
+{
+    return g->kind == GS4I_GHOST_IMAGE && g->whole && g->share > 0;
+}
 
-/* Replace the values that n particles gathered by their part that is odd about the surface, of velocities (what 0) about the body's, by their
- * shares: u = (u(x) - u(x'))/2 + v */
+/* Replace the values that n particles gathered by their part that is odd about the surface, of
+ * velocities (what 0) about the body's, by their shares: u = (u(x) - u(x'))/2 + v */
 static void gs4i_make_value_odd(const gs4i_ghost *g, int n, int what, gs4i_gathered *u)
 {
     int b, c;
     for (b = 0; b < n; b++, g++)
         for (c = 0; c < 3 && gs4i_is_odd(g); c++)
-            u->value[4 * b + c] -= g->share * (GS4I_C(0.5) * (u->value[4 * b + c] + g->seen[what][0][c]) - (what ? GS4I_C(0) : g->v[c]));
+            u->value[4 * b + c] -= g->share
+                                   * (GS4I_C(0.5) * (u->value[4 * b + c] + g->seen[what][0][c])
+                                      - (what ? GS4I_C(0) : g->v[c]));
 }
 
 /* The same of gradients: grad u = (grad u(x) - grad u(x') R)/2 + spin x (I - n n). */
@@ -7156,21 +9387,34 @@ static void gs4i_make_gradient_odd(const gs4i_ghost *g, int n, int what, gs4i_ga
     for (b = 0; b < n; b++, g++) {
         gs4_real *column[3], turn[3][3] = { { 0, 0, 0 }, { 0, 0, 0 }, { 0, 0, 0 } }, across[3];
         if (!gs4i_is_odd(g)) continue;
-        column[0] = u->dx + 4 * b; column[1] = u->dy + 4 * b; column[2] = u->dz + 4 * b;
+        column[0] = u->dx + 4 * b;
+        column[1] = u->dy + 4 * b;
+        column[2] = u->dz + 4 * b;
         if (!what) gs4i_ghost_turn(g, turn);
-        for (c = 0; c < 3; c++) across[c] = g->seen[what][1][c] * g->n[0] + g->seen[what][2][c] * g->n[1] + g->seen[what][3][c] * g->n[2];
+        for (c = 0; c < 3; c++)
+            across[c] = g->seen[what][1][c] * g->n[0] + g->seen[what][2][c] * g->n[1]
+                        + g->seen[what][3][c] * g->n[2];
         for (a = 0; a < 3; a++)
-            for (c = 0; c < 3; c++) column[a][c] -= g->share * (GS4I_C(0.5) * (column[a][c] + g->seen[what][1 + a][c]) - across[c] * g->n[a] - turn[a][c]);
+            for (c = 0; c < 3; c++)
+                column[a][c] -= g->share
+                                * (GS4I_C(0.5) * (column[a][c] + g->seen[what][1 + a][c])
+                                   - across[c] * g->n[a] - turn[a][c]);
     }
 }
 
 /* Both, of velocities. */
-static void gs4i_make_odd(const gs4i_ghost *g, int n, gs4i_gathered *u) { gs4i_make_value_odd(g, n, 0, u); gs4i_make_gradient_odd(g, n, 0, u); }
+static void gs4i_make_odd(const gs4i_ghost *g, int n, gs4i_gathered *u)
+{
+    gs4i_make_value_odd(g, n, 0, u);
+    gs4i_make_gradient_odd(g, n, 0, u);
+}
 
-/* Is what the images of block o see of velocity no cause for alarm? Of a reflection of L the trace is at most sum |L_ij|. See gs4i_is_calm. */
+/* Is what the images of block o see of velocity no cause for alarm? Of a reflection of L the
+ * trace is at most sum |L_ij|. See gs4i_is_calm. */
 static int gs4i_ghosts_are_calm(const gs4_sim *sim, int o)
 {
-    const gs4i_ghost *g = gs4i_ghosts_of(sim, o), *end = g ? g + (sim->grid.first[o + 1] - sim->grid.first[o]) : g;
+    const gs4i_ghost *g = gs4i_ghosts_of(sim, o),
+                     *end = g ? g + (sim->grid.first[o + 1] - sim->grid.first[o]) : g;
     for (; g < end; g++) {
         gs4_real moved = 0, all = 0;
         int a, c;
@@ -7185,12 +9429,14 @@ static int gs4i_ghosts_are_calm(const gs4_sim *sim, int o)
 }
 
 /* -A R, of the columns x, y, z of n particles, for their images. */
-static void gs4i_reflect_columns(gs4i_ghost *g, int n, const gs4_real *x, const gs4_real *y, const gs4_real *z, int to)
+static void gs4i_reflect_columns(gs4i_ghost *g, int n, const gs4_real *x, const gs4_real *y,
+                                 const gs4_real *z, int to)
 {
     int b, c;
     for (b = 0; b < n; b++, g++)
         for (c = 0; c < 3; c++) {
-            const gs4_real across = 2 * (x[4 * b + c] * g->n[0] + y[4 * b + c] * g->n[1] + z[4 * b + c] * g->n[2]);
+            const gs4_real across =
+                2 * (x[4 * b + c] * g->n[0] + y[4 * b + c] * g->n[1] + z[4 * b + c] * g->n[2]);
             g->carried[to][c] = across * g->n[0] - x[4 * b + c];
             g->carried[to + 1][c] = across * g->n[1] - y[4 * b + c];
             g->carried[to + 2][c] = across * g->n[2] - z[4 * b + c];
@@ -7202,12 +9448,16 @@ static void gs4i_reflect_forces(gs4i_ghost *g, int n, const gs4i_forces *f)
 {
     int b, c;
     gs4i_reflect_columns(g, n, f->x, f->y, f->z, 0);
-    for (b = 0; b < n; b++) for (c = 0; c < 4; c++) g[b].carried[3][c] = -f->weight[4 * b + c];
-    for (b = 0; b < n; b++) for (c = 0; c < 3; c++) g[b].carried[c][3] = 0;
+    for (b = 0; b < n; b++)
+        for (c = 0; c < 4; c++) g[b].carried[3][c] = -f->weight[4 * b + c];
+    for (b = 0; b < n; b++)
+        for (c = 0; c < 3; c++) g[b].carried[c][3] = 0;
 }
 
-/* Affine momentum of the images of n particles: 2 m v - P(x), and its change from node to node, that of 2 m v along the surface included. */
-static void gs4i_reflect_affine(gs4i_ghost *g, int n, const gs4i_stencils *s, const gs4i_affine_forces *f, gs4_real h)
+/* Affine momentum of the images of n particles: 2 m v - P(x), and its change from node to node,
+ * that of 2 m v along the surface included. */
+static void gs4i_reflect_affine(gs4i_ghost *g, int n, const gs4i_stencils *s,
+                                const gs4i_affine_forces *f, gs4_real h)
 {
     int b, c, a;
     gs4i_reflect_columns(g, n, f->x, f->y, f->z, 1);
@@ -7215,7 +9465,10 @@ static void gs4i_reflect_affine(gs4i_ghost *g, int n, const gs4i_stencils *s, co
         gs4_real turn[3][3];
         gs4i_ghost_turn(g, turn);
         for (c = 0; c < 3; c++) {
-            const gs4_real at_x = f->middle[4 * b + c] + f->x[4 * b + c] * GS4I_NTH_CONST(s->xi[0], b) + f->y[4 * b + c] * GS4I_NTH_CONST(s->xi[1], b) + f->z[4 * b + c] * GS4I_NTH_CONST(s->xi[2], b);
+            const gs4_real at_x = f->middle[4 * b + c]
+                                  + f->x[4 * b + c] * GS4I_NTH_CONST(s->xi[0], b)
+                                  + f->y[4 * b + c] * GS4I_NTH_CONST(s->xi[1], b)
+                                  + f->z[4 * b + c] * GS4I_NTH_CONST(s->xi[2], b);
             g->carried[0][c] = 2 * g->x[3] * g->v[c] - at_x;
             for (a = 0; a < 3; a++) g->carried[1 + a][c] += 2 * g->x[3] * h * turn[a][c];
         }
@@ -7239,53 +9492,64 @@ static void gs4i_clear_warmth(const gs4_sim *sim, gs4i_warmth *w)
 }
 
 /* What the particles of a batch give to the tiles of heat. */
-GS4I_INLINE void gs4i_scatter_warmth(const gs4_sim *sim, gs4i_warmth *w, const gs4i_stencils *s, int n)
+GS4I_INLINE void gs4i_scatter_warmth(const gs4_sim *sim, gs4i_warmth *w, const gs4i_stencils *s,
+                                     int n)
 {
     int b;
     for (b = 0; b < n; b++)
         if (s->base[b] >= 0) {
             gs4i_scatter_quad(w->content, s, b, w->sent.content + 4 * b);
             if (!sim->conduction.source) continue;
-            if (sim->particles.with_flux) gs4i_scatter_force(w->source, s, b, &w->sent.source);
-            else gs4i_scatter_quad(w->source, s, b, w->sent.source.weight + 4 * b);
+            if (sim->particles.with_flux)
+                gs4i_scatter_force(w->source, s, b, &w->sent.source);
+            else
+                gs4i_scatter_quad(w->source, s, b, w->sent.source.weight + 4 * b);
         }
 }
 
 static void gs4i_add_warmth(const gs4_sim *sim, int o, const gs4i_warmth *w)
 {
     gs4i_tile_add(&sim->grid, o, sim->reports[o].rows, w->content, sim->conduction.content);
-    if (sim->conduction.source) gs4i_tile_add(&sim->grid, o, sim->reports[o].rows, w->source, sim->conduction.source);
+    if (sim->conduction.source)
+        gs4i_tile_add(&sim->grid, o, sim->reports[o].rows, w->source, sim->conduction.source);
 }
 
 GS4I_INLINE void gs4i_prefetch_hidden(const gs4i_particles *p, size_t i)
 {
     int b;
-    for (b = 0; b < 4 * GS4I_BATCH && i < (size_t)p->count; b += 16) GS4I_PREFETCH(p->hidden + 4 * i + b);
+    for (b = 0; b < 4 * GS4I_BATCH && i < (size_t)p->count; b += 16)
+        GS4I_PREFETCH(p->hidden + 4 * i + b);
 }
 
 /* V - v~ of n particles, of which V = sum w v_i was gathered. Their momenta sum up to none. */
-GS4I_INLINE void gs4i_store_hidden(const gs4i_particles *p, size_t i, int n, gs4i_reach reach, const gs4i_batch *q, const gs4_real *V)
+GS4I_INLINE void gs4i_store_hidden(const gs4i_particles *p, size_t i, int n, gs4i_reach reach,
+                                   const gs4i_batch *q, const gs4_real *V)
 {
     gs4_real out[4 * GS4I_BATCH];
     gs4i_lanes hidden[4];
     int b, c;
     gs4i_to_lanes(V, n, hidden);
-    for (c = 0; c < 3; c++) GS4I_BATCH_LOOP(b) hidden[c][b] -= q->v[c][b] + reach.ahead * q->a[c][b];
+    for (c = 0; c < 3; c++)
+        GS4I_BATCH_LOOP(b) hidden[c][b] -= q->v[c][b] + reach.ahead * q->a[c][b];
     gs4i_from_lanes(hidden[0], hidden[1], hidden[2], hidden[3], out);
     gs4i_prefetch_hidden(p, i + 4 * GS4I_BATCH);
     memcpy(p->hidden + 4 * i, out, 4 * (size_t)n * sizeof *out);
 }
 
-/* S4 and S5: L~ = sum v_i (x) grad w, J~ and stress there, and f_i = - sum V sigma grad w + sum w m g. */
+/* S4 and S5: L~ = sum v_i (x) grad w, J~ and stress there, and f_i = - sum V sigma grad w + sum
+ * w m g. */
 static void gs4i_scatter_stage(const gs4i_pass *pass, int index, gs4i_warmth *warmth)
 {
     gs4_sim *sim = pass->sim;
     const gs4i_particles p = sim->particles;
     const gs4i_rule rule = sim->rule;
-    const int o = pass->blocks[index], next = pass->blocks[index + 1 < pass->count ? index + 1 : index];
+    const int o = pass->blocks[index],
+              next = pass->blocks[index + 1 < pass->count ? index + 1 : index];
     const gs4i_frame frame = gs4i_tile_frame(&sim->grid, sim->grid.occupied_block[o]);
-    const int sharp = sim->grid.with_sharp;                 /* then nodes weigh what is on them, see gs4i_sharpen_forces */
-    const gs4_real gravity[3] = { sharp ? 0 : sim->desc.gravity.x, sharp ? 0 : sim->desc.gravity.y, sharp ? 0 : sim->desc.gravity.z };
+    /* then nodes weigh what is on them, see gs4i_sharpen_forces */
+    const int sharp = sim->grid.with_sharp;
+    const gs4_real gravity[3] = { sharp ? 0 : sim->desc.gravity.x, sharp ? 0 : sim->desc.gravity.y,
+                                  sharp ? 0 : sim->desc.gravity.z };
     gs4i_report *report = &sim->reports[o];
     gs4i_batch_laws laws;
     gs4i_history_laws past;
@@ -7295,7 +9559,8 @@ static void gs4i_scatter_stage(const gs4i_pass *pass, int index, gs4i_warmth *wa
     int row = 0;
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
     gs4i_tile_load(&sim->grid, o, report->rows, gs4i_seen_nodes(&sim->grid), nodes);
-    if (sharp && p.with_fading) gs4i_tile_load(&sim->grid, o, report->rows, sim->grid.momentum, plain);
+    if (sharp && p.with_fading)
+        gs4i_tile_load(&sim->grid, o, report->rows, sim->grid.momentum, plain);
     memset(tile, 0, sizeof tile);
     if (warmth) gs4i_clear_warmth(sim, warmth);
     memset(&laws, 0, sizeof laws);
@@ -7317,18 +9582,23 @@ static void gs4i_scatter_stage(const gs4i_pass *pass, int index, gs4i_warmth *wa
             gs4i_row w, d;
             gs4i_x_weights(&s, b, &w, &d);
             gs4i_gather_local(nodes + 4 * s.base[b], &s, b, &w, &d, &v);
-            if (sharp && p.with_fading) gs4i_gather_value(plain + 4 * s.base[b], &s, b, &w, v.value);
+            if (sharp && p.with_fading)
+                gs4i_gather_value(plain + 4 * s.base[b], &s, b, &w, v.value);
         }
         if (ghosts) gs4i_make_odd(ghosts, n, &v);
         if (p.with_fading) gs4i_store_hidden(&p, i, n, rule.reach, &q, v.value);
         gs4i_gradient_lanes(v.dx, v.dy, v.dz, n, L);
         gs4i_take_laws(sim->laws, sim->frozen, &p, i, n, &laws);
         if (warmth) gs4i_begin_warmth(&p, i, n, sim->warm.reach.ahead, &laws, warmth);
-        gs4i_stage_forces(&p, i, n, &q, &laws, &past, &rule, L, gravity, sharp, &f, J, mu, &seen, report, warmth);
+        gs4i_stage_forces(&p, i, n, &q, &laws, &past, &rule, L, gravity, sharp, &f, J, mu, &seen,
+                          report, warmth);
         gs4i_see_liquids(&seen, &laws, J, mu);
         gs4i_check_liquids(report, J, mu, p.id + i, n);
         for (b = 0; b < n; b++) gs4i_scatter_force(tile, &s, b, &f);
-        if (ghosts) { gs4i_reflect_forces(ghosts, n, &f); ghosts += n; }
+        if (ghosts) {
+            gs4i_reflect_forces(ghosts, n, &f);
+            ghosts += n;
+        }
         if (warmth) gs4i_scatter_warmth(sim, warmth, &s, n);
     }
     gs4i_report_liquids(report, &seen);
@@ -7336,12 +9606,20 @@ static void gs4i_scatter_stage(const gs4i_pass *pass, int index, gs4i_warmth *wa
     if (warmth) gs4i_add_warmth(sim, o, warmth);
 }
 
-static void gs4i_scatter_forces(int index, void *context) { gs4i_scatter_stage((const gs4i_pass *)context, index, NULL); }
-static void gs4i_scatter_forces_and_heat(int index, void *context) { gs4i_warmth warmth; gs4i_scatter_stage((const gs4i_pass *)context, index, &warmth); }
+static void gs4i_scatter_forces(int index, void *context)
+{
+    gs4i_scatter_stage((const gs4i_pass *)context, index, NULL);
+}
+static void gs4i_scatter_forces_and_heat(int index, void *context)
+{
+    gs4i_warmth warmth;
+    gs4i_scatter_stage((const gs4i_pass *)context, index, &warmth);
+}
 
-/* --- S7 ---------------------------------------------------------------------------------------------- */
+/* --- S7 --------------------------------------------------------------------------------------- */
 
-/* Whether any block around occupied block o has jumps; then their tile; the fourth number is 1 in images that fold, else 0. */
+/* Whether any block around occupied block o has jumps; then their tile; the fourth number is 1
+ * in images that fold, else 0. */
 static int gs4i_load_jumps(const gs4i_grid *g, int o, uint64_t rows, gs4_real *tile)
 {
     const int32_t *nb = g->neighbour + 27 * (size_t)o;
@@ -7356,7 +9634,8 @@ static int gs4i_load_jumps(const gs4i_grid *g, int o, uint64_t rows, gs4_real *t
         for (i = 0; i < 3; i++) {
             static const int from[3] = { 8, 0, 0 }, to[3] = { 0, 8, 24 }, count[3] = { 8, 16, 8 };
             if (!g->jump_of[at[i] / GS4I_NODE_REALS]) continue;
-            memcpy(tile + to[i], gs4i_jump_at(g, (uint32_t)(at[i] / 4)) + from[i], (size_t)count[i] * sizeof *tile);
+            memcpy(tile + to[i], gs4i_jump_at(g, (uint32_t)(at[i] / 4)) + from[i],
+                   (size_t)count[i] * sizeof *tile);
         }
     }
     return 1;
@@ -7371,9 +9650,10 @@ static int gs4i_at_edge(const gs4i_grid *g, int o)
     return edge;
 }
 
-/* How little the grid sees of a particle among few others, by how full its nodes are: 1 below 8 %, smoothly to 0 at 20 %.
- * What it does not see of such spray would swing ever more (nodes this light take no part in the corrected gradient), so
- * there it fades at the rate c0 / h; so it does at walls, by the weight of the images. Both are rates: dt does not matter. */
+/* How little the grid sees of a particle among few others, by how full its nodes are: 1 below 8
+ * %, smoothly to 0 at 20 %. What it does not see of such spray would swing ever more (nodes this
+ * light take no part in the corrected gradient), so there it fades at the rate c0 / h; so it
+ * does at walls, by the weight of the images. Both are rates: dt does not matter. */
 GS4I_INLINE void gs4i_unseen(const gs4i_wide *filled, gs4i_wide *unseen)
 {
     const gs4i_wide zero = *filled - *filled, one = zero + GS4I_C(1);
@@ -7384,10 +9664,14 @@ GS4I_INLINE void gs4i_unseen(const gs4i_wide *filled, gs4i_wide *unseen)
 }
 
 /* What nodes and contact say to a batch in S7. */
-typedef struct gs4i_corrections { gs4i_lanes U[4] /* and mass there */, A[4], jump[4] /* and the share of images */, hidden[4]; gs4i_gradient L; } gs4i_corrections;
+typedef struct gs4i_corrections {
+    gs4i_lanes U[4] /* and mass there */, A[4], jump[4] /* and the share of images */, hidden[4];
+    gs4i_gradient L;
+} gs4i_corrections;
 
-/* S7. Velocity by rule 1, the motion that the grid cannot see fading: v~ - V at the rate 1/flip_decay_time, in spray and at walls v - U
- * faster, implicit in itself; J by 2021 (57), implicit in J for known div u; position by rule 1 with the grid's velocity U. In: move is
+/* S7. Velocity by rule 1, the motion that the grid cannot see fading: v~ - V at the rate
+ * 1/flip_decay_time, in spray and at walls v - U faster, implicit in itself; J by 2021 (57),
+ * implicit in J for known div u; position by rule 1 with the grid's velocity U. In: move is
  * dx/dt; out: what the new dx/dt lags behind v - shift a. */
 GS4I_INLINE void gs4i_correct_batch(gs4i_rule r, const gs4i_corrections *k, gs4i_batch *q)
 {
@@ -7403,8 +9687,11 @@ GS4I_INLINE void gs4i_correct_batch(gs4i_rule r, const gs4i_corrections *k, gs4i
     for (c = 0; c < 3; c++)
         GS4I_BATCH_LOOP(b) {
             const gs4i_wide v = q->v[c][b], a = q->a[c][b], move = q->move[c][b] + k->jump[c][b];
-            const gs4i_wide stage_a = (k->A[c][b] + r.fade * k->hidden[c][b] + decay[b] * (k->U[c][b] - (v + r.before * a))) * damped[b];
-            const gs4i_wide da = (stage_a - a) * r.inv_alpha_m, change = (k->U[c][b] - move) * r.inv_alpha_m;
+            const gs4i_wide stage_a = (k->A[c][b] + r.fade * k->hidden[c][b]
+                                       + decay[b] * (k->U[c][b] - (v + r.before * a)))
+                                      * damped[b];
+            const gs4i_wide da = (stage_a - a) * r.inv_alpha_m,
+                            change = (k->U[c][b] - move) * r.inv_alpha_m;
             q->v[c][b] = ((v + r.dt * a) + r.gamma * r.dt * da) + k->jump[c][b];
             q->a[c][b] = a + da;
             if (r.fading > 0) q->v[c][b] += r.fading * k->hidden[c][b];
@@ -7412,15 +9699,20 @@ GS4I_INLINE void gs4i_correct_batch(gs4i_rule r, const gs4i_corrections *k, gs4i
             q->move[c][b] = (q->v[c][b] - (move + change)) - r.next_shift * q->a[c][b];
         }
     GS4I_BATCH_LOOP(b) {
-        const gs4i_wide J = q->v[3][b], Jr = q->a[3][b], div = k->L[0][0][b] + k->L[1][1][b] + k->L[2][2][b];
-        const gs4i_wide dJ = ((J + r.reach.ahead * Jr) * div - Jr) / (r.alpha_m - r.alpha_f * r.gamma * r.dt * div);
+        const gs4i_wide J = q->v[3][b], Jr = q->a[3][b],
+                        div = k->L[0][0][b] + k->L[1][1][b] + k->L[2][2][b];
+        const gs4i_wide dJ =
+            ((J + r.reach.ahead * Jr) * div - Jr) / (r.alpha_m - r.alpha_f * r.gamma * r.dt * div);
         q->v[3][b] = (J + r.dt * Jr) + r.gamma * r.dt * dJ;
         q->a[3][b] = Jr + dJ;
     }
 }
 
 /* A batch as it goes back to memory: four numbers a particle, four halves of the lag. */
-typedef struct gs4i_stored { gs4_real x[4 * GS4I_BATCH], v[4 * GS4I_BATCH], a[4 * GS4I_BATCH]; gs4i_half lag[4 * GS4I_BATCH]; } gs4i_stored;
+typedef struct gs4i_stored {
+    gs4_real x[4 * GS4I_BATCH], v[4 * GS4I_BATCH], a[4 * GS4I_BATCH];
+    gs4i_half lag[4 * GS4I_BATCH];
+} gs4i_stored;
 
 GS4I_INLINE void gs4i_pack_batch(const gs4i_batch *q, int with_rates, gs4i_stored *o)
 {
@@ -7448,8 +9740,8 @@ GS4I_INLINE void gs4i_store_batch(const gs4i_particles *p, size_t i, int n, cons
 GS4I_INLINE int gs4i_has_left(const gs4i_grid *g, const gs4_real x[3])
 {
     return !(x[0] >= g->origin.x && x[0] < g->origin.x + GS4I_C(g->cells[0]) * g->h
-          && x[1] >= g->origin.y && x[1] < g->origin.y + GS4I_C(g->cells[1]) * g->h
-          && x[2] >= g->origin.z && x[2] < g->origin.z + GS4I_C(g->cells[2]) * g->h);
+             && x[1] >= g->origin.y && x[1] < g->origin.y + GS4I_C(g->cells[1]) * g->h
+             && x[2] >= g->origin.z && x[2] < g->origin.z + GS4I_C(g->cells[2]) * g->h);
 }
 
 /* Is any of n positions inside of a body, or may be? By the ball around their box. */
@@ -7460,19 +9752,28 @@ static int gs4i_may_touch(const gs4i_boundary *b, const gs4_real *x, int n, gs4_
     int i, a;
     if (!b->body_count) return 0;
     for (a = 0; a < 3; a++) {
-        for (low[a] = high[a] = x[a], i = 1; i < n; i++) { low[a] = gs4i_min(low[a], x[4 * i + a]); high[a] = gs4i_max(high[a], x[4 * i + a]); }
-        low[a] *= GS4I_C(0.5); high[a] *= GS4I_C(0.5);
+        for (low[a] = high[a] = x[a], i = 1; i < n; i++) {
+            low[a] = gs4i_min(low[a], x[4 * i + a]);
+            high[a] = gs4i_max(high[a], x[4 * i + a]);
+        }
+        low[a] *= GS4I_C(0.5);
+        high[a] *= GS4I_C(0.5);
     }
     midst = gs4i_vec3(low[0] + high[0], low[1] + high[1], low[2] + high[2]);
-    reach = gs4i_length(gs4i_vec3(high[0] - low[0], high[1] - low[1], high[2] - low[2])) + GS4I_C(0.1) * h;
-    for (i = 0; i < b->body_count; i++) if (!b->bodies[i].asleep && !(gs4i_body_distance(&b->bodies[i], midst) > reach)) return 1;
+    reach = gs4i_length(gs4i_vec3(high[0] - low[0], high[1] - low[1], high[2] - low[2]))
+            + GS4I_C(0.1) * h;
+    for (i = 0; i < b->body_count; i++)
+        if (!b->bodies[i].asleep && !(gs4i_body_distance(&b->bodies[i], midst) > reach)) return 1;
     return 0;
 }
 
 /* Walls, bodies and mouths on each particle after the step. */
-static void gs4i_correct_contact(gs4_sim *sim, size_t i, int n, gs4i_stored *o, gs4i_gathered *L, gs4i_report *report)
+static void gs4i_correct_contact(gs4_sim *sim, size_t i, int n, gs4i_stored *o, gs4i_gathered *L,
+                                 gs4i_report *report)
 {
-    gs4_real *elastic = sim->particles.elastic_reals ? sim->particles.elastic + (size_t)sim->particles.elastic_reals * i : NULL;
+    gs4_real *elastic = sim->particles.elastic_reals
+                            ? sim->particles.elastic + (size_t)sim->particles.elastic_reals * i
+                            : NULL;
     const int touches = gs4i_may_touch(&sim->boundary, o->x, n, sim->grid.h);
     int b;
     for (b = 0; b < n; b++) {
@@ -7486,16 +9787,22 @@ static void gs4i_correct_contact(gs4_sim *sim, size_t i, int n, gs4i_stored *o, 
             memset(L->dx + 4 * b, 0, 4 * sizeof *L->dx);
             memset(L->dy + 4 * b, 0, 4 * sizeof *L->dy);
             memset(L->dz + 4 * b, 0, 4 * sizeof *L->dz);
-            if (sim->particles.with_heat) gs4i_begin_heat(&sim->particles, i + (size_t)b, &sim->laws[sim->particles.material[i + (size_t)b]], mouth->is.temperature);
+            if (sim->particles.with_heat)
+                gs4i_begin_heat(&sim->particles, i + (size_t)b,
+                                &sim->laws[sim->particles.material[i + (size_t)b]],
+                                mouth->is.temperature);
             if (sim->particles.deformation_reals) gs4i_undeform(&sim->particles, i + (size_t)b, 1);
-            if (elastic) memset(elastic + (size_t)sim->particles.elastic_reals * (size_t)b, 0, (size_t)sim->particles.elastic_reals * sizeof *elastic);
+            if (elastic)
+                memset(elastic + (size_t)sim->particles.elastic_reals * (size_t)b, 0,
+                       (size_t)sim->particles.elastic_reals * sizeof *elastic);
         }
         report->left += gs4i_has_left(&sim->grid, o->x + 4 * b);
     }
 }
 
 /* Is the result one that may be kept? Moved at most two cells, all finite, J in its range. */
-static void gs4i_judge(gs4i_batch *q, gs4i_gradient L, const gs4_real *old_x, int n, gs4_real h, const uint32_t *id, gs4i_report *report)
+static void gs4i_judge(gs4i_batch *q, gs4i_gradient L, const gs4_real *old_x, int n, gs4_real h,
+                       const uint32_t *id, gs4i_report *report)
 {
     int b, i, j;
     for (b = 0; b < n; b++) {
@@ -7506,14 +9813,17 @@ static void gs4i_judge(gs4i_batch *q, gs4i_gradient L, const gs4_real *old_x, in
             all += v * v + GS4I_NTH(q->a[i], b);
             for (j = 0; j < 3; j++) all += GS4I_NTH(L[i][j], b) * GS4I_NTH(L[i][j], b);
         }
-        if (!(GS4I_NTH(q->v[3], b) > GS4I_J_LOW && GS4I_NTH(q->v[3], b) < GS4I_J_HIGH && gs4i_finite(GS4I_NTH(q->a[3], b)))) gs4i_see_bad(report, GS4I_BAD_VOLUME, id[b]);
+        if (!(GS4I_NTH(q->v[3], b) > GS4I_J_LOW && GS4I_NTH(q->v[3], b) < GS4I_J_HIGH
+              && gs4i_finite(GS4I_NTH(q->a[3], b))))
+            gs4i_see_bad(report, GS4I_BAD_VOLUME, id[b]);
         if (!(gs4i_finite(all) && moved <= 4 * h * h)) gs4i_see_bad(report, GS4I_BAD_MOTION, id[b]);
     }
 }
 
-/* Can the nodes around a block alone prove that S7 is safe for its particles? A node of mass m_i has weight at most m_i/m_p and
- * gradient at most sqrt(2 m_i/m_p)/h in any particle p, so with q_i = min(1, 14 sqrt(m_i/m_min)) and any velocity r no
- * particle sees |div u| > 4.7/h max_i q_i |u_i - r|_1; `spread` has that maximum about a block's own mean (gs4i_node_spreads). */
+/* Can the nodes around a block alone prove that S7 is safe for its particles? A node of mass m_i
+ * has weight at most m_i/m_p and gradient at most sqrt(2 m_i/m_p)/h in any particle p, so with
+ * q_i = min(1, 14 sqrt(m_i/m_min)) and any velocity r no particle sees |div u| > 4.7/h max_i q_i
+ * |u_i - r|_1; `spread` has that maximum about a block's own mean (gs4i_node_spreads). */
 static int gs4i_is_calm(const gs4i_pass *pass, int index)
 {
     const gs4_sim *sim = pass->sim;
@@ -7521,14 +9831,18 @@ static int gs4i_is_calm(const gs4i_pass *pass, int index)
     const int o = pass->blocks[index];
     const int32_t *nb = g->neighbour + 27 * (size_t)o;
     const gs4i_report *report = &sim->reports[o];
-    const gs4_real *mean = g->spread + 4 * (size_t)nb[13], limit = GS4I_C(0.2 / 4.7) * g->h / sim->rule.dt;
+    const gs4_real *mean = g->spread + 4 * (size_t)nb[13],
+                   limit = GS4I_C(0.2 / 4.7) * g->h / sim->rule.dt;
     int i, c;
-    if (!(report->min_J > GS4I_C(0.25) && report->max_J < 4) || report->hard || !gs4i_ghosts_are_calm(sim, o)) return 0;
-    for (c = 0; c < 3; c++) if (!(gs4i_abs(mean[c]) * sim->rule.dt < g->h)) return 0;
+    if (!(report->min_J > GS4I_C(0.25) && report->max_J < 4) || report->hard
+        || !gs4i_ghosts_are_calm(sim, o))
+        return 0;
+    for (c = 0; c < 3; c++)
+        if (!(gs4i_abs(mean[c]) * sim->rule.dt < g->h)) return 0;
     for (i = 0; i < 27; i++) {
         const gs4_real *of = g->spread + 4 * (size_t)nb[i];
         gs4_real all = of[3];
-        if (all < 0) continue;                              /* no material there */
+        if (all < 0) continue; /* no material there */
         for (c = 0; c < 3; c++) all += gs4i_abs(of[c] - mean[c]);
         if (!(all < limit)) return 0;
     }
@@ -7540,11 +9854,13 @@ static void gs4i_load_warmth(const gs4_sim *sim, int o, gs4i_warmth *w)
     memset(&w->laws, 0, sizeof w->laws);
     w->rule = &sim->warm;
     gs4i_tile_load(&sim->grid, o, sim->reports[o].rows, sim->conduction.content, w->content);
-    if (sim->particles.with_flux) gs4i_tile_load(&sim->grid, o, sim->reports[o].rows, sim->conduction.source, w->source);
+    if (sim->particles.with_flux)
+        gs4i_tile_load(&sim->grid, o, sim->reports[o].rows, sim->conduction.source, w->source);
 }
 
 /* S7 of heat for particles i to i + n. */
-static void gs4i_gather_heat(const gs4_sim *sim, size_t i, int n, const gs4i_stencils *s, gs4i_batch_laws *l, gs4i_gradient L, gs4i_warmth *w)
+static void gs4i_gather_heat(const gs4_sim *sim, size_t i, int n, const gs4i_stencils *s,
+                             gs4i_batch_laws *l, gs4i_gradient L, gs4i_warmth *w)
 {
     const gs4i_particles *p = &sim->particles;
     gs4i_gathered g;
@@ -7562,48 +9878,65 @@ static void gs4i_gather_heat(const gs4_sim *sim, size_t i, int n, const gs4i_ste
     }
     gs4i_to_lanes(rise, n, value);
     if (p->with_flux) {
-        gs4i_to_lanes(g.dx, n, column); memcpy(slope[0], column[0], sizeof slope[0]);
-        gs4i_to_lanes(g.dy, n, column); memcpy(slope[1], column[1], sizeof slope[1]);
-        gs4i_to_lanes(g.dz, n, column); memcpy(slope[2], column[2], sizeof slope[2]);
-        gs4i_to_lanes(g.value, n, column); memcpy(slope[3], column[3], sizeof slope[3]);
+        gs4i_to_lanes(g.dx, n, column);
+        memcpy(slope[0], column[0], sizeof slope[0]);
+        gs4i_to_lanes(g.dy, n, column);
+        memcpy(slope[1], column[1], sizeof slope[1]);
+        gs4i_to_lanes(g.dz, n, column);
+        memcpy(slope[2], column[2], sizeof slope[2]);
+        gs4i_to_lanes(g.value, n, column);
+        memcpy(slope[3], column[3], sizeof slope[3]);
     }
     gs4i_receive_heat(&w->laws, &sim->warm, value, slope, L, p->with_flux, &w->h);
     gs4i_store_heat(p, i, n, &w->h);
-    for (b = 0; b < n && w->laws.melts; b++)                /* hysteresis: in between the phase stays */
-        if (GS4I_NTH(w->h.fraction, b) >= 1 || GS4I_NTH(w->h.fraction, b) <= 0) gs4i_set_phase(p, i + (size_t)b, GS4I_NTH(w->h.fraction, b) > 0);
+    /* hysteresis: in between the phase stays */
+    for (b = 0; b < n && w->laws.melts; b++)
+        if (GS4I_NTH(w->h.fraction, b) >= 1 || GS4I_NTH(w->h.fraction, b) <= 0)
+            gs4i_set_phase(p, i + (size_t)b, GS4I_NTH(w->h.fraction, b) > 0);
 }
 
 /* The odd part of both, and of the gradients that were gathered. */
-static void gs4i_see_ghosts(int solids, const gs4i_ghost *ghosts, int n, gs4i_gathered *u, gs4i_gathered *acc)
+static void gs4i_see_ghosts(int solids, const gs4i_ghost *ghosts, int n, gs4i_gathered *u,
+                            gs4i_gathered *acc)
 {
     gs4i_make_odd(ghosts, n, u);
     gs4i_make_value_odd(ghosts, n, 1, acc);
     if (solids) gs4i_make_gradient_odd(ghosts, n, 1, acc);
 }
 
-static void gs4i_take_kicks(const gs4i_gathered *acc, const gs4i_gathered *jump, int n, gs4i_kicks *kicks)
+static void gs4i_take_kicks(const gs4i_gathered *acc, const gs4i_gathered *jump, int n,
+                            gs4i_kicks *kicks)
 {
     gs4i_gradient_lanes(acc->dx, acc->dy, acc->dz, n, kicks->acc);
-    if (jump) gs4i_gradient_lanes(jump->dx, jump->dy, jump->dz, n, kicks->jump);
-    else memset(kicks->jump, 0, sizeof kicks->jump);
+    if (jump)
+        gs4i_gradient_lanes(jump->dx, jump->dy, jump->dz, n, kicks->jump);
+    else
+        memset(kicks->jump, 0, sizeof kicks->jump);
 }
 
 /* S7 of stress and deformation, which see the temperature of the stage. */
-static void gs4i_advance_history(const gs4_sim *sim, size_t i, int n, gs4i_batch_laws *laws, gs4i_history_laws *past, gs4i_warmth *warmth, gs4i_gradient L,
-                                 gs4i_kicks *kicks, const gs4i_wide *J, gs4i_report *report, int commit)
+static void gs4i_advance_history(const gs4_sim *sim, size_t i, int n, gs4i_batch_laws *laws,
+                                 gs4i_history_laws *past, gs4i_warmth *warmth, gs4i_gradient L,
+                                 gs4i_kicks *kicks, const gs4i_wide *J, gs4i_report *report,
+                                 int commit)
 {
     const gs4i_particles *p = &sim->particles;
     gs4i_take_laws(sim->laws, sim->frozen, p, i, n, laws);
-    if (p->with_heat && laws->callbacks) gs4i_begin_warmth(p, i, n, sim->warm.reach.ahead, laws, warmth);
-    if (p->elastic_reals) gs4i_advance_elastic(p, i, n, &sim->rule, laws, &past->elastic, L, report, commit);
-    if (p->deformation_reals) gs4i_advance_solid(p, i, n, &sim->rule, laws, &past->solid, L, kicks, J, report, commit);
+    if (p->with_heat && laws->callbacks)
+        gs4i_begin_warmth(p, i, n, sim->warm.reach.ahead, laws, warmth);
+    if (p->elastic_reals)
+        gs4i_advance_elastic(p, i, n, &sim->rule, laws, &past->elastic, L, report, commit);
+    if (p->deformation_reals)
+        gs4i_advance_solid(p, i, n, &sim->rule, laws, &past->solid, L, kicks, J, report, commit);
 }
 
-/* S7: gather and correct. With `commit` 0 nothing is written: a rehearsal that only reports, of blocks that are not calm. */
+/* S7: gather and correct. With `commit` 0 nothing is written: a rehearsal that only reports, of
+ * blocks that are not calm. */
 static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_warmth *warmth)
 {
     gs4_sim *sim = pass->sim;
-    const int o = pass->blocks[index], next = pass->blocks[index + 1 < pass->count ? index + 1 : index];
+    const int o = pass->blocks[index],
+              next = pass->blocks[index + 1 < pass->count ? index + 1 : index];
     const gs4i_rule rule = sim->rule;
     const gs4i_particles p = sim->particles;
     gs4i_grid *grid = &sim->grid;
@@ -7612,28 +9945,36 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_warm
     gs4i_batch_laws laws;
     gs4i_history_laws past;
     gs4i_seen seen;
-    gs4i_corrections k; gs4i_kicks kicks;
+    gs4i_corrections k;
+    gs4i_kicks kicks;
     gs4_real u_nodes[GS4I_TILE_REALS], a_nodes[GS4I_TILE_REALS], j_nodes[GS4I_TILE_REALS];
-    const int jumps = gs4i_load_jumps(grid, o, report->rows, j_nodes), edge = jumps || gs4i_at_edge(grid, o);
+    const int jumps = gs4i_load_jumps(grid, o, report->rows, j_nodes),
+              edge = jumps || gs4i_at_edge(grid, o);
     const gs4i_ghost *ghosts = gs4i_ghosts_of(sim, o);
-    gs4i_gathered u; gs4i_stored out;
+    gs4i_gathered u;
+    gs4i_stored out;
     int row = 0;
     size_t i = (size_t)grid->first[o], end = (size_t)grid->first[o + 1];
     if (!commit && gs4i_is_calm(pass, index)) return;
     gs4i_tile_load(grid, o, report->rows, gs4i_seen_nodes(grid), u_nodes);
     gs4i_tile_load(grid, o, report->rows, grid->force, a_nodes);
     gs4i_see_nothing(&seen);
-    memset(&laws, 0, sizeof laws); memset(&past, 0, sizeof past);
+    memset(&laws, 0, sizeof laws);
+    memset(&past, 0, sizeof past);
     memset(&k, 0, sizeof k);
     if (warmth) gs4i_load_warmth(sim, o, warmth);
     for (; i < end; i += GS4I_BATCH, row += 2) {
         const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
-        gs4i_batch q; gs4i_stencils s;
+        gs4i_batch q;
+        gs4i_stencils s;
         gs4i_gathered acc, jump;
         int b, solids = 0;
         gs4i_tile_prefetch(grid, next, row, gs4i_seen_nodes(grid));
         gs4i_tile_prefetch(grid, next, row, grid->force);
-        if (p.deformation_reals) { gs4i_take_laws(sim->laws, sim->frozen, &p, i, n, &laws); solids = gs4i_take_solid_laws(&laws, &past.solid); }
+        if (p.deformation_reals) {
+            gs4i_take_laws(sim->laws, sim->frozen, &p, i, n, &laws);
+            solids = gs4i_take_solid_laws(&laws, &past.solid);
+        }
         gs4i_stage_batch(&p, i, n, rule.reach, &frame, &q, &s);
         for (b = 0; b < n; b++) {
             gs4i_row w, d;
@@ -7642,17 +9983,28 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_warm
             gs4i_gather_kick(solids, a_nodes + 4 * s.base[b], &s, b, &w, &d, &acc);
             if (jumps) gs4i_gather_kick(solids, j_nodes + 4 * s.base[b], &s, b, &w, &d, &jump);
         }
-        if (ghosts) { gs4i_see_ghosts(solids, ghosts, n, &u, &acc); ghosts += n; }
+        if (ghosts) {
+            gs4i_see_ghosts(solids, ghosts, n, &u, &acc);
+            ghosts += n;
+        }
         gs4i_to_lanes(u.value, n, k.U);
         gs4i_gradient_lanes(u.dx, u.dy, u.dz, n, k.L);
         gs4i_to_lanes(acc.value, n, k.A);
         if (jumps) gs4i_to_lanes(jump.value, n, k.jump);
-        if (p.with_fading) { gs4i_prefetch_hidden(&p, i + 4 * GS4I_BATCH); gs4i_to_lanes(p.hidden + 4 * i, n, k.hidden); }
+        if (p.with_fading) {
+            gs4i_prefetch_hidden(&p, i + 4 * GS4I_BATCH);
+            gs4i_to_lanes(p.hidden + 4 * i, n, k.hidden);
+        }
         gs4i_correct_batch(rule, &k, &q);
         if (solids) gs4i_take_kicks(&acc, jumps ? &jump : NULL, n, &kicks);
-        if (p.elastic_reals || p.deformation_reals || warmth) gs4i_advance_history(sim, i, n, &laws, &past, warmth, k.L, &kicks, q.v[3], report, commit);
+        if (p.elastic_reals || p.deformation_reals || warmth)
+            gs4i_advance_history(sim, i, n, &laws, &past, warmth, k.L, &kicks, q.v[3], report,
+                                 commit);
         if (warmth && commit) gs4i_gather_heat(sim, i, n, &s, &laws, k.L, warmth);
-        if (!commit) { gs4i_judge(&q, k.L, p.position + 4 * i, n, grid->h, p.id + i, report); continue; }
+        if (!commit) {
+            gs4i_judge(&q, k.L, p.position + 4 * i, n, grid->h, p.id + i, report);
+            continue;
+        }
         gs4i_pack_batch(&q, 1, &out);
         if (edge) gs4i_correct_contact(sim, i, n, &out, &u, report);
         gs4i_see_motion(&seen, q.v, k.L);
@@ -7661,12 +10013,26 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_warm
     if (commit) gs4i_report_motion(report, &seen);
 }
 
-static void gs4i_correct_task(int index, void *context) { gs4i_correct((const gs4i_pass *)context, index, 1, NULL); }
-static void gs4i_rehearse_task(int index, void *context) { gs4i_correct((const gs4i_pass *)context, index, 0, NULL); }
-static void gs4i_correct_with_heat_task(int index, void *context) { gs4i_warmth warmth; gs4i_correct((const gs4i_pass *)context, index, 1, &warmth); }
-static void gs4i_rehearse_with_heat_task(int index, void *context) { gs4i_warmth warmth; gs4i_correct((const gs4i_pass *)context, index, 0, &warmth); }
+static void gs4i_correct_task(int index, void *context)
+{
+    gs4i_correct((const gs4i_pass *)context, index, 1, NULL);
+}
+static void gs4i_rehearse_task(int index, void *context)
+{
+    gs4i_correct((const gs4i_pass *)context, index, 0, NULL);
+}
+static void gs4i_correct_with_heat_task(int index, void *context)
+{
+    gs4i_warmth warmth;
+    gs4i_correct((const gs4i_pass *)context, index, 1, &warmth);
+}
+static void gs4i_rehearse_with_heat_task(int index, void *context)
+{
+    gs4i_warmth warmth;
+    gs4i_correct((const gs4i_pass *)context, index, 0, &warmth);
+}
 
-/* --- symplectic Euler -------------------------------------------------------------------------------- */
+/* --- symplectic Euler ------------------------------------------------------------------------- */
 
 /* The velocity gradients of n particles. */
 GS4I_INLINE void gs4i_load_affine(const gs4i_particles *p, size_t i, int n, gs4i_gradient L)
@@ -7674,10 +10040,14 @@ GS4I_INLINE void gs4i_load_affine(const gs4i_particles *p, size_t i, int n, gs4i
     gs4i_gradient_lanes(p->affine[0] + 4 * i, p->affine[1] + 4 * i, p->affine[2] + 4 * i, n, L);
 }
 
-/* Momentum and impulse of stress and weight as one affine field: m (v + dt g) + (m C - dt V sigma 4/h^2) (x_i - x). */
-GS4I_INLINE void gs4i_affine_momentum(const gs4i_particles *p, size_t at, int n, const gs4i_rule *rule, const gs4i_batch *q, const gs4i_batch_laws *l,
-                                      gs4i_history_laws *past, const gs4i_stencils *s, gs4i_gradient C, gs4_real h, const gs4_real fall[3],
-                                      gs4i_affine_forces *f, gs4i_lanes mu, gs4i_seen *seen, gs4i_report *report, gs4i_warmth *warmth)
+/* Momentum and impulse of stress and weight as one affine field: m (v + dt g) + (m C - dt V
+ * sigma 4/h^2) (x_i - x). */
+GS4I_INLINE void gs4i_affine_momentum(const gs4i_particles *p, size_t at, int n,
+                                      const gs4i_rule *rule, const gs4i_batch *q,
+                                      const gs4i_batch_laws *l, gs4i_history_laws *past,
+                                      const gs4i_stencils *s, gs4i_gradient C, gs4_real h,
+                                      const gs4_real fall[3], gs4i_affine_forces *f, gs4i_lanes mu,
+                                      gs4i_seen *seen, gs4i_report *report, gs4i_warmth *warmth)
 {
     const gs4_real dt = rule->dt;
     gs4i_symmetric sigma;
@@ -7685,18 +10055,25 @@ GS4I_INLINE void gs4i_affine_momentum(const gs4i_particles *p, size_t at, int n,
     gs4i_gradient Q;
     int b, i, j;
     gs4i_liquid_stress(l, q->v[3], C, sigma, mu);
-    if (p->elastic_reals) gs4i_add_elastic(p, at, n, rule, l, &past->elastic, C, sigma, seen, report);
-    if (p->deformation_reals) gs4i_add_solid(p, at, n, rule, l, &past->solid, C, q->v[3], sigma, seen, report);
+    if (p->elastic_reals)
+        gs4i_add_elastic(p, at, n, rule, l, &past->elastic, C, sigma, seen, report);
+    if (p->deformation_reals)
+        gs4i_add_solid(p, at, n, rule, l, &past->solid, C, q->v[3], sigma, seen, report);
     if (warmth) gs4i_send_warmth(l, q->x[3], q->v[3], C, sigma, p->with_flux, warmth);
     gs4i_affine_bound(C, dt, bound);
     GS4I_BATCH_LOOP(b) {
         bound[b] *= q->x[3][b] * h;
         k[b] = -dt * q->x[3][b] * l->inv_density[b] * q->v[3][b] * (4 / h);
     }
-    for (i = 0; i < 3; i++) for (j = 0; j < 3; j++) GS4I_BATCH_LOOP(b) Q[i][j][b] = bound[b] * C[i][j][b] + k[b] * sigma[gs4i_place[i][j]][b];
+    for (i = 0; i < 3; i++)
+        for (j = 0; j < 3; j++)
+            GS4I_BATCH_LOOP(b)
+                Q[i][j][b] = bound[b] * C[i][j][b] + k[b] * sigma[gs4i_place[i][j]][b];
     for (i = 0; i < 3; i++)
         GS4I_BATCH_LOOP(b)
-            middle[i][b] = q->x[3][b] * (q->v[i][b] + fall[i]) - (Q[i][0][b] * s->xi[0][b] + Q[i][1][b] * s->xi[1][b] + Q[i][2][b] * s->xi[2][b]);
+            middle[i][b] =
+                q->x[3][b] * (q->v[i][b] + fall[i])
+                - (Q[i][0][b] * s->xi[0][b] + Q[i][1][b] * s->xi[1][b] + Q[i][2][b] * s->xi[2][b]);
     memset(none, 0, sizeof none);
     gs4i_from_lanes(middle[0], middle[1], middle[2], q->x[3], f->middle);
     gs4i_from_lanes(Q[0][0], Q[1][0], Q[2][0], none, f->x);
@@ -7713,7 +10090,8 @@ static void gs4i_scatter_affinely(const gs4i_pass *pass, int index, gs4i_warmth 
     const gs4i_reach reach = { 0, 0 };
     const gs4_real dt = sim->rule.dt, h = sim->grid.h;
     const gs4i_frame frame = gs4i_tile_frame(&sim->grid, sim->grid.occupied_block[o]);
-    const gs4_real fall[3] = { dt * sim->desc.gravity.x, dt * sim->desc.gravity.y, dt * sim->desc.gravity.z };
+    const gs4_real fall[3] = { dt * sim->desc.gravity.x, dt * sim->desc.gravity.y,
+                               dt * sim->desc.gravity.z };
     gs4i_report *report = &sim->reports[o];
     gs4i_batch_laws laws;
     gs4i_history_laws past;
@@ -7742,15 +10120,22 @@ static void gs4i_scatter_affinely(const gs4i_pass *pass, int index, gs4i_warmth 
         gs4i_load_affine(&p, i, n, C);
         gs4i_take_laws(sim->laws, sim->frozen, &p, i, n, &laws);
         if (warmth) gs4i_begin_warmth(&p, i, n, 0, &laws, warmth);
-        gs4i_affine_momentum(&p, i, n, &sim->rule, &q, &laws, &past, &s, C, h, fall, &f, mu, &seen, report, warmth);
+        gs4i_affine_momentum(&p, i, n, &sim->rule, &q, &laws, &past, &s, C, h, fall, &f, mu, &seen,
+                             report, warmth);
         gs4i_see_liquids(&seen, &laws, q.v[3], mu);
         gs4i_check_liquids(report, q.v[3], mu, p.id + i, n);
         for (b = 0; b < n; b++) {
-            if (s.base[b] < 0) { report->strayed++; continue; }
+            if (s.base[b] < 0) {
+                report->strayed++;
+                continue;
+            }
             rows |= gs4i_touched_rows(s.base[b]);
             gs4i_scatter_affine(tile, &s, b, &f);
         }
-        if (ghosts) { gs4i_reflect_affine(ghosts, n, &s, &f, h); ghosts += n; }
+        if (ghosts) {
+            gs4i_reflect_affine(ghosts, n, &s, &f, h);
+            ghosts += n;
+        }
         if (warmth) gs4i_scatter_warmth(sim, warmth, &s, n);
     }
     gs4i_report_liquids(report, &seen);
@@ -7759,17 +10144,29 @@ static void gs4i_scatter_affinely(const gs4i_pass *pass, int index, gs4i_warmth 
     if (warmth) gs4i_add_warmth(sim, o, warmth);
 }
 
-static void gs4i_scatter_euler(int index, void *context) { gs4i_scatter_affinely((const gs4i_pass *)context, index, NULL); }
-static void gs4i_scatter_euler_and_heat(int index, void *context) { gs4i_warmth warmth; gs4i_scatter_affinely((const gs4i_pass *)context, index, &warmth); }
+static void gs4i_scatter_euler(int index, void *context)
+{
+    gs4i_scatter_affinely((const gs4i_pass *)context, index, NULL);
+}
+static void gs4i_scatter_euler_and_heat(int index, void *context)
+{
+    gs4i_warmth warmth;
+    gs4i_scatter_affinely((const gs4i_pass *)context, index, &warmth);
+}
 
 /* v = sum w v_i, C = sum v_i (x) grad w, J += dt J tr C, x += dt v. */
-GS4I_INLINE void gs4i_advect_batch(gs4_real dt, const gs4i_gathered *u, int n, gs4i_batch *q, gs4i_gradient C)
+GS4I_INLINE void gs4i_advect_batch(gs4_real dt, const gs4i_gathered *u, int n, gs4i_batch *q,
+                                   gs4i_gradient C)
 {
     gs4i_lanes v[4];
     int b, c;
     gs4i_to_lanes(u->value, n, v);
     gs4i_gradient_lanes(u->dx, u->dy, u->dz, n, C);
-    for (c = 0; c < 3; c++) GS4I_BATCH_LOOP(b) { q->x[c][b] += dt * v[c][b]; q->v[c][b] = v[c][b]; }
+    for (c = 0; c < 3; c++)
+        GS4I_BATCH_LOOP(b) {
+            q->x[c][b] += dt * v[c][b];
+            q->v[c][b] = v[c][b];
+        }
     GS4I_BATCH_LOOP(b) q->v[3][b] += dt * q->v[3][b] * (C[0][0][b] + C[1][1][b] + C[2][2][b]);
 }
 
@@ -7777,7 +10174,8 @@ GS4I_INLINE void gs4i_advect_batch(gs4_real dt, const gs4i_gathered *u, int n, g
 static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, gs4i_warmth *warmth)
 {
     gs4_sim *sim = pass->sim;
-    const int o = pass->blocks[index], next = pass->blocks[index + 1 < pass->count ? index + 1 : index];
+    const int o = pass->blocks[index],
+              next = pass->blocks[index + 1 < pass->count ? index + 1 : index];
     const gs4i_reach reach = { 0, 0 };
     const gs4i_particles p = sim->particles;
     gs4i_grid *grid = &sim->grid;
@@ -7813,11 +10211,18 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, gs4i
             gs4i_x_weights(&s, b, &w, &d);
             gs4i_gather_local(nodes + 4 * s.base[b], &s, b, &w, &d, &u);
         }
-        if (ghosts) { gs4i_make_odd(ghosts, n, &u); ghosts += n; }
+        if (ghosts) {
+            gs4i_make_odd(ghosts, n, &u);
+            ghosts += n;
+        }
         gs4i_advect_batch(sim->rule.dt, &u, n, &q, C);
-        if (p.elastic_reals || p.deformation_reals || warmth) gs4i_advance_history(sim, i, n, &laws, &past, warmth, C, NULL, q.v[3], report, commit);
+        if (p.elastic_reals || p.deformation_reals || warmth)
+            gs4i_advance_history(sim, i, n, &laws, &past, warmth, C, NULL, q.v[3], report, commit);
         if (warmth && commit) gs4i_gather_heat(sim, i, n, &s, &laws, C, warmth);
-        if (!commit) { gs4i_judge(&q, C, p.position + 4 * i, n, grid->h, p.id + i, report); continue; }
+        if (!commit) {
+            gs4i_judge(&q, C, p.position + 4 * i, n, grid->h, p.id + i, report);
+            continue;
+        }
         gs4i_pack_batch(&q, 0, &out);
         if (edge) gs4i_correct_contact(sim, i, n, &out, &u, report);
         gs4i_see_motion(&seen, q.v, C);
@@ -7829,13 +10234,30 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, gs4i
     if (commit) gs4i_report_motion(report, &seen);
 }
 
-static void gs4i_gather_euler_task(int index, void *context) { gs4i_gather_euler((const gs4i_pass *)context, index, 1, NULL); }
-static void gs4i_rehearse_euler_task(int index, void *context) { gs4i_gather_euler((const gs4i_pass *)context, index, 0, NULL); }
-static void gs4i_gather_euler_with_heat_task(int index, void *context) { gs4i_warmth warmth; gs4i_gather_euler((const gs4i_pass *)context, index, 1, &warmth); }
-static void gs4i_rehearse_euler_with_heat_task(int index, void *context) { gs4i_warmth warmth; gs4i_gather_euler((const gs4i_pass *)context, index, 0, &warmth); }
+static void gs4i_gather_euler_task(int index, void *context)
+{
+    gs4i_gather_euler((const gs4i_pass *)context, index, 1, NULL);
+}
+static void gs4i_rehearse_euler_task(int index, void *context)
+{
+    gs4i_gather_euler((const gs4i_pass *)context, index, 0, NULL);
+}
+static void gs4i_gather_euler_with_heat_task(int index, void *context)
+{
+    gs4i_warmth warmth;
+    gs4i_gather_euler((const gs4i_pass *)context, index, 1, &warmth);
+}
+static void gs4i_rehearse_euler_with_heat_task(int index, void *context)
+{
+    gs4i_warmth warmth;
+    gs4i_gather_euler((const gs4i_pass *)context, index, 0, &warmth);
+}
 
 /* Run a scattering kernel over all occupied blocks. */
-static void gs4i_scatter(gs4_sim *sim, gs4_task_fn kernel) { gs4i_scatter_by_colour(sim, sim->grid.by_colour, sim->grid.colour_first, kernel); }
+static void gs4i_scatter(gs4_sim *sim, gs4_task_fn kernel)
+{
+    gs4i_scatter_by_colour(sim, sim->grid.by_colour, sim->grid.colour_first, kernel);
+}
 
 static void gs4i_gather(gs4_sim *sim, gs4_task_fn kernel)
 {
@@ -7856,17 +10278,20 @@ static gs4i_report gs4i_all_reports(const gs4_sim *sim)
     return all;
 }
 
-/* ==== [[conduction]] heat from node to node ======================================================== *
+/* ==== [[conduction]] heat from node to node ==================================================== *
  *
- * Unknown is the rise x = T~ - T** of every node with material, so that what the solver leaves undone is small against the
- * heat that moves. Nodes are cells of a dense box around the material; between two of them conducts
+ * Unknown is the rise x = T~ - T** of every node with material, so that what the solver leaves
+ * undone is small against the heat that moves. Nodes are cells of a dense box around the
+ * material; between two of them conducts
  *
- *     c_f = s K_f fill_f,   K_f the harmonic mean of their conductivities, fill_f the mean of how full they are,
+ *     c_f = s K_f fill_f,   K_f the harmonic mean of their conductivities,
+ *     fill_f the mean of how full they are,
  *
- * which at a free surface fades with the material: insulated by nature. Isothermal: a wall at half a cell through
- * the face; air and bodies through the area that a node shows, fill_i - fill_j towards each emptier neighbour j, at
- * GS4I_SURFACE_DEPTH cells (less where it is oblique, by what the step to j is shorter), which puts them on the surface. Images mirror: evenly where a wall is insulated,
- * oddly about its temperature where it is not. */
+ * which at a free surface fades with the material: insulated by nature. Isothermal: a wall at
+ * half a cell through the face; air and bodies through the area that a node shows, fill_i -
+ * fill_j towards each emptier neighbour j, at GS4I_SURFACE_DEPTH cells (less where it is
+ * oblique, by what the step to j is shorter), which puts them on the surface. Images mirror:
+ * evenly where a wall is insulated, oddly about its temperature where it is not. */
 
 #define GS4I_SURFACE_DEPTH GS4I_C(0.83)
 
@@ -7883,9 +10308,11 @@ static void gs4i_fold_heat(const gs4_sim *sim)
             const gs4_real *from = k->content + 4 * (size_t)b->images[wall][i].image;
             gs4_real *to = k->content + 4 * (size_t)b->images[wall][i].mirror;
             to[1] += odd ? twice * from[0] - from[1] : from[1];
-            for (a = 0; a < 4; a++) if (a != 1) to[a] += from[a];
+            for (a = 0; a < 4; a++)
+                if (a != 1) to[a] += from[a];
             if (k->source) {
-                from = k->source + 4 * (size_t)b->images[wall][i].image; to = k->source + 4 * (size_t)b->images[wall][i].mirror;
+                from = k->source + 4 * (size_t)b->images[wall][i].image;
+                to = k->source + 4 * (size_t)b->images[wall][i].mirror;
                 to[0] += odd ? -from[0] : from[0];
                 to[1] += from[1];
             }
@@ -7900,19 +10327,25 @@ static void gs4i_fill_heat(const gs4_sim *sim)
     const gs4i_conduction *k = &sim->conduction;
     int wall, i, a;
     for (wall = 5; wall >= 0; wall--) {
-        const gs4_real sign = GS4I_C(sim->desc.wall_is_isothermal[wall] ? -1 : 1), twice = sim->desc.wall_is_isothermal[wall] ? 2 * sim->desc.wall_temperature[wall] : 0;
+        const gs4_real sign = GS4I_C(sim->desc.wall_is_isothermal[wall] ? -1 : 1),
+                       twice = sim->desc.wall_is_isothermal[wall]
+                                   ? 2 * sim->desc.wall_temperature[wall]
+                                   : 0;
         for (i = 0; i < b->image_count[wall]; i++) {
-            const size_t from = 4 * (size_t)b->images[wall][i].mirror, to = 4 * (size_t)b->images[wall][i].image;
+            const size_t from = 4 * (size_t)b->images[wall][i].mirror,
+                         to = 4 * (size_t)b->images[wall][i].image;
             k->content[to] = sign * k->content[from];
             k->content[to + 1] = k->content[from + 1];
             k->content[to + 2] = twice * k->content[from + 1] + sign * k->content[from + 2];
-            for (a = 0; a < 3 && sim->particles.with_flux; a++) k->source[to + (size_t)a] = twice + sign * k->source[from + (size_t)a];
+            for (a = 0; a < 3 && sim->particles.with_flux; a++)
+                k->source[to + (size_t)a] = twice + sign * k->source[from + (size_t)a];
             if (sim->particles.with_flux) k->source[to + 3] = k->source[from + 3];
         }
     }
 }
 
-/* Nodes that can be unknown along one axis: those of the domain, and behind an open wall those that exist. */
+/* Nodes that can be unknown along one axis: those of the domain, and behind an open wall those
+ * that exist. */
 static void gs4i_heat_range(const gs4_sim *sim, int axis, int *begin, int *end)
 {
     *begin = sim->desc.walls[2 * axis] == GS4_WALL_OPEN ? -4 : 0;
@@ -7926,7 +10359,11 @@ static int gs4i_heat_box(gs4_sim *sim)
     gs4i_memory *m = &sim->memory;
     int a, s, begin[3], end[3], high[3];
     size_t cells = 1;
-    for (a = 0; a < 3; a++) { gs4i_heat_range(sim, a, &begin[a], &end[a]); k->low[a] = end[a]; high[a] = begin[a]; }
+    for (a = 0; a < 3; a++) {
+        gs4i_heat_range(sim, a, &begin[a], &end[a]);
+        k->low[a] = end[a];
+        high[a] = begin[a];
+    }
     for (s = 0; s < sim->grid.active; s++) {
         int at[3];
         gs4i_block_coordinates(&sim->grid, sim->grid.block[s], at);
@@ -7940,25 +10377,31 @@ static int gs4i_heat_box(gs4_sim *sim)
         if (k->low[a] < begin[a] || sim->grid.periodic[a]) k->low[a] = begin[a];
         if (high[a] > end[a] || sim->grid.periodic[a]) high[a] = end[a];
         k->size[a] = high[a] - k->low[a];
-        cells *= (size_t)k->size[a] + 1;                    /* a face more than cells along each axis */
+        /* a face more than cells along each axis */
+        cells *= (size_t)k->size[a] + 1;
     }
     if (cells > k->room) {
         gs4_real *reals;
         uint8_t *kind;
         double *outer = NULL;
         const size_t room = cells + cells / 8;
-        const int periodic = sim->grid.periodic[0] || sim->grid.periodic[1] || sim->grid.periodic[2];
+        const int periodic =
+            sim->grid.periodic[0] || sim->grid.periodic[1] || sim->grid.periodic[2];
         reals = (gs4_real *)gs4i_alloc(m, room, GS4I_HEAT_FIELDS * sizeof *reals);
         kind = (uint8_t *)gs4i_alloc(m, room, 1);
         if (periodic) outer = (double *)gs4i_alloc(m, room, 4 * sizeof *outer);
         if (!reals || !kind || (periodic && !outer)) {
             gs4i_free(m, outer, room, 4 * sizeof *outer);
-            gs4i_free(m, reals, room, GS4I_HEAT_FIELDS * sizeof *reals); gs4i_free(m, kind, room, 1);
+            gs4i_free(m, reals, room, GS4I_HEAT_FIELDS * sizeof *reals);
+            gs4i_free(m, kind, room, 1);
             return GS4_ERROR_MEMORY;
         }
-        gs4i_free(m, k->field[0], k->room, GS4I_HEAT_FIELDS * sizeof *reals); gs4i_free(m, k->kind, k->room, 1);
+        gs4i_free(m, k->field[0], k->room, GS4I_HEAT_FIELDS * sizeof *reals);
+        gs4i_free(m, k->kind, k->room, 1);
         gs4i_free(m, k->outer, k->room, 4 * sizeof *outer);
-        k->kind = kind; k->room = room; k->outer = outer;
+        k->kind = kind;
+        k->room = room;
+        k->outer = outer;
         for (a = 0; a < GS4I_HEAT_FIELDS; a++) k->field[a] = reals + room * (size_t)a;
     }
     return GS4_OK;
@@ -7970,10 +10413,15 @@ GS4I_INLINE size_t gs4i_heat_cell(const gs4i_conduction *k, int x, int y, int z)
 }
 
 /* Node i of the block at `block` in the box: coordinates, and its cell; 0 if it is outside. */
-GS4I_INLINE int gs4i_heat_cell_of(const gs4i_conduction *k, const int block[3], int i, int at[3], size_t *cell)
+GS4I_INLINE int gs4i_heat_cell_of(const gs4i_conduction *k, const int block[3], int i, int at[3],
+                                  size_t *cell)
 {
-    at[0] = 4 * (block[0] - 1) + (i & 3) - k->low[0]; at[1] = 4 * (block[1] - 1) + (i >> 2 & 3) - k->low[1]; at[2] = 4 * (block[2] - 1) + (i >> 4) - k->low[2];
-    if (at[0] < 0 || at[1] < 0 || at[2] < 0 || at[0] >= k->size[0] || at[1] >= k->size[1] || at[2] >= k->size[2]) return 0;
+    at[0] = 4 * (block[0] - 1) + (i & 3) - k->low[0];
+    at[1] = 4 * (block[1] - 1) + (i >> 2 & 3) - k->low[1];
+    at[2] = 4 * (block[2] - 1) + (i >> 4) - k->low[2];
+    if (at[0] < 0 || at[1] < 0 || at[2] < 0 || at[0] >= k->size[0] || at[1] >= k->size[1]
+        || at[2] >= k->size[2])
+        return 0;
     *cell = gs4i_heat_cell(k, at[0], at[1], at[2]);
     return 1;
 }
@@ -7998,16 +10446,24 @@ static void gs4i_heat_nodes(int index, void *context)
             if (!(g->momentum[node + 3] > pass->lightest) || !(q[0] > 0) || !(q[3] > 0)) continue;
             k->kind[cell] = GS4_CELL_LIQUID;
             k->field[GS4I_HEAT_T][cell] = q[1] / q[0];
-            k->field[GS4I_HEAT_K][cell] = q[3] / q[2];      /* one behind the other, as heat goes where two materials meet */
+            /* one behind the other, as heat goes where two materials meet */
+            k->field[GS4I_HEAT_K][cell] = q[3] / q[2];
             k->field[GS4I_HEAT_FILL][cell] = q[3] * inv_cell;
-            k->field[GS4I_HEAT_MIX][cell] = gs4i_min((k->source ? k->source[node + 1] : GS4I_MIXING * q[3] * q[3] / q[2] * g->inv_h * g->inv_h) / q[0], sim->warm.mixing) * q[0] * inv_cell;
+            k->field[GS4I_HEAT_MIX][cell] =
+                gs4i_min((k->source ? k->source[node + 1]
+                                    : GS4I_MIXING * q[3] * q[3] / q[2] * g->inv_h * g->inv_h)
+                             / q[0],
+                         sim->warm.mixing)
+                * q[0] * inv_cell;
             k->field[GS4I_HEAT_HOLDS][cell] = k->field[GS4I_HEAT_DIAGONAL][cell] = q[0] * inv_cell;
-            k->field[GS4I_HEAT_RHS][cell] = k->source ? k->source[node] * inv_cell * sim->warm.s : GS4I_C(0);
+            k->field[GS4I_HEAT_RHS][cell] =
+                k->source ? k->source[node] * inv_cell * sim->warm.s : GS4I_C(0);
         }
     }
 }
 
-/* The temperature (K) that a node feels at its empty neighbour at p, if any: of a body there, or of the air. */
+/* The temperature (K) that a node feels at its empty neighbour at p, if any: of a body there, or
+ * of the air. */
 static int gs4i_is_isothermal_at(const gs4_sim *sim, gs4_vec3 p, gs4_real *T)
 {
     int b;
@@ -8038,15 +10494,20 @@ static void gs4i_heat_faces(int z, void *context)
                 size_t i, j;
                 *face = 0;
                 if ((at == 0 || at == n) && !sim->grid.periodic[axis]) continue;
-                i = gs4i_heat_cell(k, axis == 0 && x == n ? 0 : x, axis == 1 && y == n ? 0 : y, axis == 2 && z == n ? 0 : z);
-                j = gs4i_heat_cell(k, axis == 0 ? (x ? x : n) - 1 : x, axis == 1 ? (y ? y : n) - 1 : y, axis == 2 ? (z ? z : n) - 1 : z);
-                if (K[i] > 0 && K[j] > 0) *face = s * K[i] * (K[j] / (K[i] + K[j])) * (fill[i] + fill[j]);
+                i = gs4i_heat_cell(k, axis == 0 && x == n ? 0 : x, axis == 1 && y == n ? 0 : y,
+                                   axis == 2 && z == n ? 0 : z);
+                j = gs4i_heat_cell(k, axis == 0 ? (x ? x : n) - 1 : x,
+                                   axis == 1 ? (y ? y : n) - 1 : y,
+                                   axis == 2 ? (z ? z : n) - 1 : z);
+                if (K[i] > 0 && K[j] > 0)
+                    *face = s * K[i] * (K[j] / (K[i] + K[j])) * (fill[i] + fill[j]);
             }
     }
 }
 
-/* Closes faces that let through next to nothing of what the best of them does: the solver takes less contrast than what near-empty nodes and
- * insulators, whose conductivity is GS4I_INSULATES, make of it. Nothing that can be seen goes through them. */
+/* Closes faces that let through next to nothing of what the best of them does: the solver takes
+ * less contrast than what near-empty nodes and insulators, whose conductivity is GS4I_INSULATES,
+ * make of it. Nothing that can be seen goes through them. */
 static void gs4i_close_faint_faces(const gs4i_conduction *k)
 {
     gs4_real most = 0;
@@ -8057,27 +10518,37 @@ static void gs4i_close_faint_faces(const gs4i_conduction *k)
             size_t i, n = 1;
             int a;
             for (a = 0; a < 3; a++) n *= (size_t)k->size[a] + (a == axis);
-            if (!pass) for (i = 0; i < n; i++) most = gs4i_max(most, face[i]);
-            else for (i = 0; i < n; i++) if (face[i] < GS4I_C(1e-25) * most) face[i] = 0;
+            if (!pass)
+                for (i = 0; i < n; i++) most = gs4i_max(most, face[i]);
+            else
+                for (i = 0; i < n; i++)
+                    if (face[i] < GS4I_C(1e-25) * most) face[i] = 0;
         }
 }
 
-/* How full the node `far` steps from cell `at` along a side is: around a periodic axis, by images behind a wall; nothing beyond the box else. */
+/* How full the node `far` steps from cell `at` along a side is: around a periodic axis, by
+ * images behind a wall; nothing beyond the box else. */
 GS4I_INLINE gs4_real gs4i_fill_beyond(const gs4_sim *sim, const int at[3], int side, int far)
 {
     const gs4i_conduction *k = &sim->conduction;
-    const int a = side / 2, n = sim->grid.cells[a], there = at[a] + k->low[a] + (side & 1 ? far : -far);
+    const int a = side / 2, n = sim->grid.cells[a],
+              there = at[a] + k->low[a] + (side & 1 ? far : -far);
     int p[3];
-    p[0] = at[0]; p[1] = at[1]; p[2] = at[2];
+    p[0] = at[0];
+    p[1] = at[1];
+    p[2] = at[2];
     p[a] = there - k->low[a];
-    if (sim->grid.periodic[a]) p[a] = (p[a] + n) % n;
-    else if ((there < 0 || there >= n) && sim->desc.walls[side] != GS4_WALL_OPEN) p[a] = (there < 0 ? -1 - there : 2 * n - 1 - there) - k->low[a];
+    if (sim->grid.periodic[a])
+        p[a] = (p[a] + n) % n;
+    else if ((there < 0 || there >= n) && sim->desc.walls[side] != GS4_WALL_OPEN)
+        p[a] = (there < 0 ? -1 - there : 2 * n - 1 - there) - k->low[a];
     if (p[a] < 0 || p[a] >= k->size[a]) return 0;
     return k->field[GS4I_HEAT_FILL][gs4i_heat_cell(k, p[0], p[1], p[2])];
 }
 
-/* Links of one cell to isothermal walls, air and bodies: their sum, 1/h^2, and that of their temperatures. An area that is shown
- * along several axes counts once: each by its share of the normal. */
+/* Links of one cell to isothermal walls, air and bodies: their sum, 1/h^2, and that of their
+ * temperatures. An area that is shown along several axes counts once: each by its share of the
+ * normal. */
 static gs4_real gs4i_isothermal_links(const gs4_sim *sim, const int at[3], gs4_real *warmth)
 {
     const gs4i_conduction *k = &sim->conduction;
@@ -8088,26 +10559,41 @@ static gs4_real gs4i_isothermal_links(const gs4_sim *sim, const int at[3], gs4_r
     for (side = 0; side < 6; side++) {
         const int next = at[side / 2] + k->low[side / 2] + (side & 1 ? 1 : -1);
         shows[side] = 0;
-        if ((next < 0 || next >= sim->grid.cells[side / 2]) && sim->desc.walls[side] != GS4_WALL_OPEN) {
-            if (sim->desc.wall_is_isothermal[side]) { all += 2 * fill; *warmth += 2 * fill * sim->desc.wall_temperature[side]; }
-        } else if (k->exposed && gs4i_fill_beyond(sim, at, side, 3) < GS4I_C(0.5))     /* not the noise of the inside */
+        if ((next < 0 || next >= sim->grid.cells[side / 2])
+            && sim->desc.walls[side] != GS4_WALL_OPEN) {
+            if (sim->desc.wall_is_isothermal[side]) {
+                all += 2 * fill;
+                *warmth += 2 * fill * sim->desc.wall_temperature[side];
+            }
+            /* not the noise of the inside */
+        } else if (k->exposed && gs4i_fill_beyond(sim, at, side, 3) < GS4I_C(0.5))
             shows[side] = gs4i_max(fill - gs4i_fill_beyond(sim, at, side, 1), GS4I_C(0));
         most = gs4i_max(most, shows[side]);
     }
     for (side = 0; side < 6; side++) {
-        const gs4_real own = most > 0 ? shows[side] / most : GS4I_C(0);     /* of `most`: what a node with next to no mass shows has no square in float */
+        /* of `most`: what a node with next to no mass shows has no square in float */
+        const gs4_real own = most > 0 ? shows[side] / most : GS4I_C(0);
         gs4_real square = own * own, cube = square * own, p[3], norm, link;
         if (!(shows[side] > 0)) continue;
         for (a = 0; a < 3; a++) {
             const gs4_real other = gs4i_max(shows[2 * a], shows[2 * a + 1]) / most;
-            if (a != side / 2) { square += other * other; cube += other * other * other; }
+            if (a != side / 2) {
+                square += other * other;
+                cube += other * other * other;
+            }
             p[a] = GS4I_C(at[a] + k->low[a]) + GS4I_C(0.5);
         }
         p[side / 2] += side & 1 ? GS4I_C(1) : GS4I_C(-1);
-        if (!gs4i_is_isothermal_at(sim, gs4i_add(sim->grid.origin, gs4i_scale(gs4i_vec3(p[0], p[1], p[2]), sim->grid.h)), &T)) continue;
+        if (!gs4i_is_isothermal_at(
+                sim,
+                gs4i_add(sim->grid.origin, gs4i_scale(gs4i_vec3(p[0], p[1], p[2]), sim->grid.h)),
+                &T))
+            continue;
         norm = GS4I_SQRT(square);
-        link = shows[side] * (own / norm) / (GS4I_SURFACE_DEPTH - GS4I_C(0.5) * (1 - cube / (square * norm)));
-        all += link; *warmth += link * T;
+        link = shows[side] * (own / norm)
+               / (GS4I_SURFACE_DEPTH - GS4I_C(0.5) * (1 - cube / (square * norm)));
+        all += link;
+        *warmth += link * T;
     }
     return all;
 }
@@ -8115,22 +10601,33 @@ static gs4_real gs4i_isothermal_links(const gs4_sim *sim, const int at[3], gs4_r
 /* Where the faces of a cell are among those of their axis, in the order of gs4_sim_desc's walls. */
 GS4I_INLINE void gs4i_heat_faces_of(const gs4i_conduction *k, const int at[3], size_t face[6])
 {
-    const size_t nx = (size_t)k->size[0], ny = (size_t)k->size[1], x = (size_t)at[0], y = (size_t)at[1], z = (size_t)at[2];
-    face[0] = (z * ny + y) * (nx + 1) + x;   face[1] = face[0] + 1;
-    face[2] = (z * (ny + 1) + y) * nx + x;   face[3] = face[2] + nx;
-    face[4] = (z * ny + y) * nx + x;         face[5] = face[4] + nx * ny;
+    const size_t nx = (size_t)k->size[0], ny = (size_t)k->size[1], x = (size_t)at[0],
+                 y = (size_t)at[1], z = (size_t)at[2];
+    face[0] = (z * ny + y) * (nx + 1) + x;
+    face[1] = face[0] + 1;
+    face[2] = (z * (ny + 1) + y) * nx + x;
+    face[3] = face[2] + nx;
+    face[4] = (z * ny + y) * nx + x;
+    face[5] = face[4] + nx * ny;
 }
 
-/* What flows through the faces of cell i = at into it, times h^2, where T is the temperature. Faces without a cell beyond are closed. */
-GS4I_INLINE gs4_real gs4i_heat_flow(const gs4i_conduction *k, const gs4_real *T, const int at[3], size_t i)
+/* What flows through the faces of cell i = at into it, times h^2, where T is the temperature.
+ * Faces without a cell beyond are closed. */
+GS4I_INLINE gs4_real gs4i_heat_flow(const gs4i_conduction *k, const gs4_real *T, const int at[3],
+                                    size_t i)
 {
-    const size_t row = (size_t)k->size[0], plane = row * (size_t)k->size[1], x_round = row - 1, y_round = plane - row, z_round = plane * (size_t)(k->size[2] - 1);
-    const gs4_real *fx = k->field[GS4I_HEAT_FACES], *fy = k->field[GS4I_HEAT_FACES + 1], *fz = k->field[GS4I_HEAT_FACES + 2];
+    const size_t row = (size_t)k->size[0], plane = row * (size_t)k->size[1], x_round = row - 1,
+                 y_round = plane - row, z_round = plane * (size_t)(k->size[2] - 1);
+    const gs4_real *fx = k->field[GS4I_HEAT_FACES], *fy = k->field[GS4I_HEAT_FACES + 1],
+                   *fz = k->field[GS4I_HEAT_FACES + 2];
     size_t face[6];
     gs4i_heat_faces_of(k, at, face);
-    return fx[face[0]] * (T[at[0] ? i - 1 : i + x_round] - T[i]) + fx[face[1]] * (T[at[0] < k->size[0] - 1 ? i + 1 : i - x_round] - T[i])
-         + fy[face[2]] * (T[at[1] ? i - row : i + y_round] - T[i]) + fy[face[3]] * (T[at[1] < k->size[1] - 1 ? i + row : i - y_round] - T[i])
-         + fz[face[4]] * (T[at[2] ? i - plane : i + z_round] - T[i]) + fz[face[5]] * (T[at[2] < k->size[2] - 1 ? i + plane : i - z_round] - T[i]);
+    return fx[face[0]] * (T[at[0] ? i - 1 : i + x_round] - T[i])
+           + fx[face[1]] * (T[at[0] < k->size[0] - 1 ? i + 1 : i - x_round] - T[i])
+           + fy[face[2]] * (T[at[1] ? i - row : i + y_round] - T[i])
+           + fy[face[3]] * (T[at[1] < k->size[1] - 1 ? i + row : i - y_round] - T[i])
+           + fz[face[4]] * (T[at[2] ? i - plane : i + z_round] - T[i])
+           + fz[face[5]] * (T[at[2] < k->size[2] - 1 ? i + plane : i - z_round] - T[i]);
 }
 
 /* One plane of the box: isothermal links, and the heat that flows into each cell at T**, J/m^3. */
@@ -8149,7 +10646,8 @@ static void gs4i_heat_flows(int z, void *context)
             flow = gs4i_heat_flow(k, T, at, i);
             if (k->linked) {
                 gs4_real link, warmth;
-                link = gs4i_isothermal_links(sim, at, &warmth) * sim->warm.s * k->field[GS4I_HEAT_K][i];
+                link = gs4i_isothermal_links(sim, at, &warmth) * sim->warm.s
+                       * k->field[GS4I_HEAT_K][i];
                 k->field[GS4I_HEAT_DIAGONAL][i] += per_area * link;
                 flow += sim->warm.s * k->field[GS4I_HEAT_K][i] * warmth - link * T[i];
             }
@@ -8157,12 +10655,16 @@ static void gs4i_heat_flows(int z, void *context)
         }
 }
 
-/* Second differences along the three axes of a field at a cell, h^2 d2/da2; a neighbour counts by its share of `weight`. Beyond isothermal
- * walls the field mirrors oddly, by `wall` of them (NULL: about 0). Their sum. */
-static gs4_real gs4i_second_differences(const gs4_sim *sim, const gs4_real *field, const gs4_real *weight, const gs4_real *wall, const int at[3], gs4_real difference[3])
+/* Second differences along the three axes of a field at a cell, h^2 d2/da2; a neighbour counts
+ * by its share of `weight`. Beyond isothermal walls the field mirrors oddly, by `wall` of them
+ * (NULL: about 0). Their sum. */
+static gs4_real gs4i_second_differences(const gs4_sim *sim, const gs4_real *field,
+                                        const gs4_real *weight, const gs4_real *wall,
+                                        const int at[3], gs4_real difference[3])
 {
     const gs4i_conduction *k = &sim->conduction;
-    const size_t i = gs4i_heat_cell(k, at[0], at[1], at[2]), step[3] = { 1, (size_t)k->size[0], (size_t)k->size[0] * (size_t)k->size[1] };
+    const size_t i = gs4i_heat_cell(k, at[0], at[1], at[2]),
+                 step[3] = { 1, (size_t)k->size[0], (size_t)k->size[0] * (size_t)k->size[1] };
     const gs4_real inverse = 1 / weight[i];
     int axis, end;
     for (axis = 0; axis < 3; axis++) {
@@ -8174,21 +10676,29 @@ static gs4_real gs4i_second_differences(const gs4_sim *sim, const gs4_real *fiel
         for (end = 0; end < 2; end++)
             if (at[axis] == (end ? k->size[axis] - 1 : 0) && !sim->grid.periodic[axis]) {
                 const int side = 2 * axis + end, there = at[axis] + k->low[axis] + (end ? 1 : -1);
-                if ((there < 0 || there >= sim->grid.cells[axis]) && sim->desc.wall_is_isothermal[side]) difference[axis] += 2 * ((wall ? wall[side] : 0) - field[i]);
-            } else difference[axis] += gs4i_min(weight[to[end]] * inverse, GS4I_C(1)) * (field[to[end]] - field[i]);
+                if ((there < 0 || there >= sim->grid.cells[axis])
+                    && sim->desc.wall_is_isothermal[side])
+                    difference[axis] += 2 * ((wall ? wall[side] : 0) - field[i]);
+            } else
+                difference[axis] +=
+                    gs4i_min(weight[to[end]] * inverse, GS4I_C(1)) * (field[to[end]] - field[i]);
     }
     return difference[0] + difference[1] + difference[2];
 }
 
-/* What particles gather, on the nodes of a group of blocks: the rise x, sharpened; the rate of mixing, and times T** sharpened. For the flux
- * T~ - h^2/4 div grad T~ + h^2/12 d2T~/da2 for each axis a, whose gradient there and back again gives what the faces of the box give; and 1/K. */
+/* What particles gather, on the nodes of a group of blocks: the rise x, sharpened; the rate of
+ * mixing, and times T** sharpened. For the flux T~ - h^2/4 div grad T~ + h^2/12 d2T~/da2 for
+ * each axis a, whose gradient there and back again gives what the faces of the box give; and
+ * 1/K. */
 static void gs4i_heat_back(int index, void *context)
 {
     const gs4i_node_pass *pass = (const gs4i_node_pass *)context;
     const gs4_sim *sim = pass->sim;
     const gs4i_grid *g = &sim->grid;
     const gs4i_conduction *k = &sim->conduction;
-    const gs4_real *X = k->field[GS4I_HEAT_X], *T = k->field[GS4I_HEAT_T], *holds = k->field[GS4I_HEAT_HOLDS], *mix = k->field[GS4I_HEAT_MIX], *wall = sim->desc.wall_temperature;
+    const gs4_real *X = k->field[GS4I_HEAT_X], *T = k->field[GS4I_HEAT_T],
+                   *holds = k->field[GS4I_HEAT_HOLDS], *mix = k->field[GS4I_HEAT_MIX],
+                   *wall = sim->desc.wall_temperature;
     int s, i, a;
     for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
         int block[3], at[3];
@@ -8196,29 +10706,38 @@ static void gs4i_heat_back(int index, void *context)
         for (i = 0; i < GS4I_BLOCK_NODES; i++) {
             const size_t node = 4 * ((size_t)s * GS4I_BLOCK_NODES + (size_t)i);
             const gs4_real capacity = k->content[node] * g->inv_h * g->inv_h * g->inv_h;
-            gs4_real *q = k->content + node, *flux = sim->particles.with_flux ? k->source + node : NULL, x[3], t[3], sum;
+            gs4_real *q = k->content + node,
+                     *flux = sim->particles.with_flux ? k->source + node : NULL, x[3], t[3], sum;
             size_t cell;
             memset(q, 0, 4 * sizeof *q);
             if (flux) memset(flux, 0, 4 * sizeof *flux);
-            if (!gs4i_heat_cell_of(k, block, i, at, &cell) || k->kind[cell] != GS4_CELL_LIQUID) continue;
+            if (!gs4i_heat_cell_of(k, block, i, at, &cell) || k->kind[cell] != GS4_CELL_LIQUID)
+                continue;
             sum = gs4i_second_differences(sim, X, holds, NULL, at, x);
             q[0] = X[cell] - GS4I_C(0.25) * sum;
             if (mix[cell] > 0) {
                 q[1] = mix[cell] / capacity;
-                q[2] = q[1] * (T[cell] - GS4I_C(0.25) * gs4i_second_differences(sim, T, mix, wall, at, t));
+                q[2] =
+                    q[1]
+                    * (T[cell] - GS4I_C(0.25) * gs4i_second_differences(sim, T, mix, wall, at, t));
             }
             if (!flux) continue;
             sum += gs4i_second_differences(sim, T, holds, wall, at, t);
             flux[3] = 1 / k->field[GS4I_HEAT_K][cell];
-            for (a = 0; a < 3; a++) flux[a] = T[cell] + X[cell] - GS4I_C(0.25) * sum + GS4I_C(1.0 / 12) * (t[a] + x[a]);
+            for (a = 0; a < 3; a++)
+                flux[a] = T[cell] + X[cell] - GS4I_C(0.25) * sum + GS4I_C(1.0 / 12) * (t[a] + x[a]);
         }
     }
 }
 
-/* --- periodic walls: conjugate gradients around the solver, which knows of none --------------------------- */
+/* --- periodic walls: conjugate gradients around the solver, which knows of none --------------- */
 
 /* out = A p with the links around the periodic axes, for one plane of the box. */
-typedef struct gs4i_heat_apply { const gs4_sim *sim; const double *p; double *out; } gs4i_heat_apply;
+typedef struct gs4i_heat_apply {
+    const gs4_sim *sim;
+    const double *p;
+    double *out;
+} gs4i_heat_apply;
 
 static void gs4i_heat_apply_plane(int z, void *context)
 {
@@ -8233,14 +10752,23 @@ static void gs4i_heat_apply_plane(int z, void *context)
         for (at[0] = 0; at[0] < k->size[0]; at[0]++) {
             const size_t i = gs4i_heat_cell(k, at[0], at[1], at[2]);
             double flow = 0;
-            if (k->kind[i] != GS4_CELL_LIQUID) { task->out[i] = 0; continue; }
+            if (k->kind[i] != GS4_CELL_LIQUID) {
+                task->out[i] = 0;
+                continue;
+            }
             gs4i_heat_faces_of(k, at, face);
             for (side = 0; side < 6; side++) {
                 int to[3];
-                to[0] = at[0]; to[1] = at[1]; to[2] = at[2];
+                to[0] = at[0];
+                to[1] = at[1];
+                to[2] = at[2];
                 to[side / 2] += side & 1 ? 1 : -1;
-                if (to[side / 2] < 0) to[side / 2] = k->size[side / 2] - 1; else if (to[side / 2] == k->size[side / 2]) to[side / 2] = 0;
-                flow += (double)k->field[GS4I_HEAT_FACES + side / 2][face[side]] * (task->p[gs4i_heat_cell(k, to[0], to[1], to[2])] - task->p[i]);
+                if (to[side / 2] < 0)
+                    to[side / 2] = k->size[side / 2] - 1;
+                else if (to[side / 2] == k->size[side / 2])
+                    to[side / 2] = 0;
+                flow += (double)k->field[GS4I_HEAT_FACES + side / 2][face[side]]
+                        * (task->p[gs4i_heat_cell(k, to[0], to[1], to[2])] - task->p[i]);
             }
             task->out[i] = (double)k->field[GS4I_HEAT_DIAGONAL][i] * task->p[i] - per_area * flow;
         }
@@ -8254,7 +10782,8 @@ static double gs4i_heat_dot(const double *a, const double *b, size_t n)
     return sum;
 }
 
-/* The diagonal of the preconditioner, in X until that is needed: the links around the periodic axes count as links to 0. */
+/* The diagonal of the preconditioner, in X until that is needed: the links around the periodic
+ * axes count as links to 0. */
 static const gs4_real *gs4i_unwrapped_diagonal(const gs4_sim *sim)
 {
     const gs4i_conduction *k = &sim->conduction;
@@ -8268,12 +10797,14 @@ static const gs4_real *gs4i_unwrapped_diagonal(const gs4_sim *sim)
                 gs4i_heat_faces_of(k, at, face);
                 diagonal[i] = k->field[GS4I_HEAT_DIAGONAL][i];
                 for (side = 0; side < 6; side++)
-                    if (at[side / 2] == (side & 1 ? k->size[side / 2] - 1 : 0)) diagonal[i] += per_area * k->field[GS4I_HEAT_FACES + side / 2][face[side]];
+                    if (at[side / 2] == (side & 1 ? k->size[side / 2] - 1 : 0))
+                        diagonal[i] += per_area * k->field[GS4I_HEAT_FACES + side / 2][face[side]];
             }
     return diagonal;
 }
 
-/* One solve without the links around is the preconditioner: what is left has few eigenvalues far from 1. */
+/* One solve without the links around is the preconditioner: what is left has few eigenvalues far
+ * from 1. */
 static int gs4i_solve_periodic(gs4_sim *sim, double tolerance, gs4_solve_stats *stats)
 {
     gs4i_conduction *k = &sim->conduction;
@@ -8283,23 +10814,43 @@ static int gs4i_solve_periodic(gs4_sim *sim, double tolerance, gs4_solve_stats *
     gs4i_heat_apply apply;
     size_t i;
     int turn, iterations = 0, result = GS4_ERROR_NOT_CONVERGED;
-    apply.sim = sim; apply.p = p; apply.out = q;
-    for (i = 0; i < n; i++) { x[i] = p[i] = 0; r[i] = (double)rhs[i]; }
+    apply.sim = sim;
+    apply.p = p;
+    apply.out = q;
+    for (i = 0; i < n; i++) {
+        x[i] = p[i] = 0;
+        r[i] = (double)rhs[i];
+    }
     all = sqrt(gs4i_heat_dot(r, r, n));
     stats->residual = 0;
     for (turn = 0; turn < sim->desc.solver_max_iterations; turn++) {
         double before = rz, step, left = sqrt(gs4i_heat_dot(r, r, n));
         stats->residual = all > 0 ? left / all : 0;
-        if (left <= tolerance * all) { result = GS4_OK; break; }
-        for (i = 0; i < n; i++) { rhs[i] = GS4I_C(r[i]); z[i] = 0; }
-        result = gs4i_solver_solve(&k->solver, rhs, z, fmax(1e-3 * tolerance, 1e-11), sim->desc.solver_max_iterations, stats);
+        if (left <= tolerance * all) {
+            result = GS4_OK;
+            break;
+        }
+        for (i = 0; i < n; i++) {
+            rhs[i] = GS4I_C(r[i]);
+            z[i] = 0;
+        }
+        result = gs4i_solver_solve(&k->solver, rhs, z, fmax(1e-3 * tolerance, 1e-11),
+                                   sim->desc.solver_max_iterations, stats);
         iterations += stats->iterations;
-        if (result != GS4_OK && (result != GS4_ERROR_NOT_CONVERGED || !(stats->residual < 1e-6))) break;    /* good enough to precondition: r is true to x */
-        for (rz = 0, i = 0; i < n; i++) if (k->kind[i] == GS4_CELL_LIQUID) rz += r[i] * (double)z[i];
-        for (i = 0; i < n; i++) p[i] = (k->kind[i] == GS4_CELL_LIQUID ? (double)z[i] : 0) + (turn ? rz / before : 0) * p[i];
+        /* good enough to precondition: r is true to x */
+        if (result != GS4_OK && (result != GS4_ERROR_NOT_CONVERGED || !(stats->residual < 1e-6)))
+            break;
+        for (rz = 0, i = 0; i < n; i++)
+            if (k->kind[i] == GS4_CELL_LIQUID) rz += r[i] * (double)z[i];
+        for (i = 0; i < n; i++)
+            p[i] = (k->kind[i] == GS4_CELL_LIQUID ? (double)z[i] : 0)
+                   + (turn ? rz / before : 0) * p[i];
         gs4i_parallel_for(&sim->tasks, k->size[2], gs4i_heat_apply_plane, &apply);
         step = rz / gs4i_heat_dot(p, q, n);
-        for (i = 0; i < n; i++) { x[i] += step * p[i]; r[i] -= step * q[i]; }
+        for (i = 0; i < n; i++) {
+            x[i] += step * p[i];
+            r[i] -= step * q[i];
+        }
         result = GS4_ERROR_NOT_CONVERGED;
     }
     for (i = 0; i < n; i++) z[i] = GS4I_C(x[i]);
@@ -8307,9 +10858,10 @@ static int gs4i_solve_periodic(gs4_sim *sim, double tolerance, gs4_solve_stats *
     return result;
 }
 
-/* --- the solve --------------------------------------------------------------------------------------------- */
+/* --- the solve -------------------------------------------------------------------------------- */
 
-/* What X leaves of the right-hand side, one plane of the box; in the field that says how full cells are, which is not needed any more. */
+/* What X leaves of the right-hand side, one plane of the box; in the field that says how full
+ * cells are, which is not needed any more. */
 static void gs4i_heat_residual(int z, void *context)
 {
     const gs4_sim *sim = (const gs4_sim *)context;
@@ -8321,7 +10873,9 @@ static void gs4i_heat_residual(int z, void *context)
         for (at[0] = 0; at[0] < k->size[0]; at[0]++) {
             const size_t i = gs4i_heat_cell(k, at[0], at[1], z);
             if (k->kind[i] != GS4_CELL_LIQUID) continue;
-            k->field[GS4I_HEAT_FILL][i] = (k->field[GS4I_HEAT_RHS][i] - k->field[GS4I_HEAT_DIAGONAL][i] * X[i]) + per_area * gs4i_heat_flow(k, X, at, i);
+            k->field[GS4I_HEAT_FILL][i] =
+                (k->field[GS4I_HEAT_RHS][i] - k->field[GS4I_HEAT_DIAGONAL][i] * X[i])
+                + per_area * gs4i_heat_flow(k, X, at, i);
         }
 }
 
@@ -8332,12 +10886,16 @@ static double gs4i_heat_relax(const gs4i_conduction *k, const gs4_real *r)
     double sum = 0;
     size_t i;
     for (i = 0; i < n; i++)
-        if (k->kind[i] == GS4_CELL_LIQUID) { sum += (double)r[i] * (double)r[i]; k->field[GS4I_HEAT_X][i] += r[i] / k->field[GS4I_HEAT_DIAGONAL][i]; }
+        if (k->kind[i] == GS4_CELL_LIQUID) {
+            sum += (double)r[i] * (double)r[i];
+            k->field[GS4I_HEAT_X][i] += r[i] / k->field[GS4I_HEAT_DIAGONAL][i];
+        }
     return sqrt(sum);
 }
 
-/* Steps of a liquid are short, and heat gets much less far than a cell: then a few sweeps by the diagonal (Jacobi) cost less than a
- * hierarchy. Given up, X back to 0, where twelve more would not do. */
+/* Steps of a liquid are short, and heat gets much less far than a cell: then a few sweeps by the
+ * diagonal (Jacobi) cost less than a hierarchy. Given up, X back to 0, where twelve more would
+ * not do. */
 static int gs4i_solve_by_sweeps(gs4_sim *sim, double tolerance, gs4_solve_stats *stats)
 {
     gs4i_conduction *k = &sim->conduction;
@@ -8348,9 +10906,13 @@ static int gs4i_solve_by_sweeps(gs4_sim *sim, double tolerance, gs4_solve_stats 
         gs4i_parallel_for(&sim->tasks, k->size[2], gs4i_heat_residual, sim);
         left = gs4i_heat_relax(k, k->field[GS4I_HEAT_FILL]);
         stats->iterations++;
-        if (left <= tolerance * all) { stats->residual = all > 0 ? left / all : 0; return 1; }
+        if (left <= tolerance * all) {
+            stats->residual = all > 0 ? left / all : 0;
+            return 1;
+        }
     } while (left * pow(left / before, 12) < tolerance * all);
-    memset(k->field[GS4I_HEAT_X], 0, (size_t)k->size[0] * (size_t)k->size[1] * (size_t)k->size[2] * sizeof(gs4_real));
+    memset(k->field[GS4I_HEAT_X], 0,
+           (size_t)k->size[0] * (size_t)k->size[1] * (size_t)k->size[2] * sizeof(gs4_real));
     return 0;
 }
 
@@ -8361,29 +10923,52 @@ static int gs4i_solve_heat(gs4_sim *sim)
     gs4_poisson_desc d;
     gs4_solve_stats stats;
     int a, result;
-    memset(&d, 0, sizeof d); memset(&stats, 0, sizeof stats);
-    if (gs4i_solve_by_sweeps(sim, tolerance, &stats)) { k->iterations = stats.iterations; k->residual = stats.residual; return GS4_OK; }
-    for (a = 0; a < 3; a++) { d.cells[a] = k->size[a]; d.coefficient[a] = k->field[GS4I_HEAT_FACES + a]; }
-    d.cell_size = sim->grid.h; d.kind = k->kind; d.diagonal = k->outer ? gs4i_unwrapped_diagonal(sim) : k->field[GS4I_HEAT_DIAGONAL];
-    d.threads = sim->desc.threads; d.parallel_for = sim->desc.parallel_for;
-    k->solver.memory = &sim->memory; k->solver.tasks = &sim->tasks;
+    memset(&d, 0, sizeof d);
+    memset(&stats, 0, sizeof stats);
+    if (gs4i_solve_by_sweeps(sim, tolerance, &stats)) {
+        k->iterations = stats.iterations;
+        k->residual = stats.residual;
+        return GS4_OK;
+    }
+    for (a = 0; a < 3; a++) {
+        d.cells[a] = k->size[a];
+        d.coefficient[a] = k->field[GS4I_HEAT_FACES + a];
+    }
+    d.cell_size = sim->grid.h;
+    d.kind = k->kind;
+    d.diagonal = k->outer ? gs4i_unwrapped_diagonal(sim) : k->field[GS4I_HEAT_DIAGONAL];
+    d.threads = sim->desc.threads;
+    d.parallel_for = sim->desc.parallel_for;
+    k->solver.memory = &sim->memory;
+    k->solver.tasks = &sim->tasks;
     result = gs4i_solver_setup(&k->solver, &d);
     if (result == GS4_ERROR_MEMORY) return gs4i_fail_memory(sim);
     if (result == GS4_OK)
-        result = k->outer ? gs4i_solve_periodic(sim, tolerance, &stats)
-                          : gs4i_solver_solve(&k->solver, k->field[GS4I_HEAT_RHS], k->field[GS4I_HEAT_X], tolerance, sim->desc.solver_max_iterations, &stats);
-    k->iterations = stats.iterations; k->residual = stats.residual;
+        result = k->outer
+                     ? gs4i_solve_periodic(sim, tolerance, &stats)
+                     : gs4i_solver_solve(&k->solver, k->field[GS4I_HEAT_RHS], k->field[GS4I_HEAT_X],
+                                         tolerance, sim->desc.solver_max_iterations, &stats);
+    k->iterations = stats.iterations;
+    k->residual = stats.residual;
     if (result == GS4_OK) return result;
     if (result == GS4_ERROR_NOT_CONVERGED)
-        return gs4i_fail_value(sim, result, "the heat of the step did not converge: the residual is ", stats.residual, " of the heat that flows (solver_tolerance, solver_max_iterations); the step was not taken; a larger tolerance, more iterations or a smaller dt would do");
-    return gs4i_fail_value(sim, GS4_ERROR_UNSTABLE, k->solver.fault, k->solver.fault_value, " of the heat of the step, which is not finite or absurd; the step was not taken; smaller conductivities, temperatures or heat capacities would do");
+        return gs4i_fail_value(
+            sim, result, "the heat of the step did not converge: the residual is ", stats.residual,
+            " of the heat that flows (solver_tolerance, solver_max_iterations); the step was not "
+            "taken; a larger tolerance, more iterations or a smaller dt would do");
+    return gs4i_fail_value(
+        sim, GS4_ERROR_UNSTABLE, k->solver.fault, k->solver.fault_value,
+        " of the heat of the step, which is not finite or absurd; the step was not taken; smaller "
+        "conductivities, temperatures or heat capacities would do");
 }
 
 static void gs4i_free_heat(gs4i_memory *m, gs4i_conduction *k)
 {
     const size_t node = GS4I_NODE_REALS * sizeof(gs4_real), slots = (size_t)k->slots;
-    gs4i_free(m, k->content, slots, node); gs4i_free(m, k->source, slots, node);
-    gs4i_free(m, k->field[0], k->room, GS4I_HEAT_FIELDS * sizeof(gs4_real)); gs4i_free(m, k->kind, k->room, 1);
+    gs4i_free(m, k->content, slots, node);
+    gs4i_free(m, k->source, slots, node);
+    gs4i_free(m, k->field[0], k->room, GS4I_HEAT_FIELDS * sizeof(gs4_real));
+    gs4i_free(m, k->kind, k->room, 1);
     gs4i_free(m, k->outer, k->room, 4 * sizeof *k->outer);
     k->solver.memory = m;
     gs4i_solver_free(&k->solver);
@@ -8397,12 +10982,20 @@ static int gs4i_reserve_heat(gs4_sim *sim)
     const size_t node = GS4I_NODE_REALS * sizeof(gs4_real), slots = (size_t)sim->grid.capacity;
     const int wants_source = sim->particles.with_flux || k->heats;
     gs4_real *content, *source;
-    if (!sim->particles.with_heat || (k->slots >= sim->grid.active && (k->source || !wants_source))) return GS4_OK;
+    if (!sim->particles.with_heat || (k->slots >= sim->grid.active && (k->source || !wants_source)))
+        return GS4_OK;
     content = (gs4_real *)gs4i_alloc(m, slots, node);
     source = wants_source ? (gs4_real *)gs4i_alloc(m, slots, node) : NULL;
-    if (!content || (wants_source && !source)) { gs4i_free(m, content, slots, node); gs4i_free(m, source, slots, node); return GS4_ERROR_MEMORY; }
-    gs4i_free(m, k->content, (size_t)k->slots, node); gs4i_free(m, k->source, (size_t)k->slots, node);
-    k->content = content; k->source = source; k->slots = sim->grid.capacity;
+    if (!content || (wants_source && !source)) {
+        gs4i_free(m, content, slots, node);
+        gs4i_free(m, source, slots, node);
+        return GS4_ERROR_MEMORY;
+    }
+    gs4i_free(m, k->content, (size_t)k->slots, node);
+    gs4i_free(m, k->source, (size_t)k->slots, node);
+    k->content = content;
+    k->source = source;
+    k->slots = sim->grid.capacity;
     return GS4_OK;
 }
 
@@ -8419,7 +11012,8 @@ static int gs4i_conduct(gs4_sim *sim, gs4i_node_pass *nodes)
     memset(k->kind, GS4_CELL_SOLID, cells);
     for (a = GS4I_HEAT_T; a <= GS4I_HEAT_X; a++) memset(k->field[a], 0, cells * sizeof(gs4_real));
     k->exposed = sim->desc.air_is_isothermal;
-    for (a = 0; a < sim->boundary.body_count; a++) k->exposed |= sim->boundary.bodies[a].is.is_isothermal;
+    for (a = 0; a < sim->boundary.body_count; a++)
+        k->exposed |= sim->boundary.bodies[a].is.is_isothermal;
     k->linked = k->exposed;
     for (a = 0; a < 6; a++) k->linked |= sim->desc.wall_is_isothermal[a];
     gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_heat_nodes, nodes);
@@ -8434,33 +11028,43 @@ static int gs4i_conduct(gs4_sim *sim, gs4i_node_pass *nodes)
     return GS4_OK;
 }
 
-/* ==== [[step]] one step; the function to read first is gs4i_step, at the end of this section ======= */
+/* ==== [[step]] one step; the function to read first is gs4i_step, at the end of this section == */
 
-/* --- what can go wrong, in words -------------------------------------------------------------------- */
+/* --- what can go wrong, in words -------------------------------------------------------------- */
 
 static int gs4i_fail_bad(gs4_sim *sim, const gs4i_report *r)
 {
     char line[320];
     gs4i_text t;
-    t.at = line; t.left = sizeof line;
-    gs4i_put(&t, "particle "); gs4i_put_integer(&t, (int64_t)r->bad_id);
-    gs4i_put(&t, r->bad == GS4I_BAD_VOLUME ? " would leave the range of volume ratios 1/16 to 16"
-               : r->bad == GS4I_BAD_MOTION ? " would move more than two cells, or its state would not be finite"
-               : r->bad == GS4I_BAD_STRESS ? " has a non-local stress that overflows, or swings faster than it can be followed"
-               : r->bad == GS4I_BAD_DEFORMATION ? " would be stretched, sheared or turned by more than a factor of e^8 in one step"
-               : " has a viscosity that is negative, not finite or absurdly large");
-    gs4i_put(&t, "; the step was not taken; a smaller dt, a higher sound_speed or a slower start would do");
+    t.at = line;
+    t.left = sizeof line;
+    gs4i_put(&t, "particle ");
+    gs4i_put_integer(&t, (int64_t)r->bad_id);
+    gs4i_put(
+        &t, r->bad == GS4I_BAD_VOLUME ? " would leave the range of volume ratios 1/16 to 16"
+            : r->bad == GS4I_BAD_MOTION
+                ? " would move more than two cells, or its state would not be finite"
+            : r->bad == GS4I_BAD_STRESS
+                ? " has a non-local stress that overflows, or swings faster than it can be followed"
+            : r->bad == GS4I_BAD_DEFORMATION
+                ? " would be stretched, sheared or turned by more than a factor of e^8 in one step"
+                : " has a viscosity that is negative, not finite or absurdly large");
+    gs4i_put(
+        &t,
+        "; the step was not taken; a smaller dt, a higher sound_speed or a slower start would do");
     return gs4i_fail(sim, GS4_ERROR_UNSTABLE, line);
 }
 
-/* --- stability --------------------------------------------------------------------------------------- */
+/* --- stability -------------------------------------------------------------------------------- */
 
-/* Largest eigenvalues of the discrete operators on particles, times h^2: of div grad as sound meets it, and of
- * 2 div D as viscosity does. Measured in tests/test_stability.c. */
+/* Largest eigenvalues of the discrete operators on particles, times h^2: of div grad as sound
+ * meets it, and of 2 div D as viscosity does. Measured in tests/test_stability.c. */
 #define GS4I_SOUND_EIGENVALUE GS4I_C(3.0)
 #define GS4I_VISCOUS_EIGENVALUE GS4I_C(2.5)
-#define GS4I_SHARPER GS4I_C(2.3)                     /* so many times as large with sharpened gradients */
-#define GS4I_EULER_SOUND_EIGENVALUE GS4I_C(12.0)     /* lone particles with their affine field: sum |grad w|^2 / w */
+/* so many times as large with sharpened gradients */
+#define GS4I_SHARPER GS4I_C(2.3)
+/* lone particles with their affine field: sum |grad w|^2 / w */
+#define GS4I_EULER_SOUND_EIGENVALUE GS4I_C(12.0)
 #define GS4I_EULER_VISCOUS_EIGENVALUE GS4I_C(16.0)
 
 /* What melts or freezes may do so in the next step: both its phases count. */
@@ -8474,39 +11078,56 @@ static gs4i_report gs4i_with_both_phases(const gs4_sim *sim, gs4i_report r)
         gs4_real mu;
         if (!l->is.can_melt) continue;
         mu = l->local * gs4i_viscosity_of(l, l->melting, none, 0);
-        r.max_stiffness = gs4i_max(r.max_stiffness, gs4i_max(GS4I_SOLID_WAVES * solid->shear_modulus, 2 * l->modulus) * l->inv_density);
+        r.max_stiffness = gs4i_max(r.max_stiffness,
+                                   gs4i_max(GS4I_SOLID_WAVES * solid->shear_modulus, 2 * l->modulus)
+                                       * l->inv_density);
         if (mu < GS4I_HUGE) r.max_viscosity = gs4i_max(r.max_viscosity, mu * l->inv_density);
     }
     return r;
 }
 
-/* Largest stable dt: the closed form (w dt)^2 + (d dt) (3 + r + s - r s)/2 <= 2 (1 - r s) with the sound frequency w and
- * the viscous rate d of the grid (symplectic Euler: (w dt)^2 + 2 d dt <= 4), one cell a step, and a velocity
- * gradient that turns or stretches by less than 1 in a step. */
+/* Largest stable dt: the closed form (w dt)^2 + (d dt) (3 + r + s - r s)/2 <= 2 (1 - r s) with
+ * the sound frequency w and the viscous rate d of the grid (symplectic Euler: (w dt)^2 + 2 d dt
+ * <= 4), one cell a step, and a velocity gradient that turns or stretches by less than 1 in a
+ * step. */
 static gs4_real gs4i_stable_dt(const gs4_sim *sim, const gs4i_report *seen)
 {
     const gs4i_report both = gs4i_with_both_phases(sim, *seen), *r = &both;
     const int euler = sim->desc.integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER;
-    const double rho = (double)sim->desc.rho_inf, spurious = (double)sim->desc.rho_inf_spurious, h = (double)sim->grid.h;
-    const double fall = (double)gs4i_max(gs4i_abs(sim->desc.gravity.x), gs4i_max(gs4i_abs(sim->desc.gravity.y), gs4i_abs(sim->desc.gravity.z)));
+    const double rho = (double)sim->desc.rho_inf, spurious = (double)sim->desc.rho_inf_spurious,
+                 h = (double)sim->grid.h;
+    const double fall =
+        (double)gs4i_max(gs4i_abs(sim->desc.gravity.x),
+                         gs4i_max(gs4i_abs(sim->desc.gravity.y), gs4i_abs(sim->desc.gravity.z)));
     const double a = euler ? 4 : 2 * (1 - rho * spurious);
     const double b = euler ? 2 : (3 + rho + spurious - rho * spurious) / 2;
-    const double wave = sqrt((double)r->max_sound * (double)r->max_sound + (double)r->max_stiffness);    /* of sound and of elasticity */
+    /* of sound and of elasticity */
+    const double wave =
+        sqrt((double)r->max_sound * (double)r->max_sound + (double)r->max_stiffness);
     const double sharper = sim->desc.sharp_gradients ? (double)GS4I_SHARPER : 1;
-    const double w = sqrt(sharper * (double)(euler ? GS4I_EULER_SOUND_EIGENVALUE : GS4I_SOUND_EIGENVALUE)) * wave / h;
-    const double d = sharper * b * (double)(euler ? GS4I_EULER_VISCOUS_EIGENVALUE : GS4I_VISCOUS_EIGENVALUE) * (double)r->max_viscosity / (h * h);
+    const double w =
+        sqrt(sharper * (double)(euler ? GS4I_EULER_SOUND_EIGENVALUE : GS4I_SOUND_EIGENVALUE)) * wave
+        / h;
+    const double d = sharper * b
+                     * (double)(euler ? GS4I_EULER_VISCOUS_EIGENVALUE : GS4I_VISCOUS_EIGENVALUE)
+                     * (double)r->max_viscosity / (h * h);
     int i;
     double dt = d + w > 0 ? 2 * a / (d + sqrt(d * d + 4 * w * w * a)) : (double)GS4I_HUGE;
     if ((double)r->max_speed * dt + 0.5 * fall * dt * dt > h)
-        dt = 2 * h / ((double)r->max_speed + sqrt((double)r->max_speed * (double)r->max_speed + 2 * fall * h));
+        dt = 2 * h
+             / ((double)r->max_speed
+                + sqrt((double)r->max_speed * (double)r->max_speed + 2 * fall * h));
     if ((double)r->max_gradient * dt > 1) dt = 1 / (double)r->max_gradient;
-    for (i = 0; i < sim->material_count; i++)               /* so that no particle needs more substeps than there may be */
-        if ((double)sim->laws[i].inv_lambda * dt > 1000) dt = 1000 / (double)sim->laws[i].inv_lambda;
+    /* so that no particle needs more substeps than there may be */
+    for (i = 0; i < sim->material_count; i++)
+        if ((double)sim->laws[i].inv_lambda * dt > 1000)
+            dt = 1000 / (double)sim->laws[i].inv_lambda;
     if (dt > (double)GS4I_HUGE) dt = (double)GS4I_HUGE;
     return GS4I_C(dt);
 }
 
-/* The extremes that set the limit, from the particles as they are: after the scene was changed by hand. */
+/* The extremes that set the limit, from the particles as they are: after the scene was changed
+ * by hand. */
 static void gs4i_look_at_particles(const gs4_sim *sim, gs4i_report *r)
 {
     const gs4i_particles *p = &sim->particles;
@@ -8526,17 +11147,24 @@ static void gs4i_look_at_particles(const gs4_sim *sim, gs4i_report *r)
         gs4i_symmetric sigma;
         gs4i_lanes mu;
         gs4i_load_batch(p, (size_t)i, n, reach, &q);
-        if (!p->with_rates) gs4i_load_affine(p, (size_t)i, n, L);
-        else memset(L, 0, sizeof L);
+        if (!p->with_rates)
+            gs4i_load_affine(p, (size_t)i, n, L);
+        else
+            memset(L, 0, sizeof L);
         gs4i_take_laws(sim->laws, sim->frozen, p, (size_t)i, n, &laws);
-        if (p->with_heat) { gs4i_lanes own[4]; gs4i_to_lanes(p->heat + 4 * (size_t)i, n, own); memcpy(laws.temperature, own[0], sizeof own[0]); }
+        if (p->with_heat) {
+            gs4i_lanes own[4];
+            gs4i_to_lanes(p->heat + 4 * (size_t)i, n, own);
+            memcpy(laws.temperature, own[0], sizeof own[0]);
+        }
         gs4i_liquid_stress(&laws, q.v[3], L, sigma, mu);
         gs4i_see_liquids(&seen, &laws, q.v[3], mu);
         gs4i_see_motion(&seen, q.v, L);
         if (p->elastic_reals) {
             gs4i_elastic e;
             gs4i_lanes G, stiffness;
-            gs4i_load_elastic(p->elastic + (size_t)p->elastic_reals * (size_t)i, p->elastic_reals, n, &e);
+            gs4i_load_elastic(p->elastic + (size_t)p->elastic_reals * (size_t)i, p->elastic_reals,
+                              n, &e);
             gs4i_take_elastic_laws(&laws, &past.elastic);
             gs4i_moduli(&past.elastic, L, G);
             gs4i_see_elastic(G, e.s, stiffness);
@@ -8545,7 +11173,8 @@ static void gs4i_look_at_particles(const gs4_sim *sim, gs4i_report *r)
         if (p->deformation_reals && gs4i_take_solid_laws(&laws, &past.solid)) {
             gs4i_deformation e;
             gs4i_lanes stiffness;
-            gs4i_load_deformation(p->deformation + (size_t)p->deformation_reals * (size_t)i, p->deformation_reals, n, &e);
+            gs4i_load_deformation(p->deformation + (size_t)p->deformation_reals * (size_t)i,
+                                  p->deformation_reals, n, &e);
             gs4i_solid_stress(&past.solid, e.F, q.v[3], sigma, stiffness);
             gs4i_see_stiffness(p, (size_t)i, n, &laws, stiffness, &seen, r);
         }
@@ -8554,9 +11183,11 @@ static void gs4i_look_at_particles(const gs4_sim *sim, gs4i_report *r)
     gs4i_report_motion(r, &seen);
     r->max_speed = GS4I_SQRT(r->max_speed);
     r->max_gradient = GS4I_SQRT(r->max_gradient);
-    for (c = 0; c < sim->boundary.body_count; c++) {        /* what bodies and mouths will do to their nodes */
+    /* what bodies and mouths will do to their nodes */
+    for (c = 0; c < sim->boundary.body_count; c++) {
         const gs4i_body *b = &sim->boundary.bodies[c];
-        r->max_speed = gs4i_max(r->max_speed, gs4i_max(gs4i_length(b->is.velocity), gs4i_length(b->flow)));
+        r->max_speed =
+            gs4i_max(r->max_speed, gs4i_max(gs4i_length(b->is.velocity), gs4i_length(b->flow)));
     }
 }
 
@@ -8587,35 +11218,49 @@ static gs4i_rule gs4i_make_rule(const gs4_sim *sim, gs4_real dt)
     k.reach.ahead = sim->particles.with_rates ? k.alpha_f * dt : GS4I_C(0);
     k.reach.shift = k.afresh ? GS4I_C(0) : sim->shift;
     k.next_shift = (k.gamma - GS4I_C(0.5)) * dt;
-    if (!sim->particles.with_rates) k.alpha_m = k.alpha_f = k.gamma = 1;                        /* of heat: backward Euler */
+    /* of heat: backward Euler */
+    if (!sim->particles.with_rates) k.alpha_m = k.alpha_f = k.gamma = 1;
     k.s = k.alpha_f * k.gamma * dt / k.alpha_m;
     k.before = sim->particles.with_rates ? k.reach.ahead - k.s : GS4I_C(0);
     k.decay = sim->desc.flip_decay_time > 0 && gs4i_finite(sim->desc.flip_decay_time)
-            ? 1 / gs4i_max(sim->desc.flip_decay_time, GS4I_C(1e-6) * dt) : GS4I_C(0);    /* faster makes no difference */
+                  /* faster makes no difference */
+                  ? 1 / gs4i_max(sim->desc.flip_decay_time, GS4I_C(1e-6) * dt)
+                  : GS4I_C(0);
     k.damped = 1 / (1 + k.s * k.decay);
     k.fading = 0;
-    if (k.decay * dt > 1) { k.fading = 1 - k.damped; k.decay = 0; k.damped = 1; }
+    if (k.decay * dt > 1) {
+        k.fading = 1 - k.damped;
+        k.decay = 0;
+        k.damped = 1;
+    }
     most = GS4I_C(3.2) * (1 - r * s) / ((3 + r + s - r * s) * dt);
-    y = most / gs4i_max(most + k.decay, GS4I_TINY);         /* 1 / (1 + x) */
+    y = most / gs4i_max(most + k.decay, GS4I_TINY); /* 1 / (1 + x) */
     k.fade = k.decay * y / (1 - y + y * y);
     k.inv_area = sim->grid.inv_h * sim->grid.inv_h;
     k.mixing = sim->particles.with_rates ? gs4i_mixing(&k) : GS4I_C(0.5) / k.s;
     k.inv_alpha_m = 1 / k.alpha_m;
-    k.fast_decay = 0; k.inv_full = 0; k.inv_fullest = GS4I_HUGE;
+    k.fast_decay = 0;
+    k.inv_full = 0;
+    k.inv_fullest = GS4I_HUGE;
     for (i = 0; i < sim->material_count; i++) {
         k.fast_decay = gs4i_max(k.fast_decay, sim->laws[i].sound_speed / sim->grid.h);
-        k.inv_full = gs4i_max(k.inv_full, sim->laws[i].inv_density / (sim->grid.h * sim->grid.h * sim->grid.h));
-        k.inv_fullest = gs4i_min(k.inv_fullest, sim->laws[i].inv_density / (sim->grid.h * sim->grid.h * sim->grid.h));
+        k.inv_full = gs4i_max(k.inv_full,
+                              sim->laws[i].inv_density / (sim->grid.h * sim->grid.h * sim->grid.h));
+        k.inv_fullest = gs4i_min(k.inv_fullest, sim->laws[i].inv_density
+                                                    / (sim->grid.h * sim->grid.h * sim->grid.h));
     }
     return k;
 }
 
-/* The same for heat, which has steps far beyond its own limit: there a rate is what a step as long as the last one has left to do, and where dt
- * has grown by more than twice, rates start afresh. */
+/* The same for heat, which has steps far beyond its own limit: there a rate is what a step as
+ * long as the last one has left to do, and where dt has grown by more than twice, rates start
+ * afresh. */
 static gs4i_rule gs4i_make_warm_rule(const gs4_sim *sim)
 {
     gs4i_rule k = sim->rule;
-    const gs4_real grown = sim->last_dt > 0 && sim->last_dt < (double)k.dt ? GS4I_C(sim->last_dt / (double)k.dt) : GS4I_C(1);
+    const gs4_real grown = sim->last_dt > 0 && sim->last_dt < (double)k.dt
+                               ? GS4I_C(sim->last_dt / (double)k.dt)
+                               : GS4I_C(1);
     if (sim->particles.with_rates && grown < GS4I_C(0.5)) {
         gs4i_family(&k, 0, 0, 1);
         k.reach.ahead = k.before = 0;
@@ -8626,7 +11271,7 @@ static gs4i_rule gs4i_make_warm_rule(const gs4_sim *sim)
     return k;
 }
 
-/* --- nodes -------------------------------------------------------------------------------------------- */
+/* --- nodes ------------------------------------------------------------------------------------ */
 
 static void gs4i_clear_nodes(int index, void *context)
 {
@@ -8636,8 +11281,10 @@ static void gs4i_clear_nodes(int index, void *context)
     size_t bytes = (size_t)(end - begin) * GS4I_NODE_REALS * sizeof(gs4_real);
     memset(g->momentum + (size_t)begin * GS4I_NODE_REALS, 0, bytes);
     memset(g->force + (size_t)begin * GS4I_NODE_REALS, 0, bytes);
-    if (sim->particles.with_heat) memset(sim->conduction.content + (size_t)begin * GS4I_NODE_REALS, 0, bytes);
-    if (sim->conduction.source) memset(sim->conduction.source + (size_t)begin * GS4I_NODE_REALS, 0, bytes);
+    if (sim->particles.with_heat)
+        memset(sim->conduction.content + (size_t)begin * GS4I_NODE_REALS, 0, bytes);
+    if (sim->conduction.source)
+        memset(sim->conduction.source + (size_t)begin * GS4I_NODE_REALS, 0, bytes);
 }
 
 static void gs4i_clear_jumps(int index, void *context)
@@ -8655,12 +11302,17 @@ GS4I_INLINE gs4_vec3 gs4i_node_position(const gs4i_grid *g, int slot, int i)
 {
     int at[3];
     gs4i_block_coordinates(g, g->block[slot], at);
-    return gs4i_add(g->origin, gs4i_scale(gs4i_vec3(GS4I_C(4 * at[0] - 4 + (i & 3)) + GS4I_C(0.5),
-        GS4I_C(4 * at[1] - 4 + (i >> 2 & 3)) + GS4I_C(0.5), GS4I_C(4 * at[2] - 4 + (i >> 4)) + GS4I_C(0.5)), g->h));
+    return gs4i_add(g->origin,
+                    gs4i_scale(gs4i_vec3(GS4I_C(4 * at[0] - 4 + (i & 3)) + GS4I_C(0.5),
+                                         GS4I_C(4 * at[1] - 4 + (i >> 2 & 3)) + GS4I_C(0.5),
+                                         GS4I_C(4 * at[2] - 4 + (i >> 4)) + GS4I_C(0.5)),
+                               g->h));
 }
 
-/* All bodies on the nodes of one block; what they take from the velocity at once is added to the jumps where `jump` is given. */
-static void gs4i_hold_nodes(const gs4_sim *sim, int slot, gs4_real *velocity, gs4_real *acceleration, gs4_real *jump)
+/* All bodies on the nodes of one block; what they take from the velocity at once is added to the
+ * jumps where `jump` is given. */
+static void gs4i_hold_nodes(const gs4_sim *sim, int slot, gs4_real *velocity,
+                            gs4_real *acceleration, gs4_real *jump)
 {
     gs4_real none[3], before[3];
     int b, i, c;
@@ -8670,15 +11322,18 @@ static void gs4i_hold_nodes(const gs4_sim *sim, int slot, gs4_real *velocity, gs
         if (body->asleep || !gs4i_body_is_near(body, &sim->grid, slot)) continue;
         for (i = 0; i < GS4I_BLOCK_NODES; i++) {
             gs4_real *v = velocity + 4 * i;
-            if (!(v[3] > 0)) continue;                      /* no particle sees it */
+            if (!(v[3] > 0)) continue; /* no particle sees it */
             none[0] = none[1] = none[2] = 0;
-            if (gs4i_is_sticky(body) && *gs4i_contact_at(&sim->grid, (uint32_t)(64 * slot + i)) & GS4I_IMAGED) {
-                if (jump && gs4i_body_distance(body, gs4i_node_position(&sim->grid, slot, i)) < 0) jump[4 * i + 3] = 1;
+            if (gs4i_is_sticky(body)
+                && *gs4i_contact_at(&sim->grid, (uint32_t)(64 * slot + i)) & GS4I_IMAGED) {
+                if (jump && gs4i_body_distance(body, gs4i_node_position(&sim->grid, slot, i)) < 0)
+                    jump[4 * i + 3] = 1;
                 continue;
             }
             for (c = 0; c < 3; c++) before[c] = v[c];
-            if (!gs4i_body_hold(body, gs4i_node_position(&sim->grid, slot, i), sim->grid.h, sim->rule.dt,
-                                v, acceleration ? acceleration + 4 * i : none)) continue;
+            if (!gs4i_body_hold(body, gs4i_node_position(&sim->grid, slot, i), sim->grid.h,
+                                sim->rule.dt, v, acceleration ? acceleration + 4 * i : none))
+                continue;
             for (c = 0; c < 3 && jump; c++) jump[4 * i + c] += v[c] - before[c];
         }
     }
@@ -8700,23 +11355,29 @@ static void gs4i_node_velocities(int index, void *context)
             GS4I_LANE(v, 3) = m;
             GS4I_STORE(q + i, v);
         }
-        gs4i_hold_nodes(pass->sim, s, q, NULL, g->jump_of[s] ? gs4i_jump_at(g, (uint32_t)(64 * s)) : NULL);
+        gs4i_hold_nodes(pass->sim, s, q, NULL,
+                        g->jump_of[s] ? gs4i_jump_at(g, (uint32_t)(64 * s)) : NULL);
     }
 }
 
-/* What a node remembered before this step. A node that was empty takes ag_i = acc_i; where rates start afresh ag_i = 0, as
- * the particles' are. */
-GS4I_INLINE void gs4i_remembered(const gs4i_rule *rule, const gs4_real *ag, const gs4i_quad *acc, gs4i_quad *before)
+/* What a node remembered before this step. A node that was empty takes ag_i = acc_i; where rates
+ * start afresh ag_i = 0, as the particles' are. */
+GS4I_INLINE void gs4i_remembered(const gs4i_rule *rule, const gs4_real *ag, const gs4i_quad *acc,
+                                 gs4i_quad *before)
 {
     const gs4i_quad zero = { GS4I_LANES(0, 0, 0, 0) };
-    if (rule->afresh) *before = zero;
-    else if ((int)ag[3] & 1) GS4I_LOAD(*before, ag);
-    else *before = *acc;
+    if (rule->afresh)
+        *before = zero;
+    else if ((int)ag[3] & 1)
+        GS4I_LOAD(*before, ag);
+    else
+        *before = *acc;
 }
 
-/* The share of s (acc_i - ag_i) that a node takes, smoothly from 0 where it is filled by less than 10 % to 1 at 43 %: the
- * acceleration of a nearly empty node is large, jumps when a particle comes or goes, and would spoil the order in time
- * (measured: order 1.2 to 1.6 of the velocity without this, 1.9 to 2.0 with it). */
+/* The share of s (acc_i - ag_i) that a node takes, smoothly from 0 where it is filled by less
+ * than 10 % to 1 at 43 %: the acceleration of a nearly empty node is large, jumps when a
+ * particle comes or goes, and would spoil the order in time (measured: order 1.2 to 1.6 of the
+ * velocity without this, 1.9 to 2.0 with it). */
 GS4I_INLINE gs4_real gs4i_node_share(const gs4i_rule *rule, gs4_real filled)
 {
     const gs4_real t = (filled - GS4I_C(0.1)) * 3;
@@ -8731,14 +11392,16 @@ static void gs4i_node_accelerations(int index, void *context)
     const gs4i_rule *rule = &pass->sim->rule;
     int s, i;
     for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
-        gs4_real *q = g->momentum + (size_t)s * GS4I_NODE_REALS, *f = g->force + (size_t)s * GS4I_NODE_REALS;
+        gs4_real *q = g->momentum + (size_t)s * GS4I_NODE_REALS,
+                 *f = g->force + (size_t)s * GS4I_NODE_REALS;
         const gs4_real *ag = g->memory + (size_t)s * GS4I_NODE_REALS;
         for (i = 0; i < 4 * GS4I_BLOCK_NODES; i += 4) {
             const gs4_real inverse = q[i + 3] > pass->lightest ? 1 / q[i + 3] : GS4I_C(0);
             const gs4_real share = rule->s * gs4i_node_share(rule, q[i + 3] * rule->inv_full);
             const gs4i_quad some = { GS4I_LANES(share, share, share, 0) };
             gs4i_quad acc, before, u;
-            GS4I_LOAD(acc, f + i); GS4I_LOAD(u, q + i);
+            GS4I_LOAD(acc, f + i);
+            GS4I_LOAD(u, q + i);
             GS4I_SPLAT_MUL(acc, inverse, acc);
             GS4I_STORE(f + i, acc);
             gs4i_remembered(rule, ag + i, &acc, &before);
@@ -8750,7 +11413,8 @@ static void gs4i_node_accelerations(int index, void *context)
     }
 }
 
-/* ag_i += (acc_i - ag_i) / alpha_m, once the step is certain: it belongs to the state. Images in contact have none. */
+/* ag_i += (acc_i - ag_i) / alpha_m, once the step is certain: it belongs to the state. Images in
+ * contact have none. */
 static void gs4i_node_memories(int index, void *context)
 {
     const gs4i_node_pass *pass = (const gs4i_node_pass *)context;
@@ -8758,7 +11422,8 @@ static void gs4i_node_memories(int index, void *context)
     const gs4i_rule *rule = &pass->sim->rule;
     int s, i;
     for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
-        const gs4_real *q = g->momentum + (size_t)s * GS4I_NODE_REALS, *f = g->force + (size_t)s * GS4I_NODE_REALS;
+        const gs4_real *q = g->momentum + (size_t)s * GS4I_NODE_REALS,
+                       *f = g->force + (size_t)s * GS4I_NODE_REALS;
         gs4_real *ag = g->memory + (size_t)s * GS4I_NODE_REALS;
         for (i = 0; i < 4 * GS4I_BLOCK_NODES; i += 4) {
             const int flags = g->jump_of[s] ? *gs4i_contact_at(g, (uint32_t)(64 * s + i / 4)) : 0;
@@ -8775,7 +11440,8 @@ static void gs4i_node_memories(int index, void *context)
     }
 }
 
-/* Mean velocity of the nodes of each block, and max_i q_i |u_i - mean|_1 with q of gs4i_is_calm; -1 where there is no material. */
+/* Mean velocity of the nodes of each block, and max_i q_i |u_i - mean|_1 with q of gs4i_is_calm;
+ * -1 where there is no material. */
 static void gs4i_node_spreads(int index, void *context)
 {
     const gs4i_node_pass *pass = (const gs4i_node_pass *)context;
@@ -8787,20 +11453,29 @@ static void gs4i_node_spreads(int index, void *context)
         const gs4_real *u = gs4i_seen_nodes(g) + (size_t)s * GS4I_NODE_REALS;
         gs4i_quad sum = zero, worst = zero, total = zero, q;
         gs4_real mass = 0, *spread = g->spread + 4 * (size_t)s;
-        for (i = 0; i < 4 * GS4I_BLOCK_NODES; i += 4) { GS4I_LOAD(q, u + i); GS4I_SPLAT_MAD(sum, u[i + 3], q); mass += u[i + 3]; }
+        for (i = 0; i < 4 * GS4I_BLOCK_NODES; i += 4) {
+            GS4I_LOAD(q, u + i);
+            GS4I_SPLAT_MAD(sum, u[i + 3], q);
+            mass += u[i + 3];
+        }
         GS4I_SPLAT_MUL(sum, mass > 0 ? 1 / mass : GS4I_C(0), sum);
         for (i = 0; i < 4 * GS4I_BLOCK_NODES; i += 4) {
             if (!(u[i + 3] > 0)) continue;
             GS4I_LOAD(q, u + i);
             GS4I_DIFFERENCE(q, q, sum);
-            if (u[i + 3] <= light) GS4I_SPLAT_MUL(q, 14 * GS4I_SQRT(u[i + 3] / pass->sim->min_mass), q);
+            if (u[i + 3] <= light)
+                GS4I_SPLAT_MUL(q, 14 * GS4I_SQRT(u[i + 3] / pass->sim->min_mass), q);
             GS4I_MUL(q, q, q);
             GS4I_GREATER(worst, q, worst);
-            GS4I_SUM(total, total, q);                      /* the greatest loses NaN, the sum does not */
+            /* the greatest loses NaN, the sum does not */
+            GS4I_SUM(total, total, q);
         }
         GS4I_STORE(spread, sum);
-        spread[3] = !(mass > 0) ? GS4I_C(-1) : !gs4i_finite(GS4I_LANE(total, 0) + GS4I_LANE(total, 1) + GS4I_LANE(total, 2)) ? GS4I_HUGE
-                  : GS4I_SQRT(GS4I_LANE(worst, 0)) + GS4I_SQRT(GS4I_LANE(worst, 1)) + GS4I_SQRT(GS4I_LANE(worst, 2));
+        spread[3] = !(mass > 0) ? GS4I_C(-1)
+                    : !gs4i_finite(GS4I_LANE(total, 0) + GS4I_LANE(total, 1) + GS4I_LANE(total, 2))
+                        ? GS4I_HUGE
+                        : GS4I_SQRT(GS4I_LANE(worst, 0)) + GS4I_SQRT(GS4I_LANE(worst, 1))
+                              + GS4I_SQRT(GS4I_LANE(worst, 2));
     }
 }
 
@@ -8817,7 +11492,8 @@ static void gs4i_sharpen_velocities(int index, void *context)
 {
     const gs4i_grid *g = &((const gs4i_node_pass *)context)->sim->grid;
     int s;
-    for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) gs4i_sharpen_block(g, s, g->momentum, 0);
+    for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++)
+        gs4i_sharpen_block(g, s, g->momentum, 0);
 }
 
 /* Forces of stress, and the weight of what is on the nodes. */
@@ -8825,7 +11501,8 @@ static void gs4i_sharpen_forces(int index, void *context)
 {
     const gs4_sim *sim = ((const gs4i_node_pass *)context)->sim;
     const gs4i_grid *g = &sim->grid;
-    const gs4i_quad gravity = { GS4I_LANES(sim->desc.gravity.x, sim->desc.gravity.y, sim->desc.gravity.z, 0) };
+    const gs4i_quad gravity = { GS4I_LANES(sim->desc.gravity.x, sim->desc.gravity.y,
+                                           sim->desc.gravity.z, 0) };
     int s, i;
     for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
         gs4_real *f = g->sharp + (size_t)GS4I_NODE_REALS * (size_t)s;
@@ -8839,9 +11516,13 @@ static void gs4i_sharpen_forces(int index, void *context)
     }
 }
 
-/* --- stages ------------------------------------------------------------------------------------------- */
+/* --- stages ----------------------------------------------------------------------------------- */
 
-#define GS4I_TRY(call) do { int gs4i_r = (call); if (gs4i_r != GS4_OK) return gs4i_r; } while (0)
+#define GS4I_TRY(call)                       \
+    do {                                     \
+        int gs4i_r = (call);                 \
+        if (gs4i_r != GS4_OK) return gs4i_r; \
+    } while (0)
 
 /* Everything whose size follows the blocks. */
 static int gs4i_after_occupy(gs4_sim *sim)
@@ -8849,10 +11530,12 @@ static int gs4i_after_occupy(gs4_sim *sim)
     gs4i_memory *m = &sim->memory;
     if (gs4i_list_images(m, &sim->boundary, &sim->grid) != GS4_OK) return gs4i_fail_memory(sim);
     if (sim->grid.occupied_capacity > sim->report_capacity) {
-        gs4i_report *r = (gs4i_report *)gs4i_alloc(m, (size_t)sim->grid.occupied_capacity, sizeof *r);
+        gs4i_report *r =
+            (gs4i_report *)gs4i_alloc(m, (size_t)sim->grid.occupied_capacity, sizeof *r);
         if (!r) return gs4i_fail_memory(sim);
         gs4i_free(m, sim->reports, (size_t)sim->report_capacity, sizeof *r);
-        sim->reports = r; sim->report_capacity = sim->grid.occupied_capacity;
+        sim->reports = r;
+        sim->report_capacity = sim->grid.occupied_capacity;
     }
     return gs4i_reserve_heat(sim) == GS4_OK ? GS4_OK : gs4i_fail_memory(sim);
 }
@@ -8861,7 +11544,9 @@ static int gs4i_after_occupy(gs4_sim *sim)
 static int gs4i_bin(gs4_sim *sim)
 {
     const double start = gs4i_now(sim);
-    if (gs4i_particles_sort(&sim->memory, &sim->tasks, &sim->particles, &sim->grid, sim->rule.reach) != GS4_OK) return gs4i_fail_memory(sim);
+    if (gs4i_particles_sort(&sim->memory, &sim->tasks, &sim->particles, &sim->grid, sim->rule.reach)
+        != GS4_OK)
+        return gs4i_fail_memory(sim);
     sim->unsorted = 1;
     GS4I_TRY(gs4i_after_occupy(sim));
     sim->unsorted = 0;
@@ -8869,7 +11554,8 @@ static int gs4i_bin(gs4_sim *sim)
     return GS4_OK;
 }
 
-/* S1 to S3: scatter; when particles have strayed too far from their block, sort and scatter again. */
+/* S1 to S3: scatter; when particles have strayed too far from their block, sort and scatter
+ * again. */
 static int gs4i_rasterise(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     const int euler = sim->desc.integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER;
@@ -8878,10 +11564,14 @@ static int gs4i_rasterise(gs4_sim *sim, gs4i_node_pass *nodes)
         if (sim->unsorted || tries) GS4I_TRY(gs4i_bin(sim));
         gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_clear_nodes, nodes);
         GS4I_TRY(gs4i_find_ghosts(sim));
-        gs4i_scatter(sim, !euler ? gs4i_scatter_momentum : sim->particles.with_heat ? gs4i_scatter_euler_and_heat : gs4i_scatter_euler);
+        gs4i_scatter(sim, !euler                     ? gs4i_scatter_momentum
+                          : sim->particles.with_heat ? gs4i_scatter_euler_and_heat
+                                                     : gs4i_scatter_euler);
         if (!gs4i_all_reports(sim).strayed) return GS4_OK;
     }
-    return gs4i_fail(sim, GS4_ERROR_UNSTABLE, "particles would move more than a cell beyond the domain in one step; the step was not taken");
+    return gs4i_fail(sim, GS4_ERROR_UNSTABLE,
+                     "particles would move more than a cell beyond the domain in one step; the "
+                     "step was not taken");
 }
 
 /* S v_i or S u_i, images included. */
@@ -8897,7 +11587,8 @@ static void gs4i_set_velocities(gs4_sim *sim, gs4i_node_pass *nodes)
     const int groups = gs4i_groups(sim);
     gs4i_parallel_for(&sim->tasks, groups, gs4i_clear_jumps, nodes);
     gs4i_scatter_ghosts(sim, gs4i_mark_ghosts);
-    gs4i_scatter_ghosts(sim, sim->particles.with_rates ? gs4i_scatter_ghost_momentum : gs4i_scatter_ghost_affine);
+    gs4i_scatter_ghosts(sim, sim->particles.with_rates ? gs4i_scatter_ghost_momentum
+                                                       : gs4i_scatter_ghost_affine);
     gs4i_fold_momentum(&sim->boundary, &sim->grid);
     gs4i_parallel_for(&sim->tasks, groups, gs4i_node_velocities, nodes);
     gs4i_fill_images(&sim->boundary, &sim->grid, sim->grid.momentum);
@@ -8919,47 +11610,66 @@ static void gs4i_finish_forces(gs4_sim *sim, gs4i_node_pass *nodes)
     if (!g->with_sharp) return;
     gs4i_fill_images(&sim->boundary, g, g->force);
     gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_sharpen_forces, nodes);
-    g->force = g->sharp; g->sharp = force;
+    g->force = g->sharp;
+    g->sharp = force;
     gs4i_weigh_images(&sim->boundary, g, sim->desc.gravity);
     gs4i_fold_force(&sim->boundary, g, 0);
 }
 
-/* Is what the particles have seen so far acceptable, and is dt still within the limit that follows from it? */
+/* Is what the particles have seen so far acceptable, and is dt still within the limit that
+ * follows from it? */
 static int gs4i_check_stage(gs4_sim *sim)
 {
     gs4i_report r = gs4i_all_reports(sim);
     if (r.bad) return gs4i_fail_bad(sim, &r);
     sim->stage_limit = gs4i_stable_dt(sim, &r);
     if (sim->rule.dt > GS4I_C(1.25) * sim->stage_limit)
-        return gs4i_fail_value(sim, GS4_ERROR_UNSTABLE, "viscosity or compression rose during the step: dt ", (double)sim->rule.dt,
-                               " s is beyond the stability limit there; the step was not taken");
+        return gs4i_fail_value(
+            sim, GS4_ERROR_UNSTABLE, "viscosity or compression rose during the step: dt ",
+            (double)sim->rule.dt, " s is beyond the stability limit there; the step was not taken");
     return GS4_OK;
 }
 
 /* Before anything is written to the particles: can the step be trusted? */
 static int gs4i_rehearse(gs4_sim *sim, gs4i_node_pass *nodes)
 {
-    static const gs4_task_fn tasks[2][2] = { { gs4i_rehearse_task, gs4i_rehearse_with_heat_task }, { gs4i_rehearse_euler_task, gs4i_rehearse_euler_with_heat_task } };
+    static const gs4_task_fn tasks[2][2] = { { gs4i_rehearse_task, gs4i_rehearse_with_heat_task },
+                                             { gs4i_rehearse_euler_task,
+                                               gs4i_rehearse_euler_with_heat_task } };
     gs4i_report r;
     gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_node_spreads, nodes);
-    gs4i_gather(sim, tasks[sim->desc.integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER][sim->particles.with_heat]);
+    gs4i_gather(
+        sim,
+        tasks[sim->desc.integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER][sim->particles.with_heat]);
     r = gs4i_all_reports(sim);
     return r.bad ? gs4i_fail_bad(sim, &r) : GS4_OK;
 }
 
-/* --- mouths, leavers, time ---------------------------------------------------------------------------- */
+/* --- mouths, leavers, time -------------------------------------------------------------------- */
 
-static int gs4i_add_one(gs4_sim *sim, gs4_vec3 x, gs4_vec3 v, gs4_real mass, int material, gs4_real temperature)
+static int gs4i_add_one(gs4_sim *sim, gs4_vec3 x, gs4_vec3 v, gs4_real mass, int material,
+                        gs4_real temperature)
 {
     gs4i_particles *p = &sim->particles;
     size_t i = (size_t)p->count;
     int k;
     if (p->count >= p->capacity || sim->next_id == UINT32_MAX) return 0;
-    p->position[4 * i] = x.x; p->position[4 * i + 1] = x.y; p->position[4 * i + 2] = x.z; p->position[4 * i + 3] = mass;
-    p->velocity[4 * i] = v.x; p->velocity[4 * i + 1] = v.y; p->velocity[4 * i + 2] = v.z; p->velocity[4 * i + 3] = 1;
-    if (p->with_rates) { memset(p->rate + 4 * i, 0, 4 * sizeof(gs4_real)); memset(p->lag + 4 * i, 0, 4 * sizeof(gs4i_half)); }
+    p->position[4 * i] = x.x;
+    p->position[4 * i + 1] = x.y;
+    p->position[4 * i + 2] = x.z;
+    p->position[4 * i + 3] = mass;
+    p->velocity[4 * i] = v.x;
+    p->velocity[4 * i + 1] = v.y;
+    p->velocity[4 * i + 2] = v.z;
+    p->velocity[4 * i + 3] = 1;
+    if (p->with_rates) {
+        memset(p->rate + 4 * i, 0, 4 * sizeof(gs4_real));
+        memset(p->lag + 4 * i, 0, 4 * sizeof(gs4i_half));
+    }
     for (k = 0; k < 3 && p->affine[k]; k++) memset(p->affine[k] + 4 * i, 0, 4 * sizeof(gs4_real));
-    if (p->elastic_reals) memset(p->elastic + (size_t)p->elastic_reals * i, 0, (size_t)p->elastic_reals * sizeof(gs4_real));
+    if (p->elastic_reals)
+        memset(p->elastic + (size_t)p->elastic_reals * i, 0,
+               (size_t)p->elastic_reals * sizeof(gs4_real));
     if (p->deformation_reals) gs4i_undeform(p, i, 1);
     if (p->with_heat) gs4i_begin_heat(p, i, &sim->laws[material], temperature);
     p->id[i] = sim->next_id++;
@@ -8973,8 +11683,8 @@ static int gs4i_add_one(gs4_sim *sim, gs4_vec3 x, gs4_vec3 v, gs4_real mass, int
 static int gs4i_inside_domain(const gs4i_grid *g, gs4_vec3 p)
 {
     return p.x >= g->origin.x && p.x < g->origin.x + GS4I_C(g->cells[0]) * g->h
-        && p.y >= g->origin.y && p.y < g->origin.y + GS4I_C(g->cells[1]) * g->h
-        && p.z >= g->origin.z && p.z < g->origin.z + GS4I_C(g->cells[2]) * g->h;
+           && p.y >= g->origin.y && p.y < g->origin.y + GS4I_C(g->cells[1]) * g->h
+           && p.z >= g->origin.z && p.z < g->origin.z + GS4I_C(g->cells[2]) * g->h;
 }
 
 /* Uniform in [-1/2, 1/2), from the seed and a number. */
@@ -8984,14 +11694,17 @@ static gs4_real gs4i_jitter(uint32_t seed, uint64_t number, int axis)
     return GS4I_C((double)(u >> 40) / 16777216.0 - 0.5);
 }
 
-/* The lattice that flows through a mouth: points that are in it now and were not when last looked at. With `sim` const
- * in spirit when `emit` is 0: then only counts, where the mouth will be in the time `ahead`. Lattice point n of axis a is at low + (n + 1/2) spacing + drift. */
-static int gs4i_mouth_points(gs4_sim *sim, gs4i_emitter *e, const double drift[3], double ahead, int emit)
+/* The lattice that flows through a mouth: points that are in it now and were not when last
+ * looked at. With `sim` const in spirit when `emit` is 0: then only counts, where the mouth will
+ * be in the time `ahead`. Lattice point n of axis a is at low + (n + 1/2) spacing + drift. */
+static int gs4i_mouth_points(gs4_sim *sim, gs4i_emitter *e, const double drift[3], double ahead,
+                             int emit)
 {
     const gs4i_body *mouth = &sim->boundary.bodies[e->body];
     gs4i_body placed = *mouth;
     const double spacing = (double)e->is.fill.spacing;
-    const gs4_real mass = sim->laws[e->is.fill.material].density * e->is.fill.spacing * e->is.fill.spacing * e->is.fill.spacing;
+    const gs4_real mass = sim->laws[e->is.fill.material].density * e->is.fill.spacing
+                          * e->is.fill.spacing * e->is.fill.spacing;
     double low[3], high[3], origin[3], pivot[3], travelled[3];
     gs4_vec3 lo, hi;
     int64_t from[3], to[3], i, j, k;
@@ -8999,32 +11712,51 @@ static int gs4i_mouth_points(gs4_sim *sim, gs4i_emitter *e, const double drift[3
     if (ahead > 0) gs4i_body_move(&placed, ahead);
     gs4i_to_double(mouth->is.pivot, pivot);
     gs4i_shape_bounds(&e->is.shape, &lo, &hi);
-    gs4i_to_double(lo, low); gs4i_to_double(hi, high);
+    gs4i_to_double(lo, low);
+    gs4i_to_double(hi, high);
     gs4i_to_double(sim->grid.origin, origin);
-    for (a = 0; a < 3; a++) {                               /* the part of the mouth's box that is in the domain */
-        const double moved = placed.at[a] - pivot[a], size = (double)sim->grid.cells[a] * (double)sim->grid.h;
-        const double begin = fmax(low[a], origin[a] - moved), end = fmin(high[a], origin[a] + size - moved);
+    /* the part of the mouth's box that is in the domain */
+    for (a = 0; a < 3; a++) {
+        const double moved = placed.at[a] - pivot[a],
+                     size = (double)sim->grid.cells[a] * (double)sim->grid.h;
+        const double begin = fmax(low[a], origin[a] - moved),
+                     end = fmin(high[a], origin[a] + size - moved);
         from[a] = (int64_t)floor((begin - low[a] - drift[a]) / spacing) - 1;
         to[a] = (int64_t)ceil((end - low[a] - drift[a]) / spacing) + 1;
         travelled[a] = moved;
     }
-    for (k = from[2]; k <= to[2]; k++) for (j = from[1]; j <= to[1]; j++) for (i = from[0]; i <= to[0]; i++) {
-        const double at[3] = { (double)i + 0.5, (double)j + 0.5, (double)k + 0.5 };
-        const uint64_t number = (uint64_t)i * 0x9e3779b1u + ((uint64_t)j << 21) * 31 + ((uint64_t)k << 42) * 17;
-        double p[3], before[3];
-        gs4_vec3 now, then, world;
-        for (a = 0; a < 3; a++) {
-            const double shift = low[a] + (at[a] + (double)(e->is.fill.jitter * gs4i_jitter(e->is.fill.random_seed, number, a))) * spacing;
-            p[a] = shift + drift[a]; before[a] = shift + e->looked[a];
-        }
-        now = gs4i_vec3(GS4I_C(p[0]), GS4I_C(p[1]), GS4I_C(p[2]));
-        then = gs4i_vec3(GS4I_C(before[0]), GS4I_C(before[1]), GS4I_C(before[2]));
-        if (!(gs4i_shape_or_field(mouth, now) < 0) || (e->begun && gs4i_shape_or_field(mouth, then) < 0)) continue;
-        world = gs4i_vec3(GS4I_C(p[0] + travelled[0]), GS4I_C(p[1] + travelled[1]), GS4I_C(p[2] + travelled[2]));
-        if (!gs4i_inside_domain(&sim->grid, world)) continue;
-        n++;
-        if (emit && !gs4i_add_one(sim, world, e->is.fill.velocity, mass, e->is.fill.material, e->is.fill.temperature)) return n;
-    }
+    for (k = from[2]; k <= to[2]; k++)
+        for (j = from[1]; j <= to[1]; j++)
+            for (i = from[0]; i <= to[0]; i++) {
+                const double at[3] = { (double)i + 0.5, (double)j + 0.5, (double)k + 0.5 };
+                const uint64_t number =
+                    (uint64_t)i * 0x9e3779b1u + ((uint64_t)j << 21) * 31 + ((uint64_t)k << 42) * 17;
+                double p[3], before[3];
+                gs4_vec3 now, then, world;
+                for (a = 0; a < 3; a++) {
+                    const double shift =
+                        low[a]
+                        + (at[a]
+                           + (double)(e->is.fill.jitter
+                                      * gs4i_jitter(e->is.fill.random_seed, number, a)))
+                              * spacing;
+                    p[a] = shift + drift[a];
+                    before[a] = shift + e->looked[a];
+                }
+                now = gs4i_vec3(GS4I_C(p[0]), GS4I_C(p[1]), GS4I_C(p[2]));
+                then = gs4i_vec3(GS4I_C(before[0]), GS4I_C(before[1]), GS4I_C(before[2]));
+                if (!(gs4i_shape_or_field(mouth, now) < 0)
+                    || (e->begun && gs4i_shape_or_field(mouth, then) < 0))
+                    continue;
+                world = gs4i_vec3(GS4I_C(p[0] + travelled[0]), GS4I_C(p[1] + travelled[1]),
+                                  GS4I_C(p[2] + travelled[2]));
+                if (!gs4i_inside_domain(&sim->grid, world)) continue;
+                n++;
+                if (emit
+                    && !gs4i_add_one(sim, world, e->is.fill.velocity, mass, e->is.fill.material,
+                                     e->is.fill.temperature))
+                    return n;
+            }
     return n;
 }
 
@@ -9055,19 +11787,26 @@ static int gs4i_prepare_emitters(gs4_sim *sim, double dt)
     int e, n = 0, wanted;
     for (e = 0; e < sim->emitter_count; e++) {
         double drift[3];
-        sim->boundary.bodies[sim->emitters[e].body].asleep = !gs4i_emitter_is_on(&sim->emitters[e], sim->time);
+        sim->boundary.bodies[sim->emitters[e].body].asleep =
+            !gs4i_emitter_is_on(&sim->emitters[e], sim->time);
         if (!gs4i_emitter_is_on(&sim->emitters[e], sim->time + dt)) continue;
-        if (sim->emitters[e].begun) gs4i_drift_after(&sim->emitters[e], dt, drift);
-        else memset(drift, 0, sizeof drift);
-        if (gs4i_is_due(&sim->emitters[e], drift)) n += gs4i_mouth_points(sim, &sim->emitters[e], drift, dt, 0);
+        if (sim->emitters[e].begun)
+            gs4i_drift_after(&sim->emitters[e], dt, drift);
+        else
+            memset(drift, 0, sizeof drift);
+        if (gs4i_is_due(&sim->emitters[e], drift))
+            n += gs4i_mouth_points(sim, &sim->emitters[e], drift, dt, 0);
     }
     if (n == 0) return GS4_OK;
     wanted = sim->particles.count + n;
-    if (sim->desc.max_particles) return GS4_OK;             /* all room there will be; mouths pause when it is full */
+    /* all room there will be; mouths pause when it is full */
+    if (sim->desc.max_particles) return GS4_OK;
     if (wanted <= sim->particles.capacity) return GS4_OK;
-    if (wanted > GS4I_MAX_PARTICLES) return gs4i_fail(sim, GS4_ERROR_MEMORY, "more than 2^30 particles");
+    if (wanted > GS4I_MAX_PARTICLES)
+        return gs4i_fail(sim, GS4_ERROR_MEMORY, "more than 2^30 particles");
     wanted += wanted / 8;
-    if (gs4i_particles_reserve(&sim->memory, &sim->particles, wanted) != GS4_OK) return gs4i_fail_memory(sim);
+    if (gs4i_particles_reserve(&sim->memory, &sim->particles, wanted) != GS4_OK)
+        return gs4i_fail_memory(sim);
     return GS4_OK;
 }
 
@@ -9079,8 +11818,10 @@ static void gs4i_emit(gs4_sim *sim, double dt)
         double drift[3];
         int before = sim->particles.count, n;
         if (!gs4i_emitter_is_on(m, sim->time)) continue;
-        if (m->begun) gs4i_drift_after(m, dt, drift);
-        else memset(drift, 0, sizeof drift);
+        if (m->begun)
+            gs4i_drift_after(m, dt, drift);
+        else
+            memset(drift, 0, sizeof drift);
         memcpy(m->drift, drift, sizeof drift);
         if (!gs4i_is_due(m, drift)) continue;
         n = gs4i_mouth_points(sim, m, drift, 0, 1);
@@ -9088,11 +11829,16 @@ static void gs4i_emit(gs4_sim *sim, double dt)
             sim->desc.log(1, "an emitter pauses: max_particles is reached", sim->desc.log_user);
         memcpy(m->looked, drift, sizeof drift);
         m->begun = 1;
-        {                                                   /* what is new counts for the next limit */
+        /* what is new counts for the next limit */
+        {
             const gs4i_law *law = &sim->laws[m->is.fill.material];
             sim->worst.max_sound = gs4i_max(sim->worst.max_sound, law->sound_speed);
-            sim->worst.max_viscosity = gs4i_max(sim->worst.max_viscosity, law->viscosity * law->inv_density);
-            sim->worst.max_stiffness = gs4i_max(sim->worst.max_stiffness, gs4i_max(2 * law->modulus, GS4I_SOLID_WAVES * law->shear_modulus) * law->inv_density);
+            sim->worst.max_viscosity =
+                gs4i_max(sim->worst.max_viscosity, law->viscosity * law->inv_density);
+            sim->worst.max_stiffness =
+                gs4i_max(sim->worst.max_stiffness,
+                         gs4i_max(2 * law->modulus, GS4I_SOLID_WAVES * law->shear_modulus)
+                             * law->inv_density);
             if (law->varies) sim->unseen = 1;
         }
     }
@@ -9110,7 +11856,9 @@ static void gs4i_drop_leavers(gs4_sim *sim)
         const gs4_real *x = p->position + 4 * i;
         if (!gs4i_inside_domain(&sim->grid, gs4i_vec3(x[0], x[1], x[2]))) continue;
         for (k = 0; k < GS4I_ARRAYS && kept != i; k++)
-            if (*a[k].data) memcpy((char *)*a[k].data + kept * a[k].size, (char *)*a[k].data + i * a[k].size, a[k].size);
+            if (*a[k].data)
+                memcpy((char *)*a[k].data + kept * a[k].size, (char *)*a[k].data + i * a[k].size,
+                       a[k].size);
         kept++;
     }
     p->count = (int)kept;
@@ -9124,39 +11872,48 @@ static void gs4i_finish(gs4_sim *sim)
     int b;
     if (sim->particles.count) {
         gs4i_report r = gs4i_all_reports(sim);
-        r.max_speed = GS4I_SQRT(r.max_speed); r.max_gradient = GS4I_SQRT(r.max_gradient);
+        r.max_speed = GS4I_SQRT(r.max_speed);
+        r.max_gradient = GS4I_SQRT(r.max_gradient);
         sim->worst = r;
-        sim->split += (uint64_t)r.split; sim->bounded += (uint64_t)r.bounded;
+        sim->split += (uint64_t)r.split;
+        sim->bounded += (uint64_t)r.bounded;
         if (r.left) gs4i_drop_leavers(sim);
     }
     for (b = 0; b < sim->boundary.body_count; b++) {
         gs4i_body_move(&sim->boundary.bodies[b], dt);
-        sim->worst.max_speed = gs4i_max(sim->worst.max_speed, gs4i_max(gs4i_length(sim->boundary.bodies[b].is.velocity),
-                                                                       gs4i_length(sim->boundary.bodies[b].flow)));
+        sim->worst.max_speed = gs4i_max(sim->worst.max_speed,
+                                        gs4i_max(gs4i_length(sim->boundary.bodies[b].is.velocity),
+                                                 gs4i_length(sim->boundary.bodies[b].flow)));
     }
-    sim->time += dt; sim->last_dt = dt; sim->steps++;
+    sim->time += dt;
+    sim->last_dt = dt;
+    sim->steps++;
     sim->afresh = 0;
     sim->shift = sim->rule.next_shift;
     gs4i_emit(sim, dt);
 }
 
-/* How solids turn whose velocities were set by hand: by the grid, which sees less of it at their surface than there is, hence again with what
- * it saw (kinetic energy that a stiff cube keeps in a quarter of a turn: 0.996 after three times, 0.9999 after ten). A step that is refused
+/* How solids turn whose velocities were set by hand: by the grid, which sees less of it at their
+ * surface than there is, hence again with what it saw (kinetic energy that a stiff cube keeps in
+ * a quarter of a turn: 0.996 after three times, 0.9999 after ten). A step that is refused
  * forgets it again. */
 static void gs4i_forget_turning(gs4_sim *sim)
 {
     int i;
-    for (i = 0; i < sim->particles.count && sim->particles.deformation_reals; i++) gs4i_set_turning(&sim->particles, (size_t)i, gs4i_vec3(0, 0, 0));
+    for (i = 0; i < sim->particles.count && sim->particles.deformation_reals; i++)
+        gs4i_set_turning(&sim->particles, (size_t)i, gs4i_vec3(0, 0, 0));
 }
 
 static int gs4i_find_turning(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     const gs4_real ahead = sim->rule.reach.ahead;
     int pass, result = GS4_OK;
-    sim->rule.reach.ahead = 0;                              /* as it is now, whatever dt is */
+    sim->rule.reach.ahead = 0; /* as it is now, whatever dt is */
     for (pass = 0; pass < 10 && result == GS4_OK; pass++) {
         result = gs4i_rasterise(sim, nodes);
-        if (result == GS4_OK && gs4i_place_jumps(&sim->memory, &sim->boundary, &sim->grid) != GS4_OK) result = gs4i_fail_memory(sim);
+        if (result == GS4_OK
+            && gs4i_place_jumps(&sim->memory, &sim->boundary, &sim->grid) != GS4_OK)
+            result = gs4i_fail_memory(sim);
         if (result != GS4_OK) break;
         gs4i_set_velocities(sim, nodes);
         gs4i_gather(sim, gs4i_see_turning_task);
@@ -9165,7 +11922,8 @@ static int gs4i_find_turning(gs4_sim *sim, gs4i_node_pass *nodes)
     return result;
 }
 
-/* One step of size dt. Particles are written by stage S7 alone, which is reached only when nothing can fail any more. */
+/* One step of size dt. Particles are written by stage S7 alone, which is reached only when
+ * nothing can fail any more. */
 static int gs4i_take_step(gs4_sim *sim, gs4_real dt)
 {
     const int euler = sim->desc.integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER;
@@ -9180,15 +11938,21 @@ static int gs4i_take_step(gs4_sim *sim, gs4_real dt)
     sim->warm = gs4i_make_warm_rule(sim);
     GS4I_TRY(gs4i_prepare_emitters(sim, (double)dt));
     if (sim->particles.count) {
-        if (sim->unsorted) GS4I_TRY(gs4i_bin(sim));                                             /* S1 */
-        if (sim->unturned && sim->particles.deformation_reals && !euler) GS4I_TRY(gs4i_find_turning(sim, &nodes));
-        GS4I_TRY(gs4i_rasterise(sim, &nodes));                                                  /* S2, S3 */
-        if (gs4i_place_jumps(&sim->memory, &sim->boundary, &sim->grid) != GS4_OK) return gs4i_fail_memory(sim);
+        /* S1 */
+        if (sim->unsorted) GS4I_TRY(gs4i_bin(sim));
+        if (sim->unturned && sim->particles.deformation_reals && !euler)
+            GS4I_TRY(gs4i_find_turning(sim, &nodes));
+        /* S2, S3 */
+        GS4I_TRY(gs4i_rasterise(sim, &nodes));
+        if (gs4i_place_jumps(&sim->memory, &sim->boundary, &sim->grid) != GS4_OK)
+            return gs4i_fail_memory(sim);
         gs4i_set_velocities(sim, &nodes);
         if (!euler) {
-            gs4i_scatter(sim, heat ? gs4i_scatter_forces_and_heat : gs4i_scatter_forces);       /* S4, S5 */
+            /* S4, S5 */
+            gs4i_scatter(sim, heat ? gs4i_scatter_forces_and_heat : gs4i_scatter_forces);
             gs4i_finish_forces(sim, &nodes);
-            gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_node_accelerations, &nodes);  /* S6 */
+            /* S6 */
+            gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_node_accelerations, &nodes);
             gs4i_fill_images(&sim->boundary, &sim->grid, sim->grid.momentum);
             if (sim->grid.with_sharp) gs4i_sharpen(sim, &nodes);
             gs4i_fill_images(&sim->boundary, &sim->grid, sim->grid.force);
@@ -9200,9 +11964,12 @@ static int gs4i_take_step(gs4_sim *sim, gs4_real dt)
         GS4I_TRY(gs4i_rehearse(sim, &nodes));
         if (!euler) gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_node_memories, &nodes);
         gs4i_gather(sim, euler ? heat ? gs4i_gather_euler_with_heat_task : gs4i_gather_euler_task
-                               : heat ? gs4i_correct_with_heat_task : gs4i_correct_task);       /* S7 */
+                         /* S7 */
+                         : heat ? gs4i_correct_with_heat_task
+                                : gs4i_correct_task);
     }
-    gs4i_finish(sim);                                                                           /* S8 */
+    /* S8 */
+    gs4i_finish(sim);
     sim->unturned = 0;
     sim->seconds[GS4I_CLOCK_TOTAL] += gs4i_now(sim) - start;
     return GS4_OK;
@@ -9215,11 +11982,18 @@ static int gs4i_step(gs4_sim *sim, gs4_real dt)
     return result;
 }
 
-/* ==== [[files]] frames and checkpoints ============================================================= */
+/* ==== [[files]] frames and checkpoints ======================================================== */
 
-/* A file that appears under its name only when it is whole: written beside it, then renamed. What is not a regular file
- * (a device, a pipe) is written directly. */
-typedef struct gs4i_file { FILE *stream; char *temporary; size_t temporary_size; const char *path; int failed; uint64_t hash; } gs4i_file;
+/* A file that appears under its name only when it is whole: written beside it, then renamed.
+ * What is not a regular file (a device, a pipe) is written directly. */
+typedef struct gs4i_file {
+    FILE *stream;
+    char *temporary;
+    size_t temporary_size;
+    const char *path;
+    int failed;
+    uint64_t hash;
+} gs4i_file;
 
 static int gs4i_is_special(const char *path)
 {
@@ -9249,7 +12023,9 @@ static int gs4i_file_open(gs4_sim *sim, gs4i_file *f, const char *path)
     f->stream = fopen(f->temporary ? f->temporary : path, "wb");
     if (f->stream) return GS4_OK;
     gs4i_free(&sim->memory, f->temporary, f->temporary_size, 1);
-    return gs4i_fail(sim, GS4_ERROR_IO, "the file could not be created: does its folder exist, and may it be written to?");
+    return gs4i_fail(
+        sim, GS4_ERROR_IO,
+        "the file could not be created: does its folder exist, and may it be written to?");
 }
 
 static void gs4i_file_put(gs4i_file *f, const void *data, size_t bytes)
@@ -9266,44 +12042,71 @@ static int gs4i_file_close(gs4_sim *sim, gs4i_file *f)
     if (fclose(f->stream) != 0) failed = 1;
     if (f->temporary) {
 #ifdef _WIN32
-        if (!failed) remove(f->path);                       /* rename does not replace there */
+        if (!failed) remove(f->path); /* rename does not replace there */
 #endif
         if (!failed) failed = rename(f->temporary, f->path) != 0;
         if (failed) remove(f->temporary);
         gs4i_free(&sim->memory, f->temporary, f->temporary_size, 1);
     }
-    if (failed) return gs4i_fail(sim, GS4_ERROR_IO, "the file could not be written whole: is the disk full? What was there before is untouched");
+    if (failed)
+        return gs4i_fail(sim, GS4_ERROR_IO,
+                         "the file could not be written whole: is the disk full? What was there "
+                         "before is untouched");
     return GS4_OK;
 }
 
-/* Columns of a frame, in order. Frames are little-endian; on a big-endian machine numbers are turned round. */
-enum { GS4I_COLUMNS = 11 };
-typedef struct gs4i_column { const char *name; const char *ply; const char *npy; const void *data; size_t size; int numbers; size_t stride; } gs4i_column;
+/* Columns of a frame, in order. Frames are little-endian; on a big-endian machine numbers are
+ * turned round. */
+enum {
+    GS4I_COLUMNS = 11
+};
+typedef struct gs4i_column {
+    const char *name;
+    const char *ply;
+    const char *npy;
+    const void *data;
+    size_t size;
+    int numbers;
+    size_t stride;
+} gs4i_column;
 
 static int gs4i_columns(gs4_sim *sim, gs4i_column c[GS4I_COLUMNS])
 {
     gs4i_particles *p = &sim->particles;
-    const char *real_ply = sizeof(gs4_real) == 4 ? "float" : "double", *real_npy = sizeof(gs4_real) == 4 ? "<f4" : "<f8";
+    const char *real_ply = sizeof(gs4_real) == 4 ? "float" : "double",
+               *real_npy = sizeof(gs4_real) == 4 ? "<f4" : "<f8";
     const size_t r = sizeof(gs4_real);
     int n = 0;
-    const gs4i_column columns[] = {
-        { "position", real_ply, real_npy, p->position, r, 3, 4 * r },
-        { "velocity", real_ply, real_npy, p->velocity, r, 3, 4 * r },
-        { "volume_ratio", real_ply, real_npy, p->velocity + 3, r, 1, 4 * r },
-        { "mass", real_ply, real_npy, p->position + 3, r, 1, 4 * r },
-        { "id", "uint", "<u4", p->id, 4, 1, 4 },
-        { "material", "uchar", "|u1", p->material, 1, 1, 1 } };
-    const gs4i_column stress = { "stress", real_ply, real_npy, p->elastic, r, 6, (size_t)p->elastic_reals * r };
-    const gs4i_column deformation = { "deformation", real_ply, real_npy, p->deformation, r, 9, (size_t)p->deformation_reals * r };
+    const gs4i_column columns[] = { { "position", real_ply, real_npy, p->position, r, 3, 4 * r },
+                                    { "velocity", real_ply, real_npy, p->velocity, r, 3, 4 * r },
+                                    { "volume_ratio", real_ply, real_npy, p->velocity + 3, r, 1,
+                                      4 * r },
+                                    { "mass", real_ply, real_npy, p->position + 3, r, 1, 4 * r },
+                                    { "id", "uint", "<u4", p->id, 4, 1, 4 },
+                                    { "material", "uchar", "|u1", p->material, 1, 1, 1 } };
+    const gs4i_column stress = {
+        "stress", real_ply, real_npy, p->elastic, r, 6, (size_t)p->elastic_reals * r
+    };
+    const gs4i_column deformation = {
+        "deformation", real_ply, real_npy, p->deformation, r, 9, (size_t)p->deformation_reals * r
+    };
     const gs4i_column temperature = { "temperature", real_ply, real_npy, p->heat, r, 1, 4 * r };
-    const gs4i_column fraction = { "liquid_fraction", real_ply, real_npy, p->heat ? p->heat + 1 : NULL, r, 1, 4 * r };
+    const gs4i_column fraction = {
+        "liquid_fraction", real_ply, real_npy, p->heat ? p->heat + 1 : NULL, r, 1, 4 * r
+    };
     const gs4i_column flux = { "flux", real_ply, real_npy, p->flux, r, 3, 4 * r };
     for (; n < (int)(sizeof columns / sizeof columns[0]); n++) c[n] = columns[n];
     if (p->elastic_reals) c[n++] = stress;
     if (p->deformation_reals) c[n++] = deformation;
-    if (p->with_heat) { c[n++] = temperature; c[n++] = fraction; }
+    if (p->with_heat) {
+        c[n++] = temperature;
+        c[n++] = fraction;
+    }
     if (p->with_flux) c[n++] = flux;
-    if (p->count == 0) { int i; for (i = 0; i < n; i++) c[i].data = &sim->particles; }
+    if (p->count == 0) {
+        int i;
+        for (i = 0; i < n; i++) c[i].data = &sim->particles;
+    }
     return n;
 }
 
@@ -9316,10 +12119,14 @@ static void gs4i_put_records(gs4i_file *f, const gs4i_column *c, int columns, in
     size_t used = 0, b;
     int i, k, e;
     for (i = 0; i < count; i++) {
-        if (used + 256 > sizeof buffer) { gs4i_file_put(f, buffer, used); used = 0; }
+        if (used + 256 > sizeof buffer) {
+            gs4i_file_put(f, buffer, used);
+            used = 0;
+        }
         for (k = 0; k < columns; k++)
             for (e = 0; e < c[k].numbers; e++) {
-                const unsigned char *from = (const unsigned char *)c[k].data + (size_t)i * c[k].stride + (size_t)e * c[k].size;
+                const unsigned char *from = (const unsigned char *)c[k].data
+                                            + (size_t)i * c[k].stride + (size_t)e * c[k].size;
                 for (b = 0; b < c[k].size; b++) buffer[used++] = from[big ? c[k].size - 1 - b : b];
             }
     }
@@ -9328,24 +12135,39 @@ static void gs4i_put_records(gs4i_file *f, const gs4i_column *c, int columns, in
 
 static int gs4i_write_ply(gs4_sim *sim, const char *path)
 {
-    static const char *const axis[3] = { "x", "y", "z" }, *const tensor[6] = { "xx", "yy", "zz", "xy", "xz", "yz" };
+    static const char *const axis[3] = { "x", "y", "z" }, *const tensor[6] = { "xx", "yy", "zz",
+                                                                               "xy", "xz", "yz" };
     gs4i_column c[GS4I_COLUMNS];
     gs4i_file f;
     gs4i_text t;
     char head[1024];
     int columns = gs4i_columns(sim, c), k, e;
     GS4I_TRY(gs4i_file_open(sim, &f, path));
-    t.at = head; t.left = sizeof head;
-    gs4i_put(&t, "ply\nformat binary_little_endian 1.0\ncomment gs4mpm " GS4_VERSION_STRING "\ncomment time ");
+    t.at = head;
+    t.left = sizeof head;
+    gs4i_put(&t, "ply\nformat binary_little_endian 1.0\ncomment gs4mpm " GS4_VERSION_STRING
+                 "\ncomment time ");
     gs4i_put_real(&t, sim->time);
-    gs4i_put(&t, "\nelement vertex "); gs4i_put_integer(&t, sim->particles.count);
+    gs4i_put(&t, "\nelement vertex ");
+    gs4i_put_integer(&t, sim->particles.count);
     for (k = 0; k < columns; k++)
         for (e = 0; e < c[k].numbers; e++) {
-            gs4i_put(&t, "\nproperty "); gs4i_put(&t, c[k].ply); gs4i_put(&t, " ");
-            if (c[k].numbers == 1) gs4i_put(&t, c[k].name);
-            else if (c[k].numbers == 6) { gs4i_put(&t, "stress_"); gs4i_put(&t, tensor[e]); }
-            else if (c[k].numbers == 9) { gs4i_put(&t, "F_"); gs4i_put(&t, axis[e / 3]); gs4i_put(&t, axis[e % 3]); }
-            else { gs4i_put(&t, k == 0 ? "" : k == 1 ? "v" : "flux_"); gs4i_put(&t, axis[e]); }
+            gs4i_put(&t, "\nproperty ");
+            gs4i_put(&t, c[k].ply);
+            gs4i_put(&t, " ");
+            if (c[k].numbers == 1)
+                gs4i_put(&t, c[k].name);
+            else if (c[k].numbers == 6) {
+                gs4i_put(&t, "stress_");
+                gs4i_put(&t, tensor[e]);
+            } else if (c[k].numbers == 9) {
+                gs4i_put(&t, "F_");
+                gs4i_put(&t, axis[e / 3]);
+                gs4i_put(&t, axis[e % 3]);
+            } else {
+                gs4i_put(&t, k == 0 ? "" : k == 1 ? "v" : "flux_");
+                gs4i_put(&t, axis[e]);
+            }
         }
     gs4i_put(&t, "\nend_header\n");
     gs4i_file_put(&f, head, strlen(head));
@@ -9353,7 +12175,8 @@ static int gs4i_write_ply(gs4_sim *sim, const char *path)
     return gs4i_file_close(sim, &f);
 }
 
-/* NumPy's .npy, version 1.0: magic, length of the header, a header that is Python text padded to 64 bytes, records. */
+/* NumPy's .npy, version 1.0: magic, length of the header, a header that is Python text padded to
+ * 64 bytes, records. */
 static int gs4i_write_raw(gs4_sim *sim, const char *path)
 {
     gs4i_column c[GS4I_COLUMNS];
@@ -9365,35 +12188,49 @@ static int gs4i_write_raw(gs4_sim *sim, const char *path)
     GS4I_TRY(gs4i_file_open(sim, &f, path));
     memset(head, ' ', sizeof head);
     memcpy(head, "\x93NUMPY\x01\x00", 8);
-    t.at = head + 10; t.left = sizeof head - 128;
+    t.at = head + 10;
+    t.left = sizeof head - 128;
     gs4i_put(&t, "{'descr': [");
     for (k = 0; k < columns; k++) {
-        gs4i_put(&t, "('"); gs4i_put(&t, c[k].name); gs4i_put(&t, "', '"); gs4i_put(&t, c[k].npy);
-        gs4i_put(&t, c[k].numbers == 3 ? "', (3,)), " : c[k].numbers == 6 ? "', (6,)), " : c[k].numbers == 9 ? "', (3, 3)), " : "'), ");
+        gs4i_put(&t, "('");
+        gs4i_put(&t, c[k].name);
+        gs4i_put(&t, "', '");
+        gs4i_put(&t, c[k].npy);
+        gs4i_put(&t, c[k].numbers == 3   ? "', (3,)), "
+                     : c[k].numbers == 6 ? "', (6,)), "
+                     : c[k].numbers == 9 ? "', (3, 3)), "
+                                         : "'), ");
     }
-    gs4i_put(&t, "], 'fortran_order': False, 'shape': ("); gs4i_put_integer(&t, sim->particles.count); gs4i_put(&t, ",), }");
+    gs4i_put(&t, "], 'fortran_order': False, 'shape': (");
+    gs4i_put_integer(&t, sim->particles.count);
+    gs4i_put(&t, ",), }");
     n = (size_t)(t.at - head);
     head[n] = ' ';
     while ((n + 1) % 64) n++;
     head[n++] = '\n';
-    head[8] = (char)((n - 10) & 255); head[9] = (char)((n - 10) >> 8);
+    head[8] = (char)((n - 10) & 255);
+    head[9] = (char)((n - 10) >> 8);
     gs4i_file_put(&f, head, n);
     gs4i_put_records(&f, c, columns, sim->particles.count);
     return gs4i_file_close(sim, &f);
 }
 
-/* --- checkpoints: native byte order, made for the same build; a hash of everything stands at the end -------- */
+/* --- checkpoints: native byte order, made for the same build; a hash of everything stands at
+ * the end */
 
 typedef struct gs4i_head {
     char magic[8];
     uint32_t version, real_size, byte_order, head_size, material_size, body_size, emitter_size;
     int32_t cells[3], integrator, walls[6];
     double cell_size, origin[3], gravity[3], rho[2], decay, warmth[7];
-    int32_t isothermal[7], sharp;       /* walls, air */
-    double time, last_dt; uint64_t steps;
-    uint32_t next_id; int32_t afresh, unsorted, unseen, unturned;
+    int32_t isothermal[7], sharp; /* walls, air */
+    double time, last_dt;
+    uint64_t steps;
+    uint32_t next_id;
+    int32_t afresh, unsorted, unseen, unturned;
     double min_mass, fastest, shift;
-    int32_t particles, materials, bodies, emitters, active, occupied, elastic_reals, deformation_reals, with_heat, with_flux;
+    int32_t particles, materials, bodies, emitters, active, occupied, elastic_reals,
+        deformation_reals, with_heat, with_flux;
     uint64_t split, bounded;
     gs4i_report worst;
 } gs4i_head;
@@ -9404,25 +12241,56 @@ static void gs4i_head_of(const gs4_sim *sim, gs4i_head *h)
     int i;
     memset(h, 0, sizeof *h);
     memcpy(h->magic, "GS4SAVE", 8);
-    h->version = GS4_VERSION; h->real_size = sizeof(gs4_real); h->byte_order = 0x01020304u; h->head_size = sizeof *h;
-    h->material_size = sizeof(gs4i_law); h->body_size = sizeof(gs4i_body); h->emitter_size = sizeof(gs4i_emitter);
+    h->version = GS4_VERSION;
+    h->real_size = sizeof(gs4_real);
+    h->byte_order = 0x01020304u;
+    h->head_size = sizeof *h;
+    h->material_size = sizeof(gs4i_law);
+    h->body_size = sizeof(gs4i_body);
+    h->emitter_size = sizeof(gs4i_emitter);
     for (i = 0; i < 3; i++) h->cells[i] = d->cells[i];
     for (i = 0; i < 6; i++) h->walls[i] = (int32_t)d->walls[i];
-    h->integrator = (int32_t)d->integrator; h->sharp = d->sharp_gradients != 0;
+    h->integrator = (int32_t)d->integrator;
+    h->sharp = d->sharp_gradients != 0;
     h->cell_size = (double)d->cell_size;
-    h->origin[0] = (double)d->origin.x; h->origin[1] = (double)d->origin.y; h->origin[2] = (double)d->origin.z;
-    h->gravity[0] = (double)d->gravity.x; h->gravity[1] = (double)d->gravity.y; h->gravity[2] = (double)d->gravity.z;
-    h->rho[0] = (double)d->rho_inf; h->rho[1] = (double)d->rho_inf_spurious; h->decay = (double)d->flip_decay_time;
-    for (i = 0; i < 6; i++) { h->warmth[i] = (double)d->wall_temperature[i]; h->isothermal[i] = d->wall_is_isothermal[i] != 0; }
-    h->warmth[6] = (double)d->ambient_temperature; h->isothermal[6] = d->air_is_isothermal != 0;
-    h->time = sim->time; h->last_dt = sim->last_dt; h->steps = sim->steps;
-    h->next_id = sim->next_id; h->afresh = sim->afresh; h->unsorted = sim->unsorted; h->unseen = sim->unseen; h->unturned = sim->unturned;
-    h->min_mass = (double)sim->min_mass; h->fastest = (double)sim->fastest; h->shift = (double)sim->shift;
-    h->particles = sim->particles.count; h->materials = sim->material_count;
-    h->bodies = sim->boundary.body_count; h->emitters = sim->emitter_count;
-    h->active = sim->grid.active; h->occupied = sim->grid.occupied;
-    h->elastic_reals = sim->particles.elastic_reals; h->deformation_reals = sim->particles.deformation_reals;
-    h->with_heat = sim->particles.with_heat; h->with_flux = sim->particles.with_flux; h->split = sim->split; h->bounded = sim->bounded;
+    h->origin[0] = (double)d->origin.x;
+    h->origin[1] = (double)d->origin.y;
+    h->origin[2] = (double)d->origin.z;
+    h->gravity[0] = (double)d->gravity.x;
+    h->gravity[1] = (double)d->gravity.y;
+    h->gravity[2] = (double)d->gravity.z;
+    h->rho[0] = (double)d->rho_inf;
+    h->rho[1] = (double)d->rho_inf_spurious;
+    h->decay = (double)d->flip_decay_time;
+    for (i = 0; i < 6; i++) {
+        h->warmth[i] = (double)d->wall_temperature[i];
+        h->isothermal[i] = d->wall_is_isothermal[i] != 0;
+    }
+    h->warmth[6] = (double)d->ambient_temperature;
+    h->isothermal[6] = d->air_is_isothermal != 0;
+    h->time = sim->time;
+    h->last_dt = sim->last_dt;
+    h->steps = sim->steps;
+    h->next_id = sim->next_id;
+    h->afresh = sim->afresh;
+    h->unsorted = sim->unsorted;
+    h->unseen = sim->unseen;
+    h->unturned = sim->unturned;
+    h->min_mass = (double)sim->min_mass;
+    h->fastest = (double)sim->fastest;
+    h->shift = (double)sim->shift;
+    h->particles = sim->particles.count;
+    h->materials = sim->material_count;
+    h->bodies = sim->boundary.body_count;
+    h->emitters = sim->emitter_count;
+    h->active = sim->grid.active;
+    h->occupied = sim->grid.occupied;
+    h->elastic_reals = sim->particles.elastic_reals;
+    h->deformation_reals = sim->particles.deformation_reals;
+    h->with_heat = sim->particles.with_heat;
+    h->with_flux = sim->particles.with_flux;
+    h->split = sim->split;
+    h->bounded = sim->bounded;
     h->worst = sim->worst;
 }
 
@@ -9438,50 +12306,88 @@ static int gs4i_save(gs4_sim *sim, const char *path)
     gs4i_particle_arrays(&sim->particles, a);
     gs4i_file_put(&f, &head, sizeof head);
     gs4i_file_put(&f, sim->laws, (size_t)sim->material_count * sizeof *sim->laws);
-    gs4i_file_put(&f, sim->boundary.bodies, (size_t)sim->boundary.body_count * sizeof *sim->boundary.bodies);
+    gs4i_file_put(&f, sim->boundary.bodies,
+                  (size_t)sim->boundary.body_count * sizeof *sim->boundary.bodies);
     gs4i_file_put(&f, sim->emitters, (size_t)sim->emitter_count * sizeof *sim->emitters);
     for (k = 0; k < GS4I_STATE_ARRAYS; k++)
         if (a[k].wanted) gs4i_file_put(&f, *a[k].data, (size_t)sim->particles.count * a[k].size);
-    gs4i_file_put(&f, sim->grid.occupied_block, (size_t)sim->grid.occupied * sizeof *sim->grid.occupied_block);
+    gs4i_file_put(&f, sim->grid.occupied_block,
+                  (size_t)sim->grid.occupied * sizeof *sim->grid.occupied_block);
     gs4i_file_put(&f, sim->grid.first, ((size_t)sim->grid.occupied + 1) * sizeof *sim->grid.first);
     gs4i_file_put(&f, sim->grid.block, (size_t)sim->grid.active * sizeof *sim->grid.block);
-    if (sim->grid.memory) gs4i_file_put(&f, sim->grid.memory, (size_t)sim->grid.active * GS4I_NODE_REALS * sizeof(gs4_real));
+    if (sim->grid.memory)
+        gs4i_file_put(&f, sim->grid.memory,
+                      (size_t)sim->grid.active * GS4I_NODE_REALS * sizeof(gs4_real));
     hash = f.hash;
     gs4i_file_put(&f, &hash, sizeof hash);
     return gs4i_file_close(sim, &f);
 }
 
-static void gs4i_forget_pointers(gs4_shape *s) { s->distance = NULL; s->user = NULL; s->vertices = NULL; s->triangles = NULL; }
+static void gs4i_forget_pointers(gs4_shape *s)
+{
+    s->distance = NULL;
+    s->user = NULL;
+    s->vertices = NULL;
+    s->triangles = NULL;
+}
 
 /* Does the head belong to this build, this description and this scene? */
 static int gs4i_check_head(gs4_sim *sim, const gs4i_head *h)
 {
     gs4i_head own;
     gs4i_head_of(sim, &own);
-    if (memcmp(h->magic, own.magic, 8) != 0) return gs4i_fail(sim, GS4_ERROR_FORMAT, "the file is not a gs4mpm checkpoint");
-    if (h->version != own.version || h->real_size != own.real_size || h->byte_order != own.byte_order || h->head_size != own.head_size
-        || h->material_size != own.material_size || h->body_size != own.body_size || h->emitter_size != own.emitter_size)
-        return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint was made by another build (version, precision, byte order or platform)");
-    if (memcmp(h->cells, own.cells, sizeof h->cells) || memcmp(h->walls, own.walls, sizeof h->walls) || h->integrator != own.integrator || h->sharp != own.sharp
-        || memcmp(&h->cell_size, &own.cell_size, sizeof h->cell_size) || memcmp(h->origin, own.origin, sizeof h->origin)
-        || memcmp(h->gravity, own.gravity, sizeof h->gravity) || memcmp(h->rho, own.rho, sizeof h->rho)
-        || memcmp(&h->decay, &own.decay, sizeof h->decay) || memcmp(h->warmth, own.warmth, sizeof h->warmth)
+    if (memcmp(h->magic, own.magic, 8) != 0)
+        return gs4i_fail(sim, GS4_ERROR_FORMAT, "the file is not a gs4mpm checkpoint");
+    if (h->version != own.version || h->real_size != own.real_size
+        || h->byte_order != own.byte_order || h->head_size != own.head_size
+        || h->material_size != own.material_size || h->body_size != own.body_size
+        || h->emitter_size != own.emitter_size)
+        return gs4i_fail(sim, GS4_ERROR_FORMAT,
+                         "the checkpoint was made by another build (version, precision, byte order "
+                         "or platform)");
+    if (memcmp(h->cells, own.cells, sizeof h->cells) || memcmp(h->walls, own.walls, sizeof h->walls)
+        || h->integrator != own.integrator || h->sharp != own.sharp
+        || memcmp(&h->cell_size, &own.cell_size, sizeof h->cell_size)
+        || memcmp(h->origin, own.origin, sizeof h->origin)
+        || memcmp(h->gravity, own.gravity, sizeof h->gravity)
+        || memcmp(h->rho, own.rho, sizeof h->rho) || memcmp(&h->decay, &own.decay, sizeof h->decay)
+        || memcmp(h->warmth, own.warmth, sizeof h->warmth)
         || memcmp(h->isothermal, own.isothermal, sizeof h->isothermal))
-        return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint belongs to a simulation with another description");
-    if (h->materials != own.materials || h->bodies != own.bodies || h->emitters != own.emitters || h->elastic_reals != own.elastic_reals
-        || h->deformation_reals != own.deformation_reals || h->with_heat != own.with_heat || h->with_flux != own.with_flux)
-        return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint belongs to a scene with other materials, colliders or emitters: add the same ones, in the same order, before gs4_load");
-    if (h->particles < 0 || h->active < 0 || h->occupied < 0 || h->particles > GS4I_MAX_PARTICLES || (size_t)h->active > sim->grid.table_count || h->occupied > h->active)
+        return gs4i_fail(sim, GS4_ERROR_FORMAT,
+                         "the checkpoint belongs to a simulation with another description");
+    if (h->materials != own.materials || h->bodies != own.bodies || h->emitters != own.emitters
+        || h->elastic_reals != own.elastic_reals || h->deformation_reals != own.deformation_reals
+        || h->with_heat != own.with_heat || h->with_flux != own.with_flux)
+        return gs4i_fail(sim, GS4_ERROR_FORMAT,
+                         "the checkpoint belongs to a scene with other materials, colliders or "
+                         "emitters: add the same ones, in the same order, before gs4_load");
+    if (h->particles < 0 || h->active < 0 || h->occupied < 0 || h->particles > GS4I_MAX_PARTICLES
+        || (size_t)h->active > sim->grid.table_count || h->occupied > h->active)
         return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint is damaged");
     if (sim->desc.max_particles && h->particles > sim->desc.max_particles)
-        return gs4i_fail(sim, GS4_ERROR_ARGUMENT, "the checkpoint holds more particles than max_particles");
+        return gs4i_fail(sim, GS4_ERROR_ARGUMENT,
+                         "the checkpoint holds more particles than max_particles");
     return GS4_OK;
 }
 
 /* The pieces of a checkpoint in the order of the file, and where they are in memory. */
-enum { GS4I_PIECES = GS4I_STATE_ARRAYS + 8 };
-typedef struct gs4i_pieces { size_t size[GS4I_PIECES]; const unsigned char *at[GS4I_PIECES]; } gs4i_pieces;
-enum { GS4I_PIECE_LAWS, GS4I_PIECE_BODIES, GS4I_PIECE_EMITTERS, GS4I_PIECE_OCCUPIED, GS4I_PIECE_FIRST, GS4I_PIECE_BLOCKS, GS4I_PIECE_MEMORY, GS4I_PIECE_PARTICLES };
+enum {
+    GS4I_PIECES = GS4I_STATE_ARRAYS + 8
+};
+typedef struct gs4i_pieces {
+    size_t size[GS4I_PIECES];
+    const unsigned char *at[GS4I_PIECES];
+} gs4i_pieces;
+enum {
+    GS4I_PIECE_LAWS,
+    GS4I_PIECE_BODIES,
+    GS4I_PIECE_EMITTERS,
+    GS4I_PIECE_OCCUPIED,
+    GS4I_PIECE_FIRST,
+    GS4I_PIECE_BLOCKS,
+    GS4I_PIECE_MEMORY,
+    GS4I_PIECE_PARTICLES
+};
 
 /* Sizes from the head; the bytes of all pieces. */
 static size_t gs4i_piece_sizes(gs4_sim *sim, const gs4i_head *h, gs4i_pieces *p)
@@ -9491,7 +12397,8 @@ static size_t gs4i_piece_sizes(gs4_sim *sim, const gs4i_head *h, gs4i_pieces *p)
     size_t sum = 0;
     int k;
     memset(p, 0, sizeof *p);
-    store.elastic_reals = h->elastic_reals; store.deformation_reals = h->deformation_reals;
+    store.elastic_reals = h->elastic_reals;
+    store.deformation_reals = h->deformation_reals;
     gs4i_particle_arrays(&store, a);
     p->size[GS4I_PIECE_LAWS] = (size_t)h->materials * sizeof(gs4i_law);
     p->size[GS4I_PIECE_BODIES] = (size_t)h->bodies * sizeof(gs4i_body);
@@ -9499,75 +12406,95 @@ static size_t gs4i_piece_sizes(gs4_sim *sim, const gs4i_head *h, gs4i_pieces *p)
     p->size[GS4I_PIECE_OCCUPIED] = (size_t)h->occupied * 4;
     p->size[GS4I_PIECE_FIRST] = (size_t)h->occupied * 4 + 4;
     p->size[GS4I_PIECE_BLOCKS] = (size_t)h->active * 4;
-    if (sim->particles.with_rates) p->size[GS4I_PIECE_MEMORY] = (size_t)h->active * GS4I_NODE_REALS * sizeof(gs4_real);
+    if (sim->particles.with_rates)
+        p->size[GS4I_PIECE_MEMORY] = (size_t)h->active * GS4I_NODE_REALS * sizeof(gs4_real);
     for (k = 0; k < GS4I_STATE_ARRAYS; k++)
         if (a[k].wanted) p->size[GS4I_PIECE_PARTICLES + k] = (size_t)h->particles * a[k].size;
     for (k = 0; k < GS4I_PIECES; k++) sum += p->size[k];
     return sum;
 }
 
-/* Are the materials, colliders and emitters here those of the file? Pointers and what moves are left out. */
+/* Are the materials, colliders and emitters here those of the file? Pointers and what moves are
+ * left out. */
 static int gs4i_same_scene(const gs4_sim *sim, const gs4i_pieces *p)
 {
     int i;
     for (i = 0; i < sim->material_count; i++) {
         gs4i_law there, here = sim->laws[i];
         memcpy(&there, p->at[GS4I_PIECE_LAWS] + (size_t)i * sizeof there, sizeof there);
-        there.is.viscosity_fn = here.is.viscosity_fn; there.is.viscosity_user = here.is.viscosity_user;
+        there.is.viscosity_fn = here.is.viscosity_fn;
+        there.is.viscosity_user = here.is.viscosity_user;
         if (memcmp(&there.is, &here.is, sizeof here.is) != 0) return 0;
     }
     for (i = 0; i < sim->boundary.body_count; i++) {
         gs4i_body there, here = sim->boundary.bodies[i];
         memcpy(&there, p->at[GS4I_PIECE_BODIES] + (size_t)i * sizeof there, sizeof there);
-        gs4i_forget_pointers(&there.is.shape); gs4i_forget_pointers(&here.is.shape);
-        if (memcmp(&there.is.shape, &here.is.shape, sizeof here.is.shape) || there.is.contact != here.is.contact || there.is_mouth != here.is_mouth
-            || memcmp(&there.is.friction, &here.is.friction, sizeof here.is.friction) || memcmp(&there.is.temperature, &here.is.temperature, sizeof here.is.temperature)
-            || there.is.is_isothermal != here.is.is_isothermal) return 0;
+        gs4i_forget_pointers(&there.is.shape);
+        gs4i_forget_pointers(&here.is.shape);
+        if (memcmp(&there.is.shape, &here.is.shape, sizeof here.is.shape)
+            || there.is.contact != here.is.contact || there.is_mouth != here.is_mouth
+            || memcmp(&there.is.friction, &here.is.friction, sizeof here.is.friction)
+            || memcmp(&there.is.temperature, &here.is.temperature, sizeof here.is.temperature)
+            || there.is.is_isothermal != here.is.is_isothermal)
+            return 0;
     }
     for (i = 0; i < sim->emitter_count; i++) {
         gs4i_emitter there, here = sim->emitters[i];
         memcpy(&there, p->at[GS4I_PIECE_EMITTERS] + (size_t)i * sizeof there, sizeof there);
-        if (memcmp(&there.is.fill, &here.is.fill, sizeof here.is.fill) || there.body != here.body) return 0;
+        if (memcmp(&there.is.fill, &here.is.fill, sizeof here.is.fill) || there.body != here.body)
+            return 0;
     }
     return 1;
 }
 
-/* Take materials, colliders and emitters from the file, and keep the pointers of those here: callbacks and meshes cannot be saved. */
+/* Take materials, colliders and emitters from the file, and keep the pointers of those here:
+ * callbacks and meshes cannot be saved. */
 static void gs4i_restore_scene(gs4_sim *sim, const gs4i_pieces *p)
 {
     int i;
     for (i = 0; i < sim->material_count; i++) {
         gs4i_law here = sim->laws[i], *l = &sim->laws[i];
         memcpy(l, p->at[GS4I_PIECE_LAWS] + (size_t)i * sizeof *l, sizeof *l);
-        l->viscosity_fn = here.viscosity_fn; l->viscosity_user = here.viscosity_user;
-        l->is.viscosity_fn = here.is.viscosity_fn; l->is.viscosity_user = here.is.viscosity_user;
+        l->viscosity_fn = here.viscosity_fn;
+        l->viscosity_user = here.viscosity_user;
+        l->is.viscosity_fn = here.is.viscosity_fn;
+        l->is.viscosity_user = here.is.viscosity_user;
         sim->frozen[i] = *l;
         gs4i_freeze_law(&sim->frozen[i]);
     }
     for (i = 0; i < sim->boundary.body_count; i++) {
         gs4i_body here = sim->boundary.bodies[i], *b = &sim->boundary.bodies[i];
         memcpy(b, p->at[GS4I_PIECE_BODIES] + (size_t)i * sizeof *b, sizeof *b);
-        b->is.shape = here.is.shape; b->field = here.field;
+        b->is.shape = here.is.shape;
+        b->field = here.field;
     }
     for (i = 0; i < sim->emitter_count; i++) {
         const gs4_shape shape = sim->emitters[i].is.shape;
-        memcpy(&sim->emitters[i], p->at[GS4I_PIECE_EMITTERS] + (size_t)i * sizeof(gs4i_emitter), sizeof(gs4i_emitter));
+        memcpy(&sim->emitters[i], p->at[GS4I_PIECE_EMITTERS] + (size_t)i * sizeof(gs4i_emitter),
+               sizeof(gs4i_emitter));
         sim->emitters[i].is.shape = shape;
     }
 }
 
-/* Occupied blocks must be ascending, inside the domain and cover the particles in order; those with nodes ascending too. */
-static int gs4i_blocks_are_sound(const gs4_sim *sim, const gs4i_head *h, const uint32_t *block, const int32_t *first, const uint32_t *active)
+/* Occupied blocks must be ascending, inside the domain and cover the particles in order; those
+ * with nodes ascending too. */
+static int gs4i_blocks_are_sound(const gs4_sim *sim, const gs4i_head *h, const uint32_t *block,
+                                 const int32_t *first, const uint32_t *active)
 {
     int i, a, at[3];
     for (i = 0; i < h->active; i++)
         if (active[i] >= sim->grid.table_count || (i && active[i] <= active[i - 1])) return 0;
     if (h->occupied == 0) return h->unsorted || h->particles == 0;
-    if (first[0] != 0 || (h->unsorted ? first[h->occupied] < 0 : first[h->occupied] != h->particles)) return 0;
+    if (first[0] != 0
+        || (h->unsorted ? first[h->occupied] < 0 : first[h->occupied] != h->particles))
+        return 0;
     for (i = 0; i < h->occupied; i++) {
-        if (first[i] > first[i + 1] || block[i] >= sim->grid.table_count || (i && block[i] <= block[i - 1])) return 0;
+        if (first[i] > first[i + 1] || block[i] >= sim->grid.table_count
+            || (i && block[i] <= block[i - 1]))
+            return 0;
         gs4i_block_coordinates(&sim->grid, block[i], at);
-        for (a = 0; a < 3; a++) if (at[a] < 1 || at[a] > sim->grid.blocks[a] - 2) return 0;
+        for (a = 0; a < 3; a++)
+            if (at[a] < 1 || at[a] > sim->grid.blocks[a] - 2) return 0;
     }
     return 1;
 }
@@ -9578,17 +12505,22 @@ static int gs4i_rebuild(gs4_sim *next, const gs4i_head *h, const gs4i_pieces *p)
     gs4i_grid *g = &next->grid;
     gs4i_array a[GS4I_ARRAYS];
     int k;
-    const int room = next->desc.max_particles > h->particles ? next->desc.max_particles : h->particles;
-    if (gs4i_particles_reserve(&next->memory, &next->particles, room) != GS4_OK) return GS4_ERROR_MEMORY;
+    const int room =
+        next->desc.max_particles > h->particles ? next->desc.max_particles : h->particles;
+    if (gs4i_particles_reserve(&next->memory, &next->particles, room) != GS4_OK)
+        return GS4_ERROR_MEMORY;
     g->table = (int32_t *)gs4i_alloc(&next->memory, g->table_count, sizeof *g->table);
     if (!g->table) return GS4_ERROR_MEMORY;
     if (gs4i_grid_reserve(&next->memory, g, h->active, next->particles.with_rates) != GS4_OK
-        || gs4i_grid_reserve_occupied(&next->memory, g, h->occupied + 1) != GS4_OK) return GS4_ERROR_MEMORY;
+        || gs4i_grid_reserve_occupied(&next->memory, g, h->occupied + 1) != GS4_OK)
+        return GS4_ERROR_MEMORY;
     if (h->active) memcpy(g->block, p->at[GS4I_PIECE_BLOCKS], p->size[GS4I_PIECE_BLOCKS]);
     memcpy(g->occupied_block, p->at[GS4I_PIECE_OCCUPIED], p->size[GS4I_PIECE_OCCUPIED]);
     memcpy(g->first, p->at[GS4I_PIECE_FIRST], p->size[GS4I_PIECE_FIRST]);
-    if (!gs4i_blocks_are_sound(next, h, g->occupied_block, g->first, g->block)) return GS4_ERROR_FORMAT;
-    g->active = h->active; g->occupied = h->occupied;
+    if (!gs4i_blocks_are_sound(next, h, g->occupied_block, g->first, g->block))
+        return GS4_ERROR_FORMAT;
+    g->active = h->active;
+    g->occupied = h->occupied;
     for (k = 0; k < g->active; k++) g->table[g->block[k]] = k + 1;
     if (g->memory) memcpy(g->memory, p->at[GS4I_PIECE_MEMORY], p->size[GS4I_PIECE_MEMORY]);
     if (!gs4i_grid_is_complete(g)) return GS4_ERROR_FORMAT;
@@ -9596,8 +12528,10 @@ static int gs4i_rebuild(gs4_sim *next, const gs4i_head *h, const gs4i_pieces *p)
     if (gs4i_after_occupy(next) != GS4_OK) return GS4_ERROR_MEMORY;
     gs4i_particle_arrays(&next->particles, a);
     for (k = 0; k < GS4I_STATE_ARRAYS; k++)
-        if (a[k].wanted && h->particles) memcpy(*a[k].data, p->at[GS4I_PIECE_PARTICLES + k], p->size[GS4I_PIECE_PARTICLES + k]);
-    for (k = 0; k < h->particles; k++) if (next->particles.material[k] >= next->material_count) return GS4_ERROR_FORMAT;
+        if (a[k].wanted && h->particles)
+            memcpy(*a[k].data, p->at[GS4I_PIECE_PARTICLES + k], p->size[GS4I_PIECE_PARTICLES + k]);
+    for (k = 0; k < h->particles; k++)
+        if (next->particles.material[k] >= next->material_count) return GS4_ERROR_FORMAT;
     next->particles.count = h->particles;
     return GS4_OK;
 }
@@ -9609,7 +12543,9 @@ static void gs4i_release_state(gs4_sim *sim)
     int i;
     gs4i_particles_free(m, &sim->particles);
     gs4i_grid_free(m, &sim->grid);
-    for (i = 0; i < 6; i++) gs4i_free(m, sim->boundary.images[i], (size_t)sim->boundary.image_capacity[i], sizeof(gs4i_image));
+    for (i = 0; i < 6; i++)
+        gs4i_free(m, sim->boundary.images[i], (size_t)sim->boundary.image_capacity[i],
+                  sizeof(gs4i_image));
     gs4i_free(m, sim->reports, (size_t)sim->report_capacity, sizeof(gs4i_report));
     gs4i_free_ghosts(m, &sim->ghosts);
     gs4i_free_heat(m, &sim->conduction);
@@ -9622,64 +12558,99 @@ static int gs4i_restore(gs4_sim *sim, const gs4i_head *h, const gs4i_pieces *p)
     gs4i_grid empty = sim->grid;
     int i, result;
     memset(&next.particles, 0, sizeof next.particles);
-    next.particles.with_rates = sim->particles.with_rates; next.particles.with_fading = sim->particles.with_fading;
+    next.particles.with_rates = sim->particles.with_rates;
+    next.particles.with_fading = sim->particles.with_fading;
     next.particles.elastic_reals = h->elastic_reals;
     next.particles.deformation_reals = h->deformation_reals;
-    next.particles.with_heat = sim->particles.with_heat; next.particles.with_flux = sim->particles.with_flux;
+    next.particles.with_heat = sim->particles.with_heat;
+    next.particles.with_flux = sim->particles.with_flux;
     memset(&next.grid, 0, sizeof next.grid);
-    memcpy(next.grid.cells, empty.cells, sizeof empty.cells); memcpy(next.grid.blocks, empty.blocks, sizeof empty.blocks);
+    memcpy(next.grid.cells, empty.cells, sizeof empty.cells);
+    memcpy(next.grid.blocks, empty.blocks, sizeof empty.blocks);
     memcpy(next.grid.periodic, empty.periodic, sizeof empty.periodic);
     next.grid.with_sharp = empty.with_sharp;
-    next.grid.h = empty.h; next.grid.inv_h = empty.inv_h; next.grid.origin = empty.origin; next.grid.table_count = empty.table_count;
-    for (i = 0; i < 6; i++) { next.boundary.images[i] = NULL; next.boundary.image_count[i] = next.boundary.image_capacity[i] = 0; }
-    next.reports = NULL; next.report_capacity = 0;
+    next.grid.h = empty.h;
+    next.grid.inv_h = empty.inv_h;
+    next.grid.origin = empty.origin;
+    next.grid.table_count = empty.table_count;
+    for (i = 0; i < 6; i++) {
+        next.boundary.images[i] = NULL;
+        next.boundary.image_count[i] = next.boundary.image_capacity[i] = 0;
+    }
+    next.reports = NULL;
+    next.report_capacity = 0;
     memset(&next.ghosts, 0, sizeof next.ghosts);
     memset(&next.conduction, 0, sizeof next.conduction);
     next.conduction.heats = sim->conduction.heats;
     result = gs4i_rebuild(&next, h, p);
     if (result != GS4_OK) {
         gs4i_release_state(&next);
-        return result == GS4_ERROR_MEMORY ? gs4i_fail_memory(sim) : gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint is damaged: its blocks are out of order");
+        return result == GS4_ERROR_MEMORY
+                   ? gs4i_fail_memory(sim)
+                   : gs4i_fail(sim, GS4_ERROR_FORMAT,
+                               "the checkpoint is damaged: its blocks are out of order");
     }
     {
-        gs4_sim old = *sim;                                 /* free the old with the new count of bytes */
+        /* free the old with the new count of bytes */
+        gs4_sim old = *sim;
         old.memory = next.memory;
         gs4i_release_state(&old);
         next.memory = old.memory;
     }
     *sim = next;
     gs4i_restore_scene(sim, p);
-    sim->time = h->time; sim->last_dt = h->last_dt; sim->steps = h->steps; sim->split = h->split; sim->bounded = h->bounded;
-    sim->next_id = h->next_id; sim->afresh = h->afresh; sim->unsorted = h->unsorted; sim->unseen = h->unseen; sim->unturned = h->unturned; sim->edited = 0;
-    sim->min_mass = GS4I_C(h->min_mass); sim->fastest = GS4I_C(h->fastest); sim->shift = GS4I_C(h->shift);
+    sim->time = h->time;
+    sim->last_dt = h->last_dt;
+    sim->steps = h->steps;
+    sim->split = h->split;
+    sim->bounded = h->bounded;
+    sim->next_id = h->next_id;
+    sim->afresh = h->afresh;
+    sim->unsorted = h->unsorted;
+    sim->unseen = h->unseen;
+    sim->unturned = h->unturned;
+    sim->edited = 0;
+    sim->min_mass = GS4I_C(h->min_mass);
+    sim->fastest = GS4I_C(h->fastest);
+    sim->shift = GS4I_C(h->shift);
     sim->worst = h->worst;
     return GS4_OK;
 }
 
 /* The rest of the file, of known size, with its hash; then the state. */
-static int gs4i_load_body(gs4_sim *sim, FILE *f, const gs4i_head *h, unsigned char *data, size_t size, gs4i_pieces *p)
+static int gs4i_load_body(gs4_sim *sim, FILE *f, const gs4i_head *h, unsigned char *data,
+                          size_t size, gs4i_pieces *p)
 {
     static const int order[] = { GS4I_PIECE_LAWS, GS4I_PIECE_BODIES, GS4I_PIECE_EMITTERS };
-    static const int after[] = { GS4I_PIECE_OCCUPIED, GS4I_PIECE_FIRST, GS4I_PIECE_BLOCKS, GS4I_PIECE_MEMORY };
+    static const int after[] = { GS4I_PIECE_OCCUPIED, GS4I_PIECE_FIRST, GS4I_PIECE_BLOCKS,
+                                 GS4I_PIECE_MEMORY };
     uint64_t hash, stored;
     unsigned char more;
     size_t at = 0;
     int k, sequence[GS4I_PIECES], n = 0;
-    if (fread(data, 1, size, f) != size) return gs4i_fail(sim, ferror(f) ? GS4_ERROR_IO : GS4_ERROR_FORMAT, "the checkpoint is cut off");
-    if (fread(&more, 1, 1, f) == 1) return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint has something behind its end");
+    if (fread(data, 1, size, f) != size)
+        return gs4i_fail(sim, ferror(f) ? GS4_ERROR_IO : GS4_ERROR_FORMAT,
+                         "the checkpoint is cut off");
+    if (fread(&more, 1, 1, f) == 1)
+        return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint has something behind its end");
     for (k = 0; k < 3; k++) sequence[n++] = order[k];
     for (k = 0; k < GS4I_STATE_ARRAYS; k++) sequence[n++] = GS4I_PIECE_PARTICLES + k;
     for (k = 0; k < 4; k++) sequence[n++] = after[k];
     hash = gs4i_hash_bytes(0, h, sizeof *h);
-    for (k = 0; k < n; k++) {                               /* over the same pieces as when it was saved */
+    /* over the same pieces as when it was saved */
+    for (k = 0; k < n; k++) {
         p->at[sequence[k]] = data + at;
         hash = gs4i_hash_bytes(hash, data + at, p->size[sequence[k]]);
         at += p->size[sequence[k]];
     }
     memcpy(&stored, data + at, sizeof stored);
-    if (hash != stored) return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint is damaged: its contents do not match their checksum");
+    if (hash != stored)
+        return gs4i_fail(sim, GS4_ERROR_FORMAT,
+                         "the checkpoint is damaged: its contents do not match their checksum");
     if (!gs4i_same_scene(sim, p))
-        return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint belongs to a scene with other materials, colliders or emitters: add the same ones, in the same order, before gs4_load");
+        return gs4i_fail(sim, GS4_ERROR_FORMAT,
+                         "the checkpoint belongs to a scene with other materials, colliders or "
+                         "emitters: add the same ones, in the same order, before gs4_load");
     return gs4i_restore(sim, h, p);
 }
 
@@ -9693,15 +12664,20 @@ static int gs4i_load(gs4_sim *sim, const char *path)
     int result;
     if (!path || !*path) return gs4i_fail(sim, GS4_ERROR_ARGUMENT, "path is empty");
     f = fopen(path, "rb");
-    if (!f) return gs4i_fail(sim, GS4_ERROR_IO, "the checkpoint could not be opened: does it exist, and may it be read?");
+    if (!f)
+        return gs4i_fail(sim, GS4_ERROR_IO,
+                         "the checkpoint could not be opened: does it exist, and may it be read?");
     if (fread(&h, 1, sizeof h, f) != sizeof h)
         result = ferror(f) ? gs4i_fail(sim, GS4_ERROR_IO, "the checkpoint could not be read")
-                           : gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint is cut off, or no checkpoint at all");
-    else result = gs4i_check_head(sim, &h);
+                           : gs4i_fail(sim, GS4_ERROR_FORMAT,
+                                       "the checkpoint is cut off, or no checkpoint at all");
+    else
+        result = gs4i_check_head(sim, &h);
     if (result == GS4_OK) {
         size = gs4i_piece_sizes(sim, &h, &p) + sizeof(uint64_t);
         data = (unsigned char *)gs4i_alloc(&sim->memory, size, 1);
-        if (!data) result = gs4i_fail_memory(sim);
+        if (!data)
+            result = gs4i_fail_memory(sim);
         else {
             result = gs4i_load_body(sim, f, &h, data, size, &p);
             gs4i_free(&sim->memory, data, size, 1);
@@ -9711,34 +12687,49 @@ static int gs4i_load(gs4_sim *sim, const char *path)
     return result;
 }
 
-/* ==== [[public]] every value checked, then the work ================================================= */
+/* ==== [[public]] every value checked, then the work =========================================== */
 
-/* --- rules ------------------------------------------------------------------------------------------- */
+/* --- rules ------------------------------------------------------------------------------------ */
 
-typedef enum gs4i_must { GS4I_FINITE, GS4I_POSITIVE, GS4I_NOT_NEGATIVE, GS4I_FRACTION, GS4I_ZERO } gs4i_must;
+typedef enum gs4i_must {
+    GS4I_FINITE,
+    GS4I_POSITIVE,
+    GS4I_NOT_NEGATIVE,
+    GS4I_FRACTION,
+    GS4I_ZERO
+} gs4i_must;
 
 /* One value against one rule; the sentence names the field, its value and what would do. */
 static int gs4i_check(gs4_sim *sim, const char *field, gs4_real value, gs4i_must must)
 {
-    static const char *const accepted[] = { "a finite number", "a finite number above 0", "0 or a finite number above",
-                                            "a number from 0 to 1", "0: it belongs to a part of the model that this version does not have" };
+    static const char *const accepted[] = {
+        "a finite number", "a finite number above 0", "0 or a finite number above",
+        "a number from 0 to 1",
+        "0: it belongs to a part of the model that this version does not have"
+    };
     const int sane = gs4i_finite(value) && value < GS4I_HUGE && value > -GS4I_HUGE;
     int good = 0;
     char line[320];
     gs4i_text t;
     switch (must) {
-    case GS4I_FINITE:       good = sane; break;
-    case GS4I_POSITIVE:     good = sane && value > 0 && value > 1 / GS4I_HUGE; break;
+    case GS4I_FINITE: good = sane; break;
+    case GS4I_POSITIVE: good = sane && value > 0 && value > 1 / GS4I_HUGE; break;
     case GS4I_NOT_NEGATIVE: good = sane && value >= 0; break;
-    case GS4I_FRACTION:     good = sane && value >= 0 && value <= 1; break;
-    case GS4I_ZERO:         good = value == 0; break;
+    case GS4I_FRACTION: good = sane && value >= 0 && value <= 1; break;
+    case GS4I_ZERO: good = value == 0; break;
     }
     if (good) return GS4_OK;
-    t.at = line; t.left = sizeof line;
-    gs4i_put(&t, field); gs4i_put(&t, " is "); gs4i_put_real(&t, (double)value);
-    gs4i_put(&t, "; it must be "); gs4i_put(&t, accepted[must]);
-    if (gs4i_finite(value) && !sane) gs4i_put(&t, " that is not absurdly large");
-    else if (must == GS4I_POSITIVE && value > 0) gs4i_put(&t, " that is not absurdly small");
+    t.at = line;
+    t.left = sizeof line;
+    gs4i_put(&t, field);
+    gs4i_put(&t, " is ");
+    gs4i_put_real(&t, (double)value);
+    gs4i_put(&t, "; it must be ");
+    gs4i_put(&t, accepted[must]);
+    if (gs4i_finite(value) && !sane)
+        gs4i_put(&t, " that is not absurdly large");
+    else if (must == GS4I_POSITIVE && value > 0)
+        gs4i_put(&t, " that is not absurdly small");
     return gs4i_fail(sim, GS4_ERROR_ARGUMENT, line);
 }
 
@@ -9755,98 +12746,144 @@ static int gs4i_check_absent(gs4_sim *sim, const char *field, gs4_real value, co
     char line[320];
     gs4i_text t;
     if (value == 0) return GS4_OK;
-    t.at = line; t.left = sizeof line;
-    gs4i_put(&t, field); gs4i_put(&t, " is "); gs4i_put_real(&t, (double)value); gs4i_put(&t, "; "); gs4i_put(&t, why);
+    t.at = line;
+    t.left = sizeof line;
+    gs4i_put(&t, field);
+    gs4i_put(&t, " is ");
+    gs4i_put_real(&t, (double)value);
+    gs4i_put(&t, "; ");
+    gs4i_put(&t, why);
     return gs4i_fail(sim, GS4_ERROR_ARGUMENT, line);
 }
 
-#define GS4I_NO_HEAT "no material so far conducts heat, melts or is heated by viscosity: add that material first, or leave it 0"
+#define GS4I_NO_HEAT                                                                               \
+    "no material so far conducts heat, melts or is heated by viscosity: add that material first, " \
+    "or leave it 0"
 
-static int gs4i_bad_argument(gs4_sim *sim, const char *what) { return gs4i_fail(sim, GS4_ERROR_ARGUMENT, what); }
+static int gs4i_bad_argument(gs4_sim *sim, const char *what)
+{
+    return gs4i_fail(sim, GS4_ERROR_ARGUMENT, what);
+}
 
 static int gs4i_check_id(gs4_sim *sim, const char *what, int id, int count)
 {
     char line[160];
     gs4i_text t;
     if (id >= 0 && id < count) return GS4_OK;
-    t.at = line; t.left = sizeof line;
-    gs4i_put(&t, what); gs4i_put(&t, " "); gs4i_put_integer(&t, id);
-    gs4i_put(&t, " does not exist; there are "); gs4i_put_integer(&t, count); gs4i_put(&t, ", numbered from 0");
+    t.at = line;
+    t.left = sizeof line;
+    gs4i_put(&t, what);
+    gs4i_put(&t, " ");
+    gs4i_put_integer(&t, id);
+    gs4i_put(&t, " does not exist; there are ");
+    gs4i_put_integer(&t, count);
+    gs4i_put(&t, ", numbered from 0");
     return gs4i_bad_argument(sim, line);
 }
 
-/* Fields, degeneracy, direction, closedness; normalises the normal of a plane. `open` allows a plane. */
+/* Fields, degeneracy, direction, closedness; normalises the normal of a plane. `open` allows a
+ * plane. */
 static int gs4i_check_shape(gs4_sim *sim, gs4_shape *s)
 {
     int fault;
     switch (s->kind) {
-    case GS4_SHAPE_BOX: case GS4_SHAPE_SDF:
-        GS4I_TRY(gs4i_check3(sim, "shape low corner", s->a)); GS4I_TRY(gs4i_check3(sim, "shape high corner", s->b));
+    case GS4_SHAPE_BOX:
+    case GS4_SHAPE_SDF:
+        GS4I_TRY(gs4i_check3(sim, "shape low corner", s->a));
+        GS4I_TRY(gs4i_check3(sim, "shape high corner", s->b));
         if (!(s->a.x < s->b.x && s->a.y < s->b.y && s->a.z < s->b.z))
-            return gs4i_bad_argument(sim, "shape: each coordinate of the low corner must be below that of the high corner");
-        if (s->kind == GS4_SHAPE_SDF && !s->distance) return gs4i_bad_argument(sim, "shape: the distance function is missing");
+            return gs4i_bad_argument(
+                sim,
+                "shape: each coordinate of the low corner must be below that of the high corner");
+        if (s->kind == GS4_SHAPE_SDF && !s->distance)
+            return gs4i_bad_argument(sim, "shape: the distance function is missing");
         return GS4_OK;
     case GS4_SHAPE_SPHERE:
         GS4I_TRY(gs4i_check3(sim, "shape centre", s->a));
         return gs4i_check(sim, "shape radius", s->radius, GS4I_POSITIVE);
     case GS4_SHAPE_CYLINDER:
-        GS4I_TRY(gs4i_check3(sim, "shape end a", s->a)); GS4I_TRY(gs4i_check3(sim, "shape end b", s->b));
-        if (!(gs4i_length(gs4i_sub(s->b, s->a)) > 0)) return gs4i_bad_argument(sim, "shape: the ends of the cylinder coincide");
+        GS4I_TRY(gs4i_check3(sim, "shape end a", s->a));
+        GS4I_TRY(gs4i_check3(sim, "shape end b", s->b));
+        if (!(gs4i_length(gs4i_sub(s->b, s->a)) > 0))
+            return gs4i_bad_argument(sim, "shape: the ends of the cylinder coincide");
         return gs4i_check(sim, "shape radius", s->radius, GS4I_POSITIVE);
     case GS4_SHAPE_PLANE: {
         gs4_real n;
-        GS4I_TRY(gs4i_check3(sim, "shape point", s->a)); GS4I_TRY(gs4i_check3(sim, "shape normal", s->b));
+        GS4I_TRY(gs4i_check3(sim, "shape point", s->a));
+        GS4I_TRY(gs4i_check3(sim, "shape normal", s->b));
         n = gs4i_length(s->b);
-        if (!(n > 0 && gs4i_finite(n))) return gs4i_bad_argument(sim, "shape: the normal of the plane has no length");
+        if (!(n > 0 && gs4i_finite(n)))
+            return gs4i_bad_argument(sim, "shape: the normal of the plane has no length");
         s->b = gs4i_scale(s->b, 1 / n);
         return GS4_OK;
     }
     case GS4_SHAPE_MESH:
         if (!s->vertices || !s->triangles || s->vertex_count < 4 || s->triangle_count < 4)
-            return gs4i_bad_argument(sim, "shape: a mesh needs vertices and triangles, at least four of each");
+            return gs4i_bad_argument(
+                sim, "shape: a mesh needs vertices and triangles, at least four of each");
         fault = gs4i_mesh_check(&sim->memory, s);
         if (fault == GS4_ERROR_MEMORY) return gs4i_fail_memory(sim);
         if (fault) {
             char line[200];
             gs4i_text t;
-            t.at = line; t.left = sizeof line;
-            gs4i_put(&t, "shape: the mesh "); gs4i_put(&t, gs4i_mesh_faults[fault]);
+            t.at = line;
+            t.left = sizeof line;
+            gs4i_put(&t, "shape: the mesh ");
+            gs4i_put(&t, gs4i_mesh_faults[fault]);
             return gs4i_bad_argument(sim, line);
         }
         return GS4_OK;
     case GS4_SHAPE_NONE: break;
     }
-    return gs4i_bad_argument(sim, "shape is empty: make it with gs4_box, gs4_sphere, gs4_cylinder, gs4_plane, gs4_sdf or gs4_mesh");
+    return gs4i_bad_argument(sim, "shape is empty: make it with gs4_box, gs4_sphere, gs4_cylinder, "
+                                  "gs4_plane, gs4_sdf or gs4_mesh");
 }
 
 static int gs4i_check_numerics(gs4_sim *sim, gs4_sim_desc *d)
 {
-    if (d->scheme != GS4_EXPLICIT) return gs4i_bad_argument(sim, "scheme: this version has the explicit scheme only; use GS4_EXPLICIT");
+    if (d->scheme != GS4_EXPLICIT)
+        return gs4i_bad_argument(
+            sim, "scheme: this version has the explicit scheme only; use GS4_EXPLICIT");
     if (d->integrator == GS4_INTEGRATOR_BACKWARD_EULER)
-        return gs4i_bad_argument(sim, "integrator: backward Euler belongs to the implicit schemes; use GS4_INTEGRATOR_GS4 or GS4_INTEGRATOR_SYMPLECTIC_EULER");
+        return gs4i_bad_argument(sim, "integrator: backward Euler belongs to the implicit schemes; "
+                                      "use GS4_INTEGRATOR_GS4 or GS4_INTEGRATOR_SYMPLECTIC_EULER");
     if (d->integrator != GS4_INTEGRATOR_GS4 && d->integrator != GS4_INTEGRATOR_SYMPLECTIC_EULER)
-        return gs4i_check_absent(sim, "integrator", GS4I_C((int)d->integrator), "it is none of gs4_integrator");
+        return gs4i_check_absent(sim, "integrator", GS4I_C((int)d->integrator),
+                                 "it is none of gs4_integrator");
     GS4I_TRY(gs4i_check(sim, "rho_inf", d->rho_inf, GS4I_FRACTION));
     GS4I_TRY(gs4i_check(sim, "rho_inf_spurious", d->rho_inf_spurious, GS4I_FRACTION));
     if (d->rho_inf_spurious > d->rho_inf)
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "rho_inf_spurious is ", (double)d->rho_inf_spurious, "; it must not be above rho_inf");
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "rho_inf_spurious is ",
+                               (double)d->rho_inf_spurious, "; it must not be above rho_inf");
     if (d->rho_inf * d->rho_inf_spurious > GS4I_C(0.98))
-        return gs4i_bad_argument(sim, "rho_inf_spurious: with both rho near 1 (Crank-Nicolson) the explicit scheme has no stable step; rho_inf * rho_inf_spurious must not be above 0.98");
+        return gs4i_bad_argument(
+            sim, "rho_inf_spurious: with both rho near 1 (Crank-Nicolson) the explicit scheme has "
+                 "no stable step; rho_inf * rho_inf_spurious must not be above 0.98");
     if (d->integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER) {
-        GS4I_TRY(gs4i_check_absent(sim, "rho_inf", d->rho_inf, "symplectic Euler has no such parameter, leave it 0"));
-        if (d->sharp_gradients) return gs4i_bad_argument(sim, "sharp_gradients: symplectic Euler has no use for them, its error is of first order; leave it 0");
-        GS4I_TRY(gs4i_check_absent(sim, "flip_decay_time", d->flip_decay_time, "symplectic Euler carries an affine velocity that the grid sees whole (APIC), leave it 0"));
+        GS4I_TRY(gs4i_check_absent(sim, "rho_inf", d->rho_inf,
+                                   "symplectic Euler has no such parameter, leave it 0"));
+        if (d->sharp_gradients)
+            return gs4i_bad_argument(sim, "sharp_gradients: symplectic Euler has no use for them, "
+                                          "its error is of first order; leave it 0");
+        GS4I_TRY(gs4i_check_absent(sim, "flip_decay_time", d->flip_decay_time,
+                                   "symplectic Euler carries an affine velocity that the grid sees "
+                                   "whole (APIC), leave it 0"));
     } else {
-        if (!(d->flip_decay_time >= 0))                     /* infinity is welcome */
-            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "flip_decay_time is ", (double)d->flip_decay_time, "; it must be 0 or above, INFINITY for pure FLIP");
+        if (!(d->flip_decay_time >= 0)) /* infinity is welcome */
+            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "flip_decay_time is ",
+                                   (double)d->flip_decay_time,
+                                   "; it must be 0 or above, INFINITY for pure FLIP");
         if (d->flip_decay_time == 0) d->flip_decay_time = GS4I_C(0.5);
     }
     GS4I_TRY(gs4i_check(sim, "cfl", d->cfl, GS4I_FRACTION));
     GS4I_TRY(gs4i_check(sim, "max_dt", d->max_dt, GS4I_NOT_NEGATIVE));
     GS4I_TRY(gs4i_check(sim, "solver_tolerance", d->solver_tolerance, GS4I_FRACTION));
-    if (d->solver_max_iterations < 0) return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "solver_max_iterations is ", d->solver_max_iterations, "; it must be 0 or above");
+    if (d->solver_max_iterations < 0)
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "solver_max_iterations is ",
+                               d->solver_max_iterations, "; it must be 0 or above");
     if (d->cfl == 0) d->cfl = GS4I_C(0.5);
-    if (d->solver_tolerance == 0) d->solver_tolerance = sizeof(gs4_real) == 8 ? GS4I_C(1e-6) : GS4I_C(1e-4);
+    if (d->solver_tolerance == 0)
+        d->solver_tolerance = sizeof(gs4_real) == 8 ? GS4I_C(1e-6) : GS4I_C(1e-4);
     if (d->solver_max_iterations == 0) d->solver_max_iterations = 200;
     return GS4_OK;
 }
@@ -9855,14 +12892,21 @@ static int gs4i_check_walls(gs4_sim *sim, const gs4_sim_desc *d)
 {
     int w;
     for (w = 0; w < 6; w++) {
-        if ((int)d->walls[w] < 0 || d->walls[w] > GS4_WALL_PERIODIC) return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "walls[] holds ", (int)d->walls[w], ", which is none of gs4_wall");
+        if ((int)d->walls[w] < 0 || d->walls[w] > GS4_WALL_PERIODIC)
+            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "walls[] holds ", (int)d->walls[w],
+                                   ", which is none of gs4_wall");
         if ((d->walls[w] == GS4_WALL_PERIODIC) != (d->walls[w ^ 1] == GS4_WALL_PERIODIC))
-            return gs4i_bad_argument(sim, "walls: both walls of an axis must be GS4_WALL_PERIODIC, or neither");
+            return gs4i_bad_argument(
+                sim, "walls: both walls of an axis must be GS4_WALL_PERIODIC, or neither");
         GS4I_TRY(gs4i_check(sim, "wall_temperature", d->wall_temperature[w], GS4I_FINITE));
-        if (d->wall_is_isothermal[w] && d->walls[w] >= GS4_WALL_OPEN) return gs4i_bad_argument(sim, "wall_is_isothermal: an open or periodic wall has no temperature, leave it 0");
+        if (d->wall_is_isothermal[w] && d->walls[w] >= GS4_WALL_OPEN)
+            return gs4i_bad_argument(
+                sim, "wall_is_isothermal: an open or periodic wall has no temperature, leave it 0");
     }
     if (!(gs4i_abs(d->ambient_temperature) < GS4I_HUGE))
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "ambient_temperature is ", (double)d->ambient_temperature, "; give a finite temperature, which viscosity laws see in a scene without heat");
+        return gs4i_fail_value(
+            sim, GS4_ERROR_ARGUMENT, "ambient_temperature is ", (double)d->ambient_temperature,
+            "; give a finite temperature, which viscosity laws see in a scene without heat");
     return GS4_OK;
 }
 
@@ -9874,29 +12918,42 @@ static int gs4i_check_desc(gs4_sim *sim, gs4_sim_desc *d)
     int a;
     for (a = 0; a < 3; a++) {
         if (d->cells[a] < 4 || d->cells[a] > 1 << 22)
-            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, cells[a], d->cells[a], "; it must be from 4 to 4194304");
+            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, cells[a], d->cells[a],
+                                   "; it must be from 4 to 4194304");
         blocks *= (d->cells[a] + 3) / 4 + 2;
     }
     if (blocks > 1e9) return gs4i_bad_argument(sim, "cells: more than 2^36 cells in all");
     GS4I_TRY(gs4i_check(sim, "cell_size", d->cell_size, GS4I_POSITIVE));
     if (d->cell_size < GS4I_C(1e-9) || d->cell_size > GS4I_C(1e9))
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "cell_size is ", (double)d->cell_size, "; it must be from 1e-9 to 1e9");
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "cell_size is ", (double)d->cell_size,
+                               "; it must be from 1e-9 to 1e9");
     GS4I_TRY(gs4i_check3(sim, "origin", d->origin));
     gs4i_to_double(d->origin, origin);
     for (a = 0; a < 3; a++)
-        if (fabs(origin[a]) + d->cells[a] * (double)d->cell_size > 2e-2 * (double)d->cell_size / (double)GS4I_EPSILON)
-            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "the grid reaches to the coordinate ", fabs(origin[a]) + d->cells[a] * (double)d->cell_size, " from its origin: so far out that positions could not tell a fiftieth of a cell; use an origin near 0, fewer cells, or define GS4_DOUBLE");
+        if (fabs(origin[a]) + d->cells[a] * (double)d->cell_size
+            > 2e-2 * (double)d->cell_size / (double)GS4I_EPSILON)
+            return gs4i_fail_value(
+                sim, GS4_ERROR_ARGUMENT, "the grid reaches to the coordinate ",
+                fabs(origin[a]) + d->cells[a] * (double)d->cell_size,
+                " from its origin: so far out that positions could not tell a fiftieth of a cell; "
+                "use an origin near 0, fewer cells, or define GS4_DOUBLE");
     GS4I_TRY(gs4i_check3(sim, "gravity", d->gravity));
     GS4I_TRY(gs4i_check_numerics(sim, d));
     GS4I_TRY(gs4i_check_walls(sim, d));
     if (d->max_particles < 0 || d->max_particles > GS4I_MAX_PARTICLES)
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "max_particles is ", d->max_particles, "; it must be 0 (grows as needed) or up to 1073741808");
-    if (d->threads < 0 || d->threads > 1024) return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "threads is ", d->threads, "; it must be from 0 to 1024");
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "max_particles is ", d->max_particles,
+                               "; it must be 0 (grows as needed) or up to 1073741808");
+    if (d->threads < 0 || d->threads > 1024)
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "threads is ", d->threads,
+                               "; it must be from 0 to 1024");
 #ifndef GS4_PTHREADS
     if (d->threads > 1 && !d->parallel_for)
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "threads is ", d->threads, "; more than 1 needs GS4_PTHREADS defined with the implementation, or parallel_for");
+        return gs4i_fail_value(
+            sim, GS4_ERROR_ARGUMENT, "threads is ", d->threads,
+            "; more than 1 needs GS4_PTHREADS defined with the implementation, or parallel_for");
 #endif
-    if (!d->allocator.alloc_fn != !d->allocator.free_fn) return gs4i_bad_argument(sim, "allocator: both functions or neither");
+    if (!d->allocator.alloc_fn != !d->allocator.free_fn)
+        return gs4i_bad_argument(sim, "allocator: both functions or neither");
     if (d->threads == 0) d->threads = 1;
     return GS4_OK;
 }
@@ -9904,56 +12961,91 @@ static int gs4i_check_desc(gs4_sim *sim, gs4_sim_desc *d)
 /* The non-local part of a liquid: what it needs, and what it must not have. */
 static int gs4i_check_viscoelastic(gs4_sim *sim, const gs4_material *m)
 {
-    if (m->liquid < GS4_NEWTONIAN || m->liquid > GS4_POM_POM) return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "liquid is ", (int)m->liquid, ", which is none of gs4_liquid");
+    if (m->liquid < GS4_NEWTONIAN || m->liquid > GS4_POM_POM)
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "liquid is ", (int)m->liquid,
+                               ", which is none of gs4_liquid");
     GS4I_TRY(gs4i_check(sim, "local_fraction", m->local_fraction, GS4I_FRACTION));
-    if (m->liquid == GS4_NEWTONIAN) GS4I_TRY(gs4i_check_absent(sim, "relaxation_time", m->relaxation_time, "a Newtonian liquid has none, leave it 0"));
+    if (m->liquid == GS4_NEWTONIAN)
+        GS4I_TRY(gs4i_check_absent(sim, "relaxation_time", m->relaxation_time,
+                                   "a Newtonian liquid has none, leave it 0"));
     else {
-        if (m->relaxation_time == 0) return gs4i_bad_argument(sim, "relaxation_time is 0; a viscoelastic liquid needs one above 0");
+        if (m->relaxation_time == 0)
+            return gs4i_bad_argument(
+                sim, "relaxation_time is 0; a viscoelastic liquid needs one above 0");
         GS4I_TRY(gs4i_check(sim, "relaxation_time", m->relaxation_time, GS4I_POSITIVE));
         if (!((double)m->viscosity / (double)m->relaxation_time < (double)GS4I_HUGE))
-            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "relaxation_time is ", (double)m->relaxation_time, "; the modulus (1 - local_fraction) viscosity / relaxation_time is absurdly large");
+            return gs4i_fail_value(
+                sim, GS4_ERROR_ARGUMENT, "relaxation_time is ", (double)m->relaxation_time,
+                "; the modulus (1 - local_fraction) viscosity / relaxation_time is absurdly large");
     }
     if (m->liquid != GS4_POM_POM) {
-        GS4I_TRY(gs4i_check_absent(sim, "stretch_time", m->stretch_time, "only liquid GS4_POM_POM has one, leave it 0"));
-        GS4I_TRY(gs4i_check_absent(sim, "anisotropy", m->anisotropy, "only liquid GS4_POM_POM has one, leave it 0"));
-        return gs4i_check_absent(sim, "arms", m->arms, "only liquid GS4_POM_POM has some, leave it 0");
+        GS4I_TRY(gs4i_check_absent(sim, "stretch_time", m->stretch_time,
+                                   "only liquid GS4_POM_POM has one, leave it 0"));
+        GS4I_TRY(gs4i_check_absent(sim, "anisotropy", m->anisotropy,
+                                   "only liquid GS4_POM_POM has one, leave it 0"));
+        return gs4i_check_absent(sim, "arms", m->arms,
+                                 "only liquid GS4_POM_POM has some, leave it 0");
     }
     GS4I_TRY(gs4i_check(sim, "stretch_time", m->stretch_time, GS4I_POSITIVE));
     GS4I_TRY(gs4i_check(sim, "anisotropy", m->anisotropy, GS4I_NOT_NEGATIVE));
-    if (m->anisotropy > GS4I_C(1e6)) return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "anisotropy is ", (double)m->anisotropy, "; it must be up to 1e6: beyond, rounding alone stretches the pom-poms");
+    if (m->anisotropy > GS4I_C(1e6))
+        return gs4i_fail_value(
+            sim, GS4_ERROR_ARGUMENT, "anisotropy is ", (double)m->anisotropy,
+            "; it must be up to 1e6: beyond, rounding alone stretches the pom-poms");
     GS4I_TRY(gs4i_check(sim, "arms", m->arms, GS4I_POSITIVE));
-    if (m->arms < 1) return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "arms is ", (double)m->arms, "; a pom-pom has 1 or more");
+    if (m->arms < 1)
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "arms is ", (double)m->arms,
+                               "; a pom-pom has 1 or more");
     return GS4_OK;
 }
 
-/* A solid: what it needs. Without heat it never melts, so that a liquid phase other than plain damping has no meaning. */
+/* A solid: what it needs. Without heat it never melts, so that a liquid phase other than plain
+ * damping has no meaning. */
 static int gs4i_check_solid(gs4_sim *sim, const gs4_material *m)
 {
-    if (m->solid < GS4_NO_SOLID || m->solid > GS4_FIXED_COROTATED) return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "solid is ", (int)m->solid, ", which is none of gs4_solid");
+    if (m->solid < GS4_NO_SOLID || m->solid > GS4_FIXED_COROTATED)
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "solid is ", (int)m->solid,
+                               ", which is none of gs4_solid");
     if (m->solid == GS4_NO_SOLID) {
-        GS4I_TRY(gs4i_check_absent(sim, "shear_modulus", m->shear_modulus, "a liquid has none, leave it 0 or choose a solid"));
-        GS4I_TRY(gs4i_check_absent(sim, "yield_compression", m->yield_compression, "a liquid has none, leave it 0 or choose a solid"));
-        return gs4i_check_absent(sim, "yield_stretch", m->yield_stretch, "a liquid has none, leave it 0 or choose a solid");
+        GS4I_TRY(gs4i_check_absent(sim, "shear_modulus", m->shear_modulus,
+                                   "a liquid has none, leave it 0 or choose a solid"));
+        GS4I_TRY(gs4i_check_absent(sim, "yield_compression", m->yield_compression,
+                                   "a liquid has none, leave it 0 or choose a solid"));
+        return gs4i_check_absent(sim, "yield_stretch", m->yield_stretch,
+                                 "a liquid has none, leave it 0 or choose a solid");
     }
-    if (sim->desc.sharp_gradients) return gs4i_bad_argument(sim, "solid: with sharp_gradients solids would lose energy at their surfaces; leave that field of gs4_sim_desc 0 where there are solids");
-    if (m->shear_modulus == 0) return gs4i_bad_argument(sim, "shear_modulus is 0; a solid needs one above 0");
+    if (sim->desc.sharp_gradients)
+        return gs4i_bad_argument(
+            sim, "solid: with sharp_gradients solids would lose energy at their surfaces; leave "
+                 "that field of gs4_sim_desc 0 where there are solids");
+    if (m->shear_modulus == 0)
+        return gs4i_bad_argument(sim, "shear_modulus is 0; a solid needs one above 0");
     GS4I_TRY(gs4i_check(sim, "shear_modulus", m->shear_modulus, GS4I_POSITIVE));
     GS4I_TRY(gs4i_check(sim, "yield_compression", m->yield_compression, GS4I_NOT_NEGATIVE));
-    if (m->yield_compression >= 1) return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "yield_compression is ", (double)m->yield_compression, "; it must be below 1, 0 for none");
+    if (m->yield_compression >= 1)
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "yield_compression is ",
+                               (double)m->yield_compression, "; it must be below 1, 0 for none");
     GS4I_TRY(gs4i_check(sim, "yield_stretch", m->yield_stretch, GS4I_NOT_NEGATIVE));
-    if (m->liquid != GS4_NEWTONIAN && !m->can_melt) return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "liquid is ", (int)m->liquid, "; a solid that does not melt has no liquid phase, use GS4_NEWTONIAN (its viscosity damps the solid)");
+    if (m->liquid != GS4_NEWTONIAN && !m->can_melt)
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "liquid is ", (int)m->liquid,
+                               "; a solid that does not melt has no liquid phase, use "
+                               "GS4_NEWTONIAN (its viscosity damps the solid)");
     return GS4_OK;
 }
 
-/* In a scene without heat the viscosity at the temperature of the air, at rest and far from it, must be a number. */
+/* In a scene without heat the viscosity at the temperature of the air, at rest and far from it,
+ * must be a number. */
 static int gs4i_check_cross_wlf(gs4_sim *sim, const gs4_material *m, int at_ambient)
 {
     gs4i_law l;
     int i;
     for (i = 0; i < 6; i++) {
-        static const char *const names[6] = { "cross_wlf.a", "cross_wlf.n", "cross_wlf.d1", "cross_wlf.a1", "cross_wlf.t1", "cross_wlf.t2" };
-        const gs4_real values[6] = { m->cross_wlf.a, m->cross_wlf.n, m->cross_wlf.d1, m->cross_wlf.a1, m->cross_wlf.t1, m->cross_wlf.t2 };
-        GS4I_TRY(gs4i_check(sim, names[i], values[i], i == 0 || i == 2 ? GS4I_NOT_NEGATIVE : GS4I_FINITE));
+        static const char *const names[6] = { "cross_wlf.a",  "cross_wlf.n",  "cross_wlf.d1",
+                                              "cross_wlf.a1", "cross_wlf.t1", "cross_wlf.t2" };
+        const gs4_real values[6] = { m->cross_wlf.a,  m->cross_wlf.n,  m->cross_wlf.d1,
+                                     m->cross_wlf.a1, m->cross_wlf.t1, m->cross_wlf.t2 };
+        GS4I_TRY(gs4i_check(sim, names[i], values[i],
+                            i == 0 || i == 2 ? GS4I_NOT_NEGATIVE : GS4I_FINITE));
     }
     memset(&l, 0, sizeof l);
     l.is = *m;
@@ -9961,13 +13053,20 @@ static int gs4i_check_cross_wlf(gs4_sim *sim, const gs4_material *m, int at_ambi
     for (i = -6; i <= 6 && at_ambient; i += 2) {
         const gs4_real mu = gs4i_cross_wlf(&l.is, l.temperature, GS4I_C(pow(10, i)));
         if (!(mu >= 0 && mu < GS4I_HUGE))
-            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "cross_wlf gives no finite viscosity at ambient_temperature ", (double)l.temperature, "; other constants would, or a temperature well above t2");
+            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT,
+                                   "cross_wlf gives no finite viscosity at ambient_temperature ",
+                                   (double)l.temperature,
+                                   "; other constants would, or a temperature well above t2");
     }
     return GS4_OK;
 }
 
-/* A scene carries heat from the first material on that conducts it, melts or is heated by viscosity. */
-static int gs4i_has_heat(const gs4_material *m) { return m->conductivity > 0 || m->can_melt || m->viscous_heating; }
+/* A scene carries heat from the first material on that conducts it, melts or is heated by
+ * viscosity. */
+static int gs4i_has_heat(const gs4_material *m)
+{
+    return m->conductivity > 0 || m->can_melt || m->viscous_heating;
+}
 
 static int gs4i_check_heat(gs4_sim *sim, const gs4_material *m)
 {
@@ -9978,25 +13077,41 @@ static int gs4i_check_heat(gs4_sim *sim, const gs4_material *m)
     GS4I_TRY(gs4i_check(sim, "fourier_fraction", m->fourier_fraction, GS4I_FRACTION));
     GS4I_TRY(gs4i_check(sim, "melting_temperature", m->melting_temperature, GS4I_FINITE));
     GS4I_TRY(gs4i_check(sim, "latent_heat", m->latent_heat, GS4I_NOT_NEGATIVE));
-    if (m->heat_capacity > 0 && (m->heat_capacity < GS4I_C(1e-9) || m->heat_capacity > GS4I_C(1e12)))
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "heat_capacity is ", (double)m->heat_capacity, "; it must be 0 (no heat) or from 1e-9 to 1e12 J/(kg K)");
+    if (m->heat_capacity > 0
+        && (m->heat_capacity < GS4I_C(1e-9) || m->heat_capacity > GS4I_C(1e12)))
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "heat_capacity is ",
+                               (double)m->heat_capacity,
+                               "; it must be 0 (no heat) or from 1e-9 to 1e12 J/(kg K)");
     if (m->conductivity > 0 && (m->conductivity < GS4I_C(1e-12) || m->conductivity > GS4I_C(1e12)))
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "conductivity is ", (double)m->conductivity, "; it must be 0 (insulating) or from 1e-12 to 1e12 W/(m K)");
-    if (m->flux_relaxation_time > 0 && (m->flux_relaxation_time < GS4I_C(1e-15) || m->flux_relaxation_time > GS4I_C(1e15)))
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "flux_relaxation_time is ", (double)m->flux_relaxation_time, "; it must be 0 (Fourier) or from 1e-15 to 1e15 s");
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "conductivity is ", (double)m->conductivity,
+                               "; it must be 0 (insulating) or from 1e-12 to 1e12 W/(m K)");
+    if (m->flux_relaxation_time > 0
+        && (m->flux_relaxation_time < GS4I_C(1e-15) || m->flux_relaxation_time > GS4I_C(1e15)))
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "flux_relaxation_time is ",
+                               (double)m->flux_relaxation_time,
+                               "; it must be 0 (Fourier) or from 1e-15 to 1e15 s");
     if (m->heat_capacity == 0 && (gs4i_has_heat(m) || sim->particles.with_heat))
-        return gs4i_bad_argument(sim, "heat_capacity is 0; every material of a scene with heat needs one above 0, J/(kg K)");
+        return gs4i_bad_argument(
+            sim,
+            "heat_capacity is 0; every material of a scene with heat needs one above 0, J/(kg K)");
     for (i = 0; i < sim->material_count && gs4i_has_heat(m); i++)
         if (sim->laws[i].is.heat_capacity == 0)
-            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "heat_capacity of material ", i, " is 0; with this material the scene has heat, and every material needs one above 0");
+            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "heat_capacity of material ", i,
+                                   " is 0; with this material the scene has heat, and every "
+                                   "material needs one above 0");
     if (m->flux_relaxation_time > 0 && m->conductivity == 0)
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "flux_relaxation_time is ", (double)m->flux_relaxation_time, "; without conductivity there is no flux, leave it 0");
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "flux_relaxation_time is ",
+                               (double)m->flux_relaxation_time,
+                               "; without conductivity there is no flux, leave it 0");
     if (!m->can_melt) {
-        GS4I_TRY(gs4i_check_absent(sim, "latent_heat", m->latent_heat, "only a material that can_melt has one, leave it 0"));
-        return gs4i_check_absent(sim, "melting_temperature", m->melting_temperature, "only a material that can_melt has one, leave it 0");
+        GS4I_TRY(gs4i_check_absent(sim, "latent_heat", m->latent_heat,
+                                   "only a material that can_melt has one, leave it 0"));
+        return gs4i_check_absent(sim, "melting_temperature", m->melting_temperature,
+                                 "only a material that can_melt has one, leave it 0");
     }
     if (!((double)m->latent_heat / (double)m->heat_capacity < (double)GS4I_HUGE))
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "latent_heat is ", (double)m->latent_heat, "; over heat_capacity it is absurdly large");
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "latent_heat is ", (double)m->latent_heat,
+                               "; over heat_capacity it is absurdly large");
     return GS4_OK;
 }
 
@@ -10009,29 +13124,49 @@ static int gs4i_check_material(gs4_sim *sim, const gs4_material *m)
     GS4I_TRY(gs4i_check_solid(sim, m));
     if (m->viscosity_law != GS4_VISCOSITY_CROSS_WLF)
         for (i = 0; i < 6; i++) {
-            const gs4_real *constants[6] = { &m->cross_wlf.a, &m->cross_wlf.n, &m->cross_wlf.d1, &m->cross_wlf.a1, &m->cross_wlf.t1, &m->cross_wlf.t2 };
-            GS4I_TRY(gs4i_check_absent(sim, "cross_wlf", *constants[i], "only viscosity_law GS4_VISCOSITY_CROSS_WLF has constants, leave it 0"));
+            const gs4_real *constants[6] = { &m->cross_wlf.a,  &m->cross_wlf.n,  &m->cross_wlf.d1,
+                                             &m->cross_wlf.a1, &m->cross_wlf.t1, &m->cross_wlf.t2 };
+            GS4I_TRY(gs4i_check_absent(
+                sim, "cross_wlf", *constants[i],
+                "only viscosity_law GS4_VISCOSITY_CROSS_WLF has constants, leave it 0"));
         }
-    else GS4I_TRY(gs4i_check_cross_wlf(sim, m, !gs4i_has_heat(m) && !sim->particles.with_heat));
-    if (m->viscosity_law == GS4_VISCOSITY_CALLBACK && !m->viscosity_fn) return gs4i_bad_argument(sim, "viscosity_fn is missing; GS4_VISCOSITY_CALLBACK needs it");
+    else
+        GS4I_TRY(gs4i_check_cross_wlf(sim, m, !gs4i_has_heat(m) && !sim->particles.with_heat));
+    if (m->viscosity_law == GS4_VISCOSITY_CALLBACK && !m->viscosity_fn)
+        return gs4i_bad_argument(sim, "viscosity_fn is missing; GS4_VISCOSITY_CALLBACK needs it");
     if (m->viscosity_law < GS4_VISCOSITY_CONSTANT || m->viscosity_law > GS4_VISCOSITY_CALLBACK)
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "viscosity_law is ", (int)m->viscosity_law, ", which is none of gs4_viscosity_law");
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "viscosity_law is ", (int)m->viscosity_law,
+                               ", which is none of gs4_viscosity_law");
     GS4I_TRY(gs4i_check(sim, "bulk_modulus", m->bulk_modulus, GS4I_NOT_NEGATIVE));
     GS4I_TRY(gs4i_check(sim, "sound_speed", m->sound_speed, GS4I_NOT_NEGATIVE));
     if (m->bulk_modulus > 0 && m->sound_speed > 0) {
         const double k = (double)m->density * (double)m->sound_speed * (double)m->sound_speed;
         if (fabs(k - (double)m->bulk_modulus) > 1e-3 * k)
-            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "bulk_modulus is ", (double)m->bulk_modulus, ", which is not density * sound_speed^2; give one of the two");
+            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "bulk_modulus is ",
+                                   (double)m->bulk_modulus,
+                                   ", which is not density * sound_speed^2; give one of the two");
     }
-    {                                                       /* mass and stiffness of a cell must be numbers that leave room */
-        const double h = (double)sim->grid.h, c = (double)(m->sound_speed > 1 ? m->sound_speed : GS4I_C(1));
-        const double mass = (double)m->density * h * h * h, room = 1e-4 / (double)(GS4I_TINY * GS4I_HUGE);
-        if (!(1e6 * (double)m->shear_modulus < (double)GS4I_HUGE && (double)m->shear_modulus * h * h * h < room * (double)GS4I_HUGE))
-            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "shear_modulus is ", (double)m->shear_modulus, "; with this cell_size the stiffness of a cell is beyond gs4_real; use other units, or define GS4_DOUBLE");
-        if (!(mass < (double)GS4I_HUGE * 1e4 && mass * c * c < room * (double)GS4I_HUGE && mass > 64 * (double)GS4I_TINY / (double)GS4I_EPSILON))
-            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "density is ", (double)m->density, "; with this cell_size and sound_speed the mass or the stiffness of a cell is beyond gs4_real; use other units, or define GS4_DOUBLE");
+    /* mass and stiffness of a cell must be numbers that leave room */
+    {
+        const double h = (double)sim->grid.h,
+                     c = (double)(m->sound_speed > 1 ? m->sound_speed : GS4I_C(1));
+        const double mass = (double)m->density * h * h * h,
+                     room = 1e-4 / (double)(GS4I_TINY * GS4I_HUGE);
+        if (!(1e6 * (double)m->shear_modulus < (double)GS4I_HUGE
+              && (double)m->shear_modulus * h * h * h < room * (double)GS4I_HUGE))
+            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "shear_modulus is ",
+                                   (double)m->shear_modulus,
+                                   "; with this cell_size the stiffness of a cell is beyond "
+                                   "gs4_real; use other units, or define GS4_DOUBLE");
+        if (!(mass < (double)GS4I_HUGE * 1e4 && mass * c * c < room * (double)GS4I_HUGE
+              && mass > 64 * (double)GS4I_TINY / (double)GS4I_EPSILON))
+            return gs4i_fail_value(
+                sim, GS4_ERROR_ARGUMENT, "density is ", (double)m->density,
+                "; with this cell_size and sound_speed the mass or the stiffness of a cell is "
+                "beyond gs4_real; use other units, or define GS4_DOUBLE");
     }
-    GS4I_TRY(gs4i_check_absent(sim, "incompressible", GS4I_C(m->incompressible), "the explicit scheme is weakly compressible, leave it 0"));
+    GS4I_TRY(gs4i_check_absent(sim, "incompressible", GS4I_C(m->incompressible),
+                               "the explicit scheme is weakly compressible, leave it 0"));
     return gs4i_check_heat(sim, m);
 }
 
@@ -10040,32 +13175,44 @@ static int gs4i_check_fill(gs4_sim *sim, gs4_fill *f)
     GS4I_TRY(gs4i_check_id(sim, "fill.material", f->material, sim->material_count));
     GS4I_TRY(gs4i_check(sim, "fill.spacing", f->spacing, GS4I_NOT_NEGATIVE));
     if (f->spacing == 0) f->spacing = GS4I_C(0.5) * sim->grid.h;
-    if (f->spacing > sim->grid.h) return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "fill.spacing is ", (double)f->spacing, "; above one cell there would be holes in the material");
-    if (f->spacing < GS4I_C(0.02) * sim->grid.h) return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "fill.spacing is ", (double)f->spacing, "; below a fiftieth of a cell it is absurdly small");
+    if (f->spacing > sim->grid.h)
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "fill.spacing is ", (double)f->spacing,
+                               "; above one cell there would be holes in the material");
+    if (f->spacing < GS4I_C(0.02) * sim->grid.h)
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "fill.spacing is ", (double)f->spacing,
+                               "; below a fiftieth of a cell it is absurdly small");
     GS4I_TRY(gs4i_check3(sim, "fill.velocity", f->velocity));
     GS4I_TRY(gs4i_check3(sim, "fill.angular_velocity", f->angular_velocity));
     GS4I_TRY(gs4i_check(sim, "fill.temperature", f->temperature, GS4I_FINITE));
-    if (!sim->particles.with_heat) GS4I_TRY(gs4i_check_absent(sim, "fill.temperature", f->temperature, GS4I_NO_HEAT));
+    if (!sim->particles.with_heat)
+        GS4I_TRY(gs4i_check_absent(sim, "fill.temperature", f->temperature, GS4I_NO_HEAT));
     return gs4i_check(sim, "fill.jitter", f->jitter, GS4I_FRACTION);
 }
 
-/* --- sound speed where none is given ------------------------------------------------------------------ */
+/* --- sound speed where none is given ---------------------------------------------------------- */
 
-/* Ten times the fastest that anything here moves, falls or flows down: compression goes as the Mach number squared. Of solids also
- * at least sqrt(10 G/rho): a bulk modulus of 10 shear moduli, Poisson's ratio 0.45. */
+/* Ten times the fastest that anything here moves, falls or flows down: compression goes as the
+ * Mach number squared. Of solids also at least sqrt(10 G/rho): a bulk modulus of 10 shear
+ * moduli, Poisson's ratio 0.45. */
 static void gs4i_set_laws(gs4_sim *sim)
 {
     const gs4_sim_desc *d = &sim->desc;
     const double size = (double)d->cell_size;
-    double fall = fabs((double)d->gravity.x) * d->cells[0] * size + fabs((double)d->gravity.y) * d->cells[1] * size
-                + fabs((double)d->gravity.z) * d->cells[2] * size;
+    double fall = fabs((double)d->gravity.x) * d->cells[0] * size
+                  + fabs((double)d->gravity.y) * d->cells[1] * size
+                  + fabs((double)d->gravity.z) * d->cells[2] * size;
     double speed = sqrt(2 * fall + (double)sim->fastest * (double)sim->fastest);
     int i;
-    if (speed <= 0) speed = size;                           /* nothing moves so far: a cell a second is as good as any */
+    /* nothing moves so far: a cell a second is as good as any */
+    if (speed <= 0) speed = size;
     for (i = 0; i < sim->material_count; i++) {
         gs4i_law *l = &sim->laws[i];
         const gs4_material *m = &l->is;
-        double c0 = m->sound_speed > 0 ? (double)m->sound_speed : m->bulk_modulus > 0 ? sqrt((double)m->bulk_modulus / (double)m->density) : fmax(10 * speed, sqrt(10 * (double)m->shear_modulus / (double)m->density));
+        double c0 =
+            m->sound_speed > 0 ? (double)m->sound_speed
+            : m->bulk_modulus > 0
+                ? sqrt((double)m->bulk_modulus / (double)m->density)
+                : fmax(10 * speed, sqrt(10 * (double)m->shear_modulus / (double)m->density));
         l->sound_speed = GS4I_C(c0);
         l->tait = GS4I_C((double)m->density * c0 * c0 / 7);
         gs4i_set_law(l, d->ambient_temperature);
@@ -10077,10 +13224,13 @@ static void gs4i_set_laws(gs4_sim *sim)
 
 static void gs4i_note_speed(gs4_sim *sim, gs4_real speed)
 {
-    if (speed > sim->fastest) { sim->fastest = speed; gs4i_set_laws(sim); }
+    if (speed > sim->fastest) {
+        sim->fastest = speed;
+        gs4i_set_laws(sim);
+    }
 }
 
-/* --- life ------------------------------------------------------------------------------------------------ */
+/* --- life ------------------------------------------------------------------------------------- */
 
 #if defined(__cplusplus)
 #define GS4I_THREAD_LOCAL thread_local
@@ -10111,21 +13261,30 @@ static int gs4i_init(gs4_sim *sim)
         g->table_count *= (size_t)g->blocks[a];
     }
     g->with_sharp = d->sharp_gradients != 0;
-    g->h = d->cell_size; g->inv_h = 1 / d->cell_size; g->origin = d->origin;
+    g->h = d->cell_size;
+    g->inv_h = 1 / d->cell_size;
+    g->origin = d->origin;
     sim->boundary.h = g->h;
     memcpy(sim->boundary.walls, d->walls, sizeof d->walls);
     sim->particles.with_rates = d->integrator == GS4_INTEGRATOR_GS4;
     sim->particles.with_fading = sim->particles.with_rates && gs4i_finite(d->flip_decay_time);
     sim->afresh = sim->unsorted = sim->unseen = 1;
-    sim->tasks.parallel_for = d->parallel_for; sim->tasks.user = d->parallel_user;
+    sim->tasks.parallel_for = d->parallel_for;
+    sim->tasks.user = d->parallel_user;
     g->table = (int32_t *)gs4i_alloc(&sim->memory, g->table_count, sizeof *g->table);
-    if (!g->table) { g->table_count = 0; return gs4i_fail_memory(sim); }
+    if (!g->table) {
+        g->table_count = 0;
+        return gs4i_fail_memory(sim);
+    }
     if (gs4i_grid_reserve_occupied(&sim->memory, g, 1) != GS4_OK) return gs4i_fail_memory(sim);
-    if (d->max_particles && gs4i_particles_reserve(&sim->memory, &sim->particles, d->max_particles) != GS4_OK) return gs4i_fail_memory(sim);
+    if (d->max_particles
+        && gs4i_particles_reserve(&sim->memory, &sim->particles, d->max_particles) != GS4_OK)
+        return gs4i_fail_memory(sim);
 #ifdef GS4_PTHREADS
     if (d->threads > 1 && !d->parallel_for) {
         sim->tasks.pool = gs4i_pool_create(&sim->memory, d->threads - 1);
-        if (!sim->tasks.pool) return gs4i_fail(sim, GS4_ERROR_MEMORY, "the threads could not be started");
+        if (!sim->tasks.pool)
+            return gs4i_fail(sim, GS4_ERROR_MEMORY, "the threads could not be started");
     }
 #endif
     return GS4_OK;
@@ -10135,22 +13294,31 @@ GS4_API int gs4_create(const gs4_sim_desc *desc, gs4_sim **out)
 {
     gs4_sim fake, *sim;
     int result;
-    memset(&fake, 0, sizeof fake);                          /* somewhere to put the sentence */
+    memset(&fake, 0, sizeof fake); /* somewhere to put the sentence */
     if (out) *out = NULL;
-    if (!desc || !out) result = gs4i_bad_argument(&fake, "gs4_create needs a description and a place for the simulation");
+    if (!desc || !out)
+        result = gs4i_bad_argument(&fake,
+                                   "gs4_create needs a description and a place for the simulation");
     else {
         fake.desc = *desc;
         result = gs4i_check_desc(&fake, &fake.desc);
     }
     if (result == GS4_OK) {
         fake.memory.hook = fake.desc.allocator;
-        if (!fake.memory.hook.alloc_fn) { fake.memory.hook.alloc_fn = gs4i_default_alloc; fake.memory.hook.free_fn = gs4i_default_free; }
+        if (!fake.memory.hook.alloc_fn) {
+            fake.memory.hook.alloc_fn = gs4i_default_alloc;
+            fake.memory.hook.free_fn = gs4i_default_free;
+        }
         sim = (gs4_sim *)gs4i_alloc(&fake.memory, 1, sizeof *sim);
-        if (!sim) result = gs4i_fail_memory(&fake);
+        if (!sim)
+            result = gs4i_fail_memory(&fake);
         else {
             *sim = fake;
             result = gs4i_init(sim);
-            if (result == GS4_OK) { *out = sim; return GS4_OK; }
+            if (result == GS4_OK) {
+                *out = sim;
+                return GS4_OK;
+            }
             memcpy(fake.error, sim->error, sizeof fake.error);
             gs4_destroy(sim);
         }
@@ -10168,8 +13336,10 @@ GS4_API void gs4_destroy(gs4_sim *sim)
     gs4i_pool_destroy(&sim->memory, sim->tasks.pool, sim->desc.threads - 1);
 #endif
     gs4i_release_state(sim);
-    for (i = 0; i < sim->boundary.body_count; i++) gs4i_field_free(&sim->memory, &sim->boundary.bodies[i].field);
-    gs4i_free(&sim->memory, sim->boundary.bodies, (size_t)sim->boundary.body_capacity, sizeof(gs4i_body));
+    for (i = 0; i < sim->boundary.body_count; i++)
+        gs4i_field_free(&sim->memory, &sim->boundary.bodies[i].field);
+    gs4i_free(&sim->memory, sim->boundary.bodies, (size_t)sim->boundary.body_capacity,
+              sizeof(gs4i_body));
     gs4i_free(&sim->memory, sim->laws, (size_t)sim->material_capacity, sizeof(gs4i_law));
     gs4i_free(&sim->memory, sim->frozen, (size_t)sim->frozen_capacity, sizeof(gs4i_law));
     gs4i_free(&sim->memory, sim->emitters, (size_t)sim->emitter_capacity, sizeof(gs4i_emitter));
@@ -10177,7 +13347,10 @@ GS4_API void gs4_destroy(gs4_sim *sim)
     gs4i_free(&memory, sim, 1, sizeof *sim);
 }
 
-GS4_API const char *gs4_last_error(const gs4_sim *sim) { return sim ? sim->error : gs4i_create_error; }
+GS4_API const char *gs4_last_error(const gs4_sim *sim)
+{
+    return sim ? sim->error : gs4i_create_error;
+}
 
 GS4_API gs4_sim_desc gs4_get_desc(const gs4_sim *sim)
 {
@@ -10192,48 +13365,68 @@ GS4_API int gs4_real_size(void) { return (int)sizeof(gs4_real); }
 GS4_API const char *gs4_result_string(int result)
 {
     switch (result) {
-    case GS4_OK:                  return "success";
-    case GS4_ERROR_ARGUMENT:      return "a value is out of its range";
-    case GS4_ERROR_MEMORY:        return "out of memory";
-    case GS4_ERROR_IO:            return "a file could not be opened, read or written whole";
-    case GS4_ERROR_FORMAT:        return "a file is damaged or not what it should be";
-    case GS4_ERROR_UNSTABLE:      return "the step would not be stable and was not taken";
+    case GS4_OK: return "success";
+    case GS4_ERROR_ARGUMENT: return "a value is out of its range";
+    case GS4_ERROR_MEMORY: return "out of memory";
+    case GS4_ERROR_IO: return "a file could not be opened, read or written whole";
+    case GS4_ERROR_FORMAT: return "a file is damaged or not what it should be";
+    case GS4_ERROR_UNSTABLE: return "the step would not be stable and was not taken";
     case GS4_ERROR_NOT_CONVERGED: return "a linear solve did not converge; the step was not taken";
-    case GS4_ERROR_ABI:           return "header and implementation were compiled with different settings";
-    default:                      return result > 0 ? "success" : "unknown result";
+    case GS4_ERROR_ABI: return "header and implementation were compiled with different settings";
+    default: return result > 0 ? "success" : "unknown result";
     }
 }
 
-/* --- shapes ----------------------------------------------------------------------------------------------- */
+/* --- shapes ----------------------------------------------------------------------------------- */
 
 static gs4_shape gs4i_shape(gs4_shape_kind kind, gs4_vec3 a, gs4_vec3 b, gs4_real radius)
 {
     gs4_shape s;
     memset(&s, 0, sizeof s);
-    s.kind = kind; s.a = a; s.b = b; s.radius = radius;
+    s.kind = kind;
+    s.a = a;
+    s.b = b;
+    s.radius = radius;
     return s;
 }
 
-GS4_API gs4_shape gs4_box(gs4_vec3 low, gs4_vec3 high) { return gs4i_shape(GS4_SHAPE_BOX, low, high, 0); }
-GS4_API gs4_shape gs4_sphere(gs4_vec3 centre, gs4_real radius) { return gs4i_shape(GS4_SHAPE_SPHERE, centre, centre, radius); }
-GS4_API gs4_shape gs4_cylinder(gs4_vec3 a, gs4_vec3 b, gs4_real radius) { return gs4i_shape(GS4_SHAPE_CYLINDER, a, b, radius); }
-GS4_API gs4_shape gs4_plane(gs4_vec3 point, gs4_vec3 outward_normal) { return gs4i_shape(GS4_SHAPE_PLANE, point, outward_normal, 0); }
+GS4_API gs4_shape gs4_box(gs4_vec3 low, gs4_vec3 high)
+{
+    return gs4i_shape(GS4_SHAPE_BOX, low, high, 0);
+}
+GS4_API gs4_shape gs4_sphere(gs4_vec3 centre, gs4_real radius)
+{
+    return gs4i_shape(GS4_SHAPE_SPHERE, centre, centre, radius);
+}
+GS4_API gs4_shape gs4_cylinder(gs4_vec3 a, gs4_vec3 b, gs4_real radius)
+{
+    return gs4i_shape(GS4_SHAPE_CYLINDER, a, b, radius);
+}
+GS4_API gs4_shape gs4_plane(gs4_vec3 point, gs4_vec3 outward_normal)
+{
+    return gs4i_shape(GS4_SHAPE_PLANE, point, outward_normal, 0);
+}
 
 GS4_API gs4_shape gs4_sdf(gs4_sdf_fn distance, void *user, gs4_vec3 low, gs4_vec3 high)
 {
     gs4_shape s = gs4i_shape(GS4_SHAPE_SDF, low, high, 0);
-    s.distance = distance; s.user = user;
+    s.distance = distance;
+    s.user = user;
     return s;
 }
 
-GS4_API gs4_shape gs4_mesh(const gs4_real *vertices_xyz, int vertex_count, const int *triangles, int triangle_count)
+GS4_API gs4_shape gs4_mesh(const gs4_real *vertices_xyz, int vertex_count, const int *triangles,
+                           int triangle_count)
 {
     gs4_shape s = gs4i_shape(GS4_SHAPE_MESH, gs4i_vec3(0, 0, 0), gs4i_vec3(0, 0, 0), 0);
-    s.vertices = vertices_xyz; s.vertex_count = vertex_count; s.triangles = triangles; s.triangle_count = triangle_count;
+    s.vertices = vertices_xyz;
+    s.vertex_count = vertex_count;
+    s.triangles = triangles;
+    s.triangle_count = triangle_count;
     return s;
 }
 
-/* --- scene ------------------------------------------------------------------------------------------------- */
+/* --- scene ------------------------------------------------------------------------------------ */
 
 /* Room for one more element of an array of the scene. */
 static int gs4i_grow(gs4_sim *sim, void **data, int count, int *capacity, size_t size)
@@ -10246,7 +13439,8 @@ static int gs4i_grow(gs4_sim *sim, void **data, int count, int *capacity, size_t
     if (!grown) return gs4i_fail_memory(sim);
     if (*data) memcpy(grown, *data, (size_t)count * size);
     gs4i_free(&sim->memory, *data, (size_t)*capacity, size);
-    *data = grown; *capacity = wanted;
+    *data = grown;
+    *capacity = wanted;
     return GS4_OK;
 }
 
@@ -10256,13 +13450,16 @@ static int gs4i_make_elastic(gs4_sim *sim)
     gs4i_particles *p = &sim->particles;
     const int reals = p->with_rates ? 12 : 6;
     if (p->elastic_reals) return GS4_OK;
-    if (p->capacity && !(p->elastic = (gs4_real *)gs4i_alloc(&sim->memory, (size_t)p->capacity + 1, (size_t)reals * sizeof(gs4_real)))) return GS4_ERROR_MEMORY;
+    if (p->capacity
+        && !(p->elastic = (gs4_real *)gs4i_alloc(&sim->memory, (size_t)p->capacity + 1,
+                                                 (size_t)reals * sizeof(gs4_real))))
+        return GS4_ERROR_MEMORY;
     p->elastic_reals = reals;
     return GS4_OK;
 }
 
-/* From the first material with heat on particles carry a temperature, those that are there already that of the air; from the
- * first with a flux relaxation time on, a flux. */
+/* From the first material with heat on particles carry a temperature, those that are there
+ * already that of the air; from the first with a flux relaxation time on, a flux. */
 static int gs4i_make_heat(gs4_sim *sim, const gs4_material *material)
 {
     gs4i_particles *p = &sim->particles;
@@ -10272,30 +13469,49 @@ static int gs4i_make_heat(gs4_sim *sim, const gs4_material *material)
     uint8_t *liquid = NULL;
     int i;
     if (p->capacity) {
-        if (heat) { made[0] = (gs4_real *)gs4i_alloc(&sim->memory, room, each); liquid = (uint8_t *)gs4i_alloc(&sim->memory, room, 1); }
-        if (flux) { made[1] = (gs4_real *)gs4i_alloc(&sim->memory, room, each); made[2] = (gs4_real *)gs4i_alloc(&sim->memory, room, each); }
+        if (heat) {
+            made[0] = (gs4_real *)gs4i_alloc(&sim->memory, room, each);
+            liquid = (uint8_t *)gs4i_alloc(&sim->memory, room, 1);
+        }
+        if (flux) {
+            made[1] = (gs4_real *)gs4i_alloc(&sim->memory, room, each);
+            made[2] = (gs4_real *)gs4i_alloc(&sim->memory, room, each);
+        }
         if ((heat && (!made[0] || !liquid)) || (flux && (!made[1] || !made[2]))) {
             for (i = 0; i < 3; i++) gs4i_free(&sim->memory, made[i], room, each);
             gs4i_free(&sim->memory, liquid, room, 1);
             return GS4_ERROR_MEMORY;
         }
     }
-    if (heat) { p->heat = made[0]; p->liquid = liquid; p->with_heat = 1; }
-    for (i = 0; i < p->count && heat; i++) gs4i_begin_heat(p, (size_t)i, &sim->laws[p->material[i]], sim->desc.ambient_temperature);
-    if (flux) { p->flux = made[1]; p->flux_rate = made[2]; p->with_flux = 1; }
+    if (heat) {
+        p->heat = made[0];
+        p->liquid = liquid;
+        p->with_heat = 1;
+    }
+    for (i = 0; i < p->count && heat; i++)
+        gs4i_begin_heat(p, (size_t)i, &sim->laws[p->material[i]], sim->desc.ambient_temperature);
+    if (flux) {
+        p->flux = made[1];
+        p->flux_rate = made[2];
+        p->with_flux = 1;
+    }
     sim->conduction.heats |= material->viscous_heating != 0;
-    sim->unsorted = 1;                                      /* nodes need room for it, too */
+    sim->unsorted = 1; /* nodes need room for it, too */
     return GS4_OK;
 }
 
-/* From the first solid on particles carry F; those that are there already, the one that their volume ratio says. */
+/* From the first solid on particles carry F; those that are there already, the one that their
+ * volume ratio says. */
 static int gs4i_make_deformation(gs4_sim *sim)
 {
     gs4i_particles *p = &sim->particles;
     const int reals = p->with_rates ? 24 : 9;
     int i;
     if (p->deformation_reals) return GS4_OK;
-    if (p->capacity && !(p->deformation = (gs4_real *)gs4i_alloc(&sim->memory, (size_t)p->capacity + 1, (size_t)reals * sizeof(gs4_real)))) return GS4_ERROR_MEMORY;
+    if (p->capacity
+        && !(p->deformation = (gs4_real *)gs4i_alloc(&sim->memory, (size_t)p->capacity + 1,
+                                                     (size_t)reals * sizeof(gs4_real))))
+        return GS4_ERROR_MEMORY;
     p->deformation_reals = reals;
     for (i = 0; i < p->count; i++) gs4i_undeform(p, (size_t)i, p->velocity[4 * (size_t)i + 3]);
     return GS4_OK;
@@ -10310,25 +13526,51 @@ static int gs4i_make_history(gs4_sim *sim, const gs4_material *material)
     if (result == GS4_OK && material->solid != GS4_NO_SOLID) result = gs4i_make_deformation(sim);
     if (result == GS4_OK && gs4i_has_heat(material)) result = gs4i_make_heat(sim, material);
     if (result == GS4_OK) return GS4_OK;
-    if (p->elastic != before.elastic) gs4i_free(&sim->memory, p->elastic, (size_t)p->capacity + 1, (size_t)p->elastic_reals * sizeof(gs4_real));
-    if (p->deformation != before.deformation) gs4i_free(&sim->memory, p->deformation, (size_t)p->capacity + 1, (size_t)p->deformation_reals * sizeof(gs4_real));
+    if (p->elastic != before.elastic)
+        gs4i_free(&sim->memory, p->elastic, (size_t)p->capacity + 1,
+                  (size_t)p->elastic_reals * sizeof(gs4_real));
+    if (p->deformation != before.deformation)
+        gs4i_free(&sim->memory, p->deformation, (size_t)p->capacity + 1,
+                  (size_t)p->deformation_reals * sizeof(gs4_real));
     *p = before;
     return result;
 }
 
-/* All members, and nothing of what lies between them: checkpoints compare materials byte by byte. */
+/* All members, and nothing of what lies between them: checkpoints compare materials byte by
+ * byte. */
 static void gs4i_copy_members(gs4_material *to, const gs4_material *m)
 {
-    to->density = m->density; to->liquid = m->liquid; to->viscosity = m->viscosity; to->local_fraction = m->local_fraction;
-    to->relaxation_time = m->relaxation_time; to->stretch_time = m->stretch_time; to->anisotropy = m->anisotropy;
-    to->arms = m->arms; to->viscosity_law = m->viscosity_law; to->cross_wlf.a = m->cross_wlf.a; to->cross_wlf.n = m->cross_wlf.n;
-    to->cross_wlf.d1 = m->cross_wlf.d1; to->cross_wlf.a1 = m->cross_wlf.a1; to->cross_wlf.t1 = m->cross_wlf.t1;
-    to->cross_wlf.t2 = m->cross_wlf.t2; to->viscosity_fn = m->viscosity_fn; to->viscosity_user = m->viscosity_user;
-    to->bulk_modulus = m->bulk_modulus; to->sound_speed = m->sound_speed; to->incompressible = m->incompressible;
-    to->solid = m->solid; to->shear_modulus = m->shear_modulus; to->yield_compression = m->yield_compression;
-    to->yield_stretch = m->yield_stretch; to->heat_capacity = m->heat_capacity; to->conductivity = m->conductivity;
-    to->flux_relaxation_time = m->flux_relaxation_time; to->fourier_fraction = m->fourier_fraction;
-    to->melting_temperature = m->melting_temperature; to->latent_heat = m->latent_heat; to->can_melt = m->can_melt;
+    to->density = m->density;
+    to->liquid = m->liquid;
+    to->viscosity = m->viscosity;
+    to->local_fraction = m->local_fraction;
+    to->relaxation_time = m->relaxation_time;
+    to->stretch_time = m->stretch_time;
+    to->anisotropy = m->anisotropy;
+    to->arms = m->arms;
+    to->viscosity_law = m->viscosity_law;
+    to->cross_wlf.a = m->cross_wlf.a;
+    to->cross_wlf.n = m->cross_wlf.n;
+    to->cross_wlf.d1 = m->cross_wlf.d1;
+    to->cross_wlf.a1 = m->cross_wlf.a1;
+    to->cross_wlf.t1 = m->cross_wlf.t1;
+    to->cross_wlf.t2 = m->cross_wlf.t2;
+    to->viscosity_fn = m->viscosity_fn;
+    to->viscosity_user = m->viscosity_user;
+    to->bulk_modulus = m->bulk_modulus;
+    to->sound_speed = m->sound_speed;
+    to->incompressible = m->incompressible;
+    to->solid = m->solid;
+    to->shear_modulus = m->shear_modulus;
+    to->yield_compression = m->yield_compression;
+    to->yield_stretch = m->yield_stretch;
+    to->heat_capacity = m->heat_capacity;
+    to->conductivity = m->conductivity;
+    to->flux_relaxation_time = m->flux_relaxation_time;
+    to->fourier_fraction = m->fourier_fraction;
+    to->melting_temperature = m->melting_temperature;
+    to->latent_heat = m->latent_heat;
+    to->can_melt = m->can_melt;
     to->viscous_heating = m->viscous_heating;
 }
 
@@ -10337,9 +13579,12 @@ GS4_API int gs4_add_material(gs4_sim *sim, const gs4_material *material)
     if (!sim) return GS4_ERROR_ARGUMENT;
     if (!material) return gs4i_bad_argument(sim, "material is NULL");
     GS4I_TRY(gs4i_check_material(sim, material));
-    if (sim->material_count == 256) return gs4i_bad_argument(sim, "there are 256 materials already, which is all there can be");
-    GS4I_TRY(gs4i_grow(sim, (void **)&sim->laws, sim->material_count, &sim->material_capacity, sizeof *sim->laws));
-    GS4I_TRY(gs4i_grow(sim, (void **)&sim->frozen, sim->material_count, &sim->frozen_capacity, sizeof *sim->frozen));
+    if (sim->material_count == 256)
+        return gs4i_bad_argument(sim, "there are 256 materials already, which is all there can be");
+    GS4I_TRY(gs4i_grow(sim, (void **)&sim->laws, sim->material_count, &sim->material_capacity,
+                       sizeof *sim->laws));
+    GS4I_TRY(gs4i_grow(sim, (void **)&sim->frozen, sim->material_count, &sim->frozen_capacity,
+                       sizeof *sim->frozen));
     if (gs4i_make_history(sim, material) != GS4_OK) return gs4i_fail_memory(sim);
     memset(&sim->laws[sim->material_count].is, 0, sizeof *material);
     gs4i_copy_members(&sim->laws[sim->material_count++].is, material);
@@ -10350,16 +13595,21 @@ GS4_API int gs4_add_material(gs4_sim *sim, const gs4_material *material)
 /* Room for n more particles. */
 static int gs4i_make_room(gs4_sim *sim, int64_t n)
 {
-    const int64_t wanted = sim->particles.count + n, limit = sim->desc.max_particles ? sim->desc.max_particles : GS4I_MAX_PARTICLES;
+    const int64_t wanted = sim->particles.count + n,
+                  limit = sim->desc.max_particles ? sim->desc.max_particles : GS4I_MAX_PARTICLES;
     if (wanted > limit)
-        return gs4i_fail_value(sim, GS4_ERROR_MEMORY, "this needs room for ", (double)wanted, " particles, more than max_particles; nothing was added");
-    if ((uint64_t)sim->next_id + (uint64_t)n >= UINT32_MAX) return gs4i_fail(sim, GS4_ERROR_MEMORY, "all 2^32 particle ids are used up");
-    if (gs4i_particles_reserve(&sim->memory, &sim->particles, (int)wanted) != GS4_OK) return gs4i_fail_memory(sim);
+        return gs4i_fail_value(sim, GS4_ERROR_MEMORY, "this needs room for ", (double)wanted,
+                               " particles, more than max_particles; nothing was added");
+    if ((uint64_t)sim->next_id + (uint64_t)n >= UINT32_MAX)
+        return gs4i_fail(sim, GS4_ERROR_MEMORY, "all 2^32 particle ids are used up");
+    if (gs4i_particles_reserve(&sim->memory, &sim->particles, (int)wanted) != GS4_OK)
+        return gs4i_fail_memory(sim);
     return GS4_OK;
 }
 
 /* Give one particle to the scene: v = velocity + omega x (x - centre), C = omega x. */
-static void gs4i_fill_one(gs4_sim *sim, gs4_vec3 x, gs4_vec3 centre, const gs4_fill *f, gs4_real mass)
+static void gs4i_fill_one(gs4_sim *sim, gs4_vec3 x, gs4_vec3 centre, const gs4_fill *f,
+                          gs4_real mass)
 {
     const gs4_vec3 w = f->angular_velocity;
     const gs4_real C[3][4] = { { 0, w.z, -w.y, 0 }, { -w.z, 0, w.x, 0 }, { w.y, -w.x, 0, 0 } };
@@ -10367,14 +13617,19 @@ static void gs4i_fill_one(gs4_sim *sim, gs4_vec3 x, gs4_vec3 centre, const gs4_f
     const gs4_vec3 v = gs4i_add(f->velocity, gs4i_cross(w, gs4i_sub(x, centre)));
     int k;
     if (!gs4i_add_one(sim, x, v, mass, f->material, f->temperature)) return;
-    for (k = 0; k < 3 && sim->particles.affine[k]; k++) memcpy(sim->particles.affine[k] + 4 * i, C[k], sizeof C[k]);
-    if (sim->particles.deformation_reals && !sim->unturned) gs4i_set_turning(&sim->particles, i, gs4i_law_of(sim, i)->shear_modulus > 0 ? w : gs4i_vec3(0, 0, 0));
+    for (k = 0; k < 3 && sim->particles.affine[k]; k++)
+        memcpy(sim->particles.affine[k] + 4 * i, C[k], sizeof C[k]);
+    if (sim->particles.deformation_reals && !sim->unturned)
+        gs4i_set_turning(&sim->particles, i,
+                         gs4i_law_of(sim, i)->shear_modulus > 0 ? w : gs4i_vec3(0, 0, 0));
     gs4i_note_speed(sim, gs4i_length(v));
 }
 
-/* Is there material already where new particles would go? A cell that the new ones fill by a good half must not be
- * filled by as much before. `low` and `n` span the cells; -1: out of memory. */
-static int gs4i_overlaps(gs4_sim *sim, const int low[3], const int n[3], const gs4_real *points, int count, gs4_real volume)
+/* Is there material already where new particles would go? A cell that the new ones fill by a
+ * good half must not be filled by as much before. `low` and `n` span the cells; -1: out of
+ * memory. */
+static int gs4i_overlaps(gs4_sim *sim, const int low[3], const int n[3], const gs4_real *points,
+                         int count, gs4_real volume)
 {
     const gs4i_particles *p = &sim->particles;
     const size_t cells = (size_t)n[0] * (size_t)n[1] * (size_t)n[2];
@@ -10396,54 +13651,78 @@ static int gs4i_overlaps(gs4_sim *sim, const int low[3], const int n[3], const g
                 at = at * (size_t)n[a] + (size_t)c;
             }
             if (a >= 0) continue;
-            filled[2 * at + (size_t)pass] += pass ? volume : p->position[4 * i + 3] * sim->laws[p->material[i]].inv_density * p->velocity[4 * i + 3];
+            filled[2 * at + (size_t)pass] += pass ? volume
+                                                  : p->position[4 * i + 3]
+                                                        * sim->laws[p->material[i]].inv_density
+                                                        * p->velocity[4 * i + 3];
         }
-    for (i = 0; i < cells; i++) overlap |= filled[2 * i] > GS4I_C(0.6) * full && filled[2 * i + 1] > GS4I_C(0.6) * full;
+    for (i = 0; i < cells; i++)
+        overlap |= filled[2 * i] > GS4I_C(0.6) * full && filled[2 * i + 1] > GS4I_C(0.6) * full;
     gs4i_free(&sim->memory, filled, cells, 2 * sizeof *filled);
     return overlap;
 }
 
-/* Points of the lattice low + (i + 1/2) spacing that are inside the shape and the domain: counts them, and writes them
- * where `out` is given; -1 when there are more than there is room for. Lattices of all shapes are aligned with the cells. */
-static int64_t gs4i_lattice(const gs4_sim *sim, const gs4i_body *shape, const gs4_fill *f, const int64_t from[3], const int64_t to[3], gs4_real *out)
+/* Points of the lattice low + (i + 1/2) spacing that are inside the shape and the domain: counts
+ * them, and writes them where `out` is given; -1 when there are more than there is room for.
+ * Lattices of all shapes are aligned with the cells. */
+static int64_t gs4i_lattice(const gs4_sim *sim, const gs4i_body *shape, const gs4_fill *f,
+                            const int64_t from[3], const int64_t to[3], gs4_real *out)
 {
     const double s = (double)f->spacing;
-    const int64_t most = (sim->desc.max_particles ? sim->desc.max_particles : GS4I_MAX_PARTICLES) - sim->particles.count;
+    const int64_t most = (sim->desc.max_particles ? sim->desc.max_particles : GS4I_MAX_PARTICLES)
+                         - sim->particles.count;
     double o[3];
     int64_t i, j, k, n = 0;
     gs4i_to_double(sim->grid.origin, o);
-    for (k = from[2]; k < to[2]; k++) for (j = from[1]; j < to[1]; j++) for (i = from[0]; i < to[0]; i++) {
-        const uint64_t number = ((uint64_t)k << 42) ^ ((uint64_t)j << 21) ^ (uint64_t)i;
-        gs4_vec3 x = gs4i_vec3(GS4I_C(o[0] + ((double)i + 0.5) * s), GS4I_C(o[1] + ((double)j + 0.5) * s), GS4I_C(o[2] + ((double)k + 0.5) * s));
-        if (!(gs4i_shape_or_field(shape, x) < 0)) continue;
-        if (f->jitter > 0) {
-            const gs4_real amount = f->jitter * f->spacing;
-            x = gs4i_add(x, gs4i_vec3(amount * gs4i_jitter(f->random_seed, number, 0), amount * gs4i_jitter(f->random_seed, number, 1),
-                                      amount * gs4i_jitter(f->random_seed, number, 2)));
-        }
-        if (!gs4i_inside_domain(&sim->grid, x)) continue;
-        if (n == most) return -1;
-        if (out) { out[3 * n] = x.x; out[3 * n + 1] = x.y; out[3 * n + 2] = x.z; }
-        n++;
-    }
+    for (k = from[2]; k < to[2]; k++)
+        for (j = from[1]; j < to[1]; j++)
+            for (i = from[0]; i < to[0]; i++) {
+                const uint64_t number = ((uint64_t)k << 42) ^ ((uint64_t)j << 21) ^ (uint64_t)i;
+                gs4_vec3 x = gs4i_vec3(GS4I_C(o[0] + ((double)i + 0.5) * s),
+                                       GS4I_C(o[1] + ((double)j + 0.5) * s),
+                                       GS4I_C(o[2] + ((double)k + 0.5) * s));
+                if (!(gs4i_shape_or_field(shape, x) < 0)) continue;
+                if (f->jitter > 0) {
+                    const gs4_real amount = f->jitter * f->spacing;
+                    x = gs4i_add(x, gs4i_vec3(amount * gs4i_jitter(f->random_seed, number, 0),
+                                              amount * gs4i_jitter(f->random_seed, number, 1),
+                                              amount * gs4i_jitter(f->random_seed, number, 2)));
+                }
+                if (!gs4i_inside_domain(&sim->grid, x)) continue;
+                if (n == most) return -1;
+                if (out) {
+                    out[3 * n] = x.x;
+                    out[3 * n + 1] = x.y;
+                    out[3 * n + 2] = x.z;
+                }
+                n++;
+            }
     return n;
 }
 
-/* Box of a shape, cut to the domain: in lattice numbers of the given spacing, and in cells. 0 where nothing is left. */
-static int gs4i_clip_shape(const gs4_sim *sim, const gs4_shape *s, double spacing, int64_t from[3], int64_t to[3], int low[3], int n[3])
+/* Box of a shape, cut to the domain: in lattice numbers of the given spacing, and in cells. 0
+ * where nothing is left. */
+static int gs4i_clip_shape(const gs4_sim *sim, const gs4_shape *s, double spacing, int64_t from[3],
+                           int64_t to[3], int low[3], int n[3])
 {
     gs4_vec3 lo = sim->grid.origin, hi = sim->grid.origin;
     double l[3], h[3], o[3];
     int a;
     gs4i_shape_bounds(s, &lo, &hi);
-    gs4i_to_double(lo, l); gs4i_to_double(hi, h); gs4i_to_double(sim->grid.origin, o);
+    gs4i_to_double(lo, l);
+    gs4i_to_double(hi, h);
+    gs4i_to_double(sim->grid.origin, o);
     for (a = 0; a < 3; a++) {
         const double size = sim->grid.cells[a] * (double)sim->grid.h;
-        if (s->kind == GS4_SHAPE_PLANE) { l[a] = o[a]; h[a] = o[a] + size; }
+        if (s->kind == GS4_SHAPE_PLANE) {
+            l[a] = o[a];
+            h[a] = o[a] + size;
+        }
         if (l[a] < o[a]) l[a] = o[a];
         if (h[a] > o[a] + size) h[a] = o[a] + size;
         if (l[a] >= h[a]) return 0;
-        from[a] = (int64_t)floor((l[a] - o[a]) / spacing); to[a] = (int64_t)ceil((h[a] - o[a]) / spacing);
+        from[a] = (int64_t)floor((l[a] - o[a]) / spacing);
+        to[a] = (int64_t)ceil((h[a] - o[a]) / spacing);
         low[a] = (int)((l[a] - o[a]) / (double)sim->grid.h) - 1;
         n[a] = (int)((h[a] - o[a]) / (double)sim->grid.h) + 2 - low[a];
     }
@@ -10455,15 +13734,21 @@ static int gs4i_make_body(gs4_sim *sim, gs4i_body *b, const gs4_collider *is, do
 {
     memset(b, 0, sizeof *b);
     b->is = *is;
-    b->at[0] = (double)is->pivot.x; b->at[1] = (double)is->pivot.y; b->at[2] = (double)is->pivot.z;
+    b->at[0] = (double)is->pivot.x;
+    b->at[1] = (double)is->pivot.y;
+    b->at[2] = (double)is->pivot.z;
     b->turn[0] = 1;
     gs4i_body_orient(b);
-    if (is->shape.kind == GS4_SHAPE_MESH && gs4i_field_create(&sim->memory, &b->field, &is->shape, spacing) != GS4_OK) return gs4i_fail_memory(sim);
+    if (is->shape.kind == GS4_SHAPE_MESH
+        && gs4i_field_create(&sim->memory, &b->field, &is->shape, spacing) != GS4_OK)
+        return gs4i_fail_memory(sim);
     return GS4_OK;
 }
 
-/* Points of the shape, checked for overlap, into a list that the caller frees. Returns how many, or an error. */
-static int64_t gs4i_collect_points(gs4_sim *sim, const gs4_shape *shape, const gs4_fill *f, gs4_real **points)
+/* Points of the shape, checked for overlap, into a list that the caller frees. Returns how many,
+ * or an error. */
+static int64_t gs4i_collect_points(gs4_sim *sim, const gs4_shape *shape, const gs4_fill *f,
+                                   gs4_real **points)
 {
     gs4_collider as_body;
     gs4i_body body;
@@ -10472,20 +13757,32 @@ static int64_t gs4i_collect_points(gs4_sim *sim, const gs4_shape *shape, const g
     if (!gs4i_clip_shape(sim, shape, (double)f->spacing, from, to, low, cells))
         return gs4i_bad_argument(sim, "shape lies outside of the grid: nothing was added");
     if ((double)(to[0] - from[0]) * (double)(to[1] - from[1]) * (double)(to[2] - from[2]) > 16e9)
-        return gs4i_fail(sim, GS4_ERROR_MEMORY, "shape spans more than 1.6e10 particles; a larger spacing would do; nothing was added");
+        return gs4i_fail(
+            sim, GS4_ERROR_MEMORY,
+            "shape spans more than 1.6e10 particles; a larger spacing would do; nothing was added");
     memset(&as_body, 0, sizeof as_body);
     as_body.shape = *shape;
     GS4I_TRY(gs4i_make_body(sim, &body, &as_body, (double)f->spacing));
     n = gs4i_lattice(sim, &body, f, from, to, NULL);
-    if (n < 0) n = gs4i_fail(sim, GS4_ERROR_MEMORY, "shape holds more particles than there is room for (max_particles); a larger spacing would do; nothing was added");
-    else if (n == 0) n = gs4i_bad_argument(sim, "shape holds no particle: it is thinner than fill.spacing, outside of the grid, or inside out");
-    else if (!(*points = (gs4_real *)gs4i_alloc(&sim->memory, (size_t)n, 3 * sizeof **points))) n = gs4i_fail_memory(sim);
+    if (n < 0)
+        n = gs4i_fail(sim, GS4_ERROR_MEMORY,
+                      "shape holds more particles than there is room for (max_particles); a larger "
+                      "spacing would do; nothing was added");
+    else if (n == 0)
+        n = gs4i_bad_argument(sim, "shape holds no particle: it is thinner than fill.spacing, "
+                                   "outside of the grid, or inside out");
+    else if (!(*points = (gs4_real *)gs4i_alloc(&sim->memory, (size_t)n, 3 * sizeof **points)))
+        n = gs4i_fail_memory(sim);
     else {
         gs4i_lattice(sim, &body, f, from, to, *points);
-        overlap = gs4i_overlaps(sim, low, cells, *points, (int)n, f->spacing * f->spacing * f->spacing);
+        overlap =
+            gs4i_overlaps(sim, low, cells, *points, (int)n, f->spacing * f->spacing * f->spacing);
         if (overlap) {
             gs4i_free(&sim->memory, *points, (size_t)n, 3 * sizeof **points);
-            n = overlap < 0 ? gs4i_fail_memory(sim) : gs4i_bad_argument(sim, "shape overlaps material that is there already: nothing was added");
+            n = overlap < 0
+                    ? gs4i_fail_memory(sim)
+                    : gs4i_bad_argument(
+                        sim, "shape overlaps material that is there already: nothing was added");
         }
     }
     gs4i_field_free(&sim->memory, &body.field);
@@ -10498,7 +13795,8 @@ static gs4_real gs4i_fastest(const gs4i_particles *p)
     gs4_real fastest = 0;
     int i;
     for (i = 0; i < p->count; i++) {
-        const gs4_real *v = p->velocity + 4 * (size_t)i, speed = gs4i_length(gs4i_vec3(v[0], v[1], v[2]));
+        const gs4_real *v = p->velocity + 4 * (size_t)i,
+                       speed = gs4i_length(gs4i_vec3(v[0], v[1], v[2]));
         if (speed > fastest && speed < GS4I_HUGE) fastest = speed;
     }
     return fastest;
@@ -10513,12 +13811,17 @@ static int gs4i_check_edit(gs4_sim *sim)
     for (i = 0; i < p->count; i++) {
         const gs4_real *x = p->position + 4 * (size_t)i, *v = p->velocity + 4 * (size_t)i;
         int good = gs4i_inside_domain(&sim->grid, gs4i_vec3(x[0], x[1], x[2]));
-        for (c = 0; c < 3; c++) good = good && gs4i_finite(x[c]) && gs4i_finite(v[c]) && v[c] < GS4I_HUGE && v[c] > -GS4I_HUGE;
+        for (c = 0; c < 3; c++)
+            good = good && gs4i_finite(x[c]) && gs4i_finite(v[c]) && v[c] < GS4I_HUGE
+                   && v[c] > -GS4I_HUGE;
         if (p->with_heat) good = good && gs4i_abs(p->heat[4 * (size_t)i]) < GS4I_HUGE;
         if (!good)
-            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "an edit has left particle ", (double)p->id[i], " outside of the grid or with a number that is not finite; edit it again");
+            return gs4i_fail_value(
+                sim, GS4_ERROR_ARGUMENT, "an edit has left particle ", (double)p->id[i],
+                " outside of the grid or with a number that is not finite; edit it again");
     }
-    for (i = 0; i < p->count && p->with_heat; i++) gs4i_settle_phase(p, (size_t)i, &sim->laws[p->material[i]]);
+    for (i = 0; i < p->count && p->with_heat; i++)
+        gs4i_settle_phase(p, (size_t)i, &sim->laws[p->material[i]]);
     gs4i_note_speed(sim, gs4i_fastest(p));
     sim->edited = 0;
     return GS4_OK;
@@ -10543,15 +13846,21 @@ GS4_API int gs4_add_particles(gs4_sim *sim, gs4_shape shape, const gs4_fill *fil
     n = gs4i_collect_points(sim, &shape, &f, &points);
     if (n < 0) return (int)n;
     mass = sim->laws[f.material].density * f.spacing * f.spacing * f.spacing;
-    result = mass > GS4I_TINY / GS4I_EPSILON ? gs4i_make_room(sim, n) : gs4i_bad_argument(sim, "a particle would be lighter than gs4_real can tell from nothing; use other units, or define GS4_DOUBLE");
-    for (i = 0; i < n && result == GS4_OK; i++) gs4i_fill_one(sim, gs4i_vec3(points[3 * i], points[3 * i + 1], points[3 * i + 2]), centre, &f, mass);
+    result = mass > GS4I_TINY / GS4I_EPSILON
+                 ? gs4i_make_room(sim, n)
+                 : gs4i_bad_argument(sim, "a particle would be lighter than gs4_real can tell from "
+                                          "nothing; use other units, or define GS4_DOUBLE");
+    for (i = 0; i < n && result == GS4_OK; i++)
+        gs4i_fill_one(sim, gs4i_vec3(points[3 * i], points[3 * i + 1], points[3 * i + 2]), centre,
+                      &f, mass);
     gs4i_free(&sim->memory, points, (size_t)n, 3 * sizeof *points);
     if (result != GS4_OK) return result;
     sim->afresh = sim->unsorted = sim->unseen = 1;
     return (int)n;
 }
 
-GS4_API int gs4_add_points(gs4_sim *sim, const gs4_real *xyz, int count, gs4_real volume_each, const gs4_fill *fill)
+GS4_API int gs4_add_points(gs4_sim *sim, const gs4_real *xyz, int count, gs4_real volume_each,
+                           const gs4_fill *fill)
 {
     gs4_fill f;
     gs4_vec3 centre = gs4i_vec3(0, 0, 0);
@@ -10559,24 +13868,33 @@ GS4_API int gs4_add_points(gs4_sim *sim, const gs4_real *xyz, int count, gs4_rea
     int i, a;
     if (!sim) return GS4_ERROR_ARGUMENT;
     if (!fill || (!xyz && count > 0)) return gs4i_bad_argument(sim, "xyz or fill is NULL");
-    if (count < 0) return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "count is ", count, "; it must be 0 or above");
+    if (count < 0)
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "count is ", count,
+                               "; it must be 0 or above");
     f = *fill;
     GS4I_TRY(gs4i_check_edit(sim));
     GS4I_TRY(gs4i_check_fill(sim, &f));
     GS4I_TRY(gs4i_check(sim, "volume_each", volume_each, GS4I_POSITIVE));
     if (volume_each > 8 * sim->grid.h * sim->grid.h * sim->grid.h)
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "volume_each is ", (double)volume_each, "; above eight cells there would be holes in the material");
+        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "volume_each is ", (double)volume_each,
+                               "; above eight cells there would be holes in the material");
     for (i = 0; i < count; i++) {
         const gs4_real *x = xyz + 3 * (size_t)i;
         for (a = 0; a < 3; a++) GS4I_TRY(gs4i_check(sim, "xyz", x[a], GS4I_FINITE));
         if (!gs4i_inside_domain(&sim->grid, gs4i_vec3(x[0], x[1], x[2])))
-            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "point ", i, " lies outside of the grid: nothing was added");
+            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "point ", i,
+                                   " lies outside of the grid: nothing was added");
         centre = gs4i_add(centre, gs4i_scale(gs4i_vec3(x[0], x[1], x[2]), 1 / GS4I_C(count)));
     }
     mass = sim->laws[f.material].density * volume_each;
-    if (!(mass > GS4I_TINY / GS4I_EPSILON)) return gs4i_bad_argument(sim, "a particle would be lighter than gs4_real can tell from nothing; use other units, or define GS4_DOUBLE");
+    if (!(mass > GS4I_TINY / GS4I_EPSILON))
+        return gs4i_bad_argument(sim, "a particle would be lighter than gs4_real can tell from "
+                                      "nothing; use other units, or define GS4_DOUBLE");
     GS4I_TRY(gs4i_make_room(sim, count));
-    for (i = 0; i < count; i++) gs4i_fill_one(sim, gs4i_vec3(xyz[3 * (size_t)i], xyz[3 * (size_t)i + 1], xyz[3 * (size_t)i + 2]), centre, &f, mass);
+    for (i = 0; i < count; i++)
+        gs4i_fill_one(sim,
+                      gs4i_vec3(xyz[3 * (size_t)i], xyz[3 * (size_t)i + 1], xyz[3 * (size_t)i + 2]),
+                      centre, &f, mass);
     if (count) sim->afresh = sim->unsorted = sim->unseen = 1;
     return count;
 }
@@ -10584,9 +13902,11 @@ GS4_API int gs4_add_points(gs4_sim *sim, const gs4_real *xyz, int count, gs4_rea
 static int gs4i_check_collider(gs4_sim *sim, gs4_collider *c)
 {
     GS4I_TRY(gs4i_check_shape(sim, &c->shape));
-    if ((int)c->contact < 0 || c->contact > GS4_WALL_SEPARATE) return gs4i_bad_argument(sim, "contact of a collider must be stick, slip or separate");
+    if ((int)c->contact < 0 || c->contact > GS4_WALL_SEPARATE)
+        return gs4i_bad_argument(sim, "contact of a collider must be stick, slip or separate");
     GS4I_TRY(gs4i_check(sim, "friction", c->friction, GS4I_NOT_NEGATIVE));
-    if (c->friction > 0 && c->contact != GS4_WALL_SEPARATE) return gs4i_bad_argument(sim, "friction is for contact GS4_WALL_SEPARATE, leave it 0");
+    if (c->friction > 0 && c->contact != GS4_WALL_SEPARATE)
+        return gs4i_bad_argument(sim, "friction is for contact GS4_WALL_SEPARATE, leave it 0");
     GS4I_TRY(gs4i_check3(sim, "velocity", c->velocity));
     GS4I_TRY(gs4i_check3(sim, "angular_velocity", c->angular_velocity));
     GS4I_TRY(gs4i_check3(sim, "pivot", c->pivot));
@@ -10600,18 +13920,23 @@ GS4_API int gs4_add_collider(gs4_sim *sim, const gs4_collider *collider)
     if (!collider) return gs4i_bad_argument(sim, "collider is NULL");
     c = *collider;
     GS4I_TRY(gs4i_check_collider(sim, &c));
-    GS4I_TRY(gs4i_grow(sim, (void **)&sim->boundary.bodies, sim->boundary.body_count, &sim->boundary.body_capacity, sizeof *sim->boundary.bodies));
-    GS4I_TRY(gs4i_make_body(sim, &sim->boundary.bodies[sim->boundary.body_count], &c, 0.5 * (double)sim->grid.h));
+    GS4I_TRY(gs4i_grow(sim, (void **)&sim->boundary.bodies, sim->boundary.body_count,
+                       &sim->boundary.body_capacity, sizeof *sim->boundary.bodies));
+    GS4I_TRY(gs4i_make_body(sim, &sim->boundary.bodies[sim->boundary.body_count], &c,
+                            0.5 * (double)sim->grid.h));
     gs4i_note_speed(sim, gs4i_length(c.velocity));
     sim->unseen = 1;
     return sim->boundary.body_count++;
 }
 
-GS4_API int gs4_move_collider(gs4_sim *sim, int collider, gs4_vec3 velocity, gs4_vec3 angular_velocity)
+GS4_API int gs4_move_collider(gs4_sim *sim, int collider, gs4_vec3 velocity,
+                              gs4_vec3 angular_velocity)
 {
     if (!sim) return GS4_ERROR_ARGUMENT;
     GS4I_TRY(gs4i_check_id(sim, "collider", collider, sim->boundary.body_count));
-    if (sim->boundary.bodies[collider].is_mouth) return gs4i_bad_argument(sim, "that id belongs to the mouth of an emitter, not to a collider");
+    if (sim->boundary.bodies[collider].is_mouth)
+        return gs4i_bad_argument(sim,
+                                 "that id belongs to the mouth of an emitter, not to a collider");
     GS4I_TRY(gs4i_check3(sim, "velocity", velocity));
     GS4I_TRY(gs4i_check3(sim, "angular_velocity", angular_velocity));
     sim->boundary.bodies[collider].is.velocity = velocity;
@@ -10624,13 +13949,16 @@ GS4_API int gs4_move_collider(gs4_sim *sim, int collider, gs4_vec3 velocity, gs4
 static int gs4i_check_emitter(gs4_sim *sim, gs4_emitter *e)
 {
     GS4I_TRY(gs4i_check_shape(sim, &e->shape));
-    if (e->shape.kind == GS4_SHAPE_PLANE) return gs4i_bad_argument(sim, "shape: a plane has no volume to emit from");
+    if (e->shape.kind == GS4_SHAPE_PLANE)
+        return gs4i_bad_argument(sim, "shape: a plane has no volume to emit from");
     GS4I_TRY(gs4i_check_fill(sim, &e->fill));
-    if (gs4i_length(e->fill.angular_velocity) > 0) return gs4i_bad_argument(sim, "fill.angular_velocity: a nozzle does not spin, leave it 0");
+    if (gs4i_length(e->fill.angular_velocity) > 0)
+        return gs4i_bad_argument(sim, "fill.angular_velocity: a nozzle does not spin, leave it 0");
     GS4I_TRY(gs4i_check3(sim, "travel", e->travel));
     GS4I_TRY(gs4i_check(sim, "start", e->start, GS4I_NOT_NEGATIVE));
     GS4I_TRY(gs4i_check(sim, "stop", e->stop, GS4I_NOT_NEGATIVE));
-    if (e->stop > 0 && e->stop <= e->start) return gs4i_bad_argument(sim, "stop must be later than start, or 0 for never");
+    if (e->stop > 0 && e->stop <= e->start)
+        return gs4i_bad_argument(sim, "stop must be later than start, or 0 for never");
     return GS4_OK;
 }
 
@@ -10645,14 +13973,21 @@ GS4_API int gs4_add_emitter(gs4_sim *sim, const gs4_emitter *emitter)
     if (!emitter) return gs4i_bad_argument(sim, "emitter is NULL");
     e = *emitter;
     GS4I_TRY(gs4i_check_emitter(sim, &e));
-    if (!gs4i_clip_shape(sim, &e.shape, (double)e.fill.spacing, from, to, low, n)) return gs4i_bad_argument(sim, "shape lies outside of the grid");
+    if (!gs4i_clip_shape(sim, &e.shape, (double)e.fill.spacing, from, to, low, n))
+        return gs4i_bad_argument(sim, "shape lies outside of the grid");
     memset(&mouth, 0, sizeof mouth);
-    mouth.shape = e.shape; mouth.velocity = e.travel; mouth.temperature = e.fill.temperature;
-    GS4I_TRY(gs4i_grow(sim, (void **)&sim->emitters, sim->emitter_count, &sim->emitter_capacity, sizeof *sim->emitters));
-    GS4I_TRY(gs4i_grow(sim, (void **)&sim->boundary.bodies, sim->boundary.body_count, &sim->boundary.body_capacity, sizeof *sim->boundary.bodies));
+    mouth.shape = e.shape;
+    mouth.velocity = e.travel;
+    mouth.temperature = e.fill.temperature;
+    GS4I_TRY(gs4i_grow(sim, (void **)&sim->emitters, sim->emitter_count, &sim->emitter_capacity,
+                       sizeof *sim->emitters));
+    GS4I_TRY(gs4i_grow(sim, (void **)&sim->boundary.bodies, sim->boundary.body_count,
+                       &sim->boundary.body_capacity, sizeof *sim->boundary.bodies));
     body = &sim->boundary.bodies[sim->boundary.body_count];
     GS4I_TRY(gs4i_make_body(sim, body, &mouth, (double)e.fill.spacing));
-    body->is_mouth = 1; body->asleep = 1; body->flow = e.fill.velocity;
+    body->is_mouth = 1;
+    body->asleep = 1;
+    body->flow = e.fill.velocity;
     memset(&sim->emitters[sim->emitter_count], 0, sizeof *sim->emitters);
     sim->emitters[sim->emitter_count].is = e;
     sim->emitters[sim->emitter_count].body = sim->boundary.body_count++;
@@ -10673,7 +14008,7 @@ GS4_API int gs4_move_emitter(gs4_sim *sim, int emitter, gs4_vec3 travel)
     return GS4_OK;
 }
 
-/* --- stepping ----------------------------------------------------------------------------------------------- */
+/* --- stepping --------------------------------------------------------------------------------- */
 
 static gs4_real gs4i_limit_now(const gs4_sim *sim)
 {
@@ -10684,7 +14019,8 @@ static gs4_real gs4i_limit_now(const gs4_sim *sim)
 
 GS4_API gs4_real gs4_stable_dt(const gs4_sim *sim)
 {
-    gs4_sim *noted;                                         /* a default sound speed follows the speeds that an edit has brought */
+    /* a default sound speed follows the speeds that an edit has brought */
+    gs4_sim *noted;
     if (!sim) return GS4I_C(0);
     memcpy(&noted, &sim, sizeof noted);
     if (sim->edited) gs4i_note_speed(noted, gs4i_fastest(&sim->particles));
@@ -10695,14 +14031,21 @@ static int gs4i_try_step(gs4_sim *sim, gs4_real dt)
 {
     gs4_real limit;
     GS4I_TRY(gs4i_check_edit(sim));
-    if (sim->unseen) { gs4i_look_at_particles(sim, &sim->worst); sim->unseen = 0; }
+    if (sim->unseen) {
+        gs4i_look_at_particles(sim, &sim->worst);
+        sim->unseen = 0;
+    }
     limit = gs4i_limit_now(sim);
     if (dt > limit * (1 + 8 * GS4I_EPSILON)) {
         char line[320];
         gs4i_text t;
-        t.at = line; t.left = sizeof line;
-        gs4i_put(&t, "dt is "); gs4i_put_real(&t, (double)dt); gs4i_put(&t, " s; the largest stable step is now ");
-        gs4i_put_real(&t, (double)limit); gs4i_put(&t, " s (gs4_stable_dt); the step was not taken");
+        t.at = line;
+        t.left = sizeof line;
+        gs4i_put(&t, "dt is ");
+        gs4i_put_real(&t, (double)dt);
+        gs4i_put(&t, " s; the largest stable step is now ");
+        gs4i_put_real(&t, (double)limit);
+        gs4i_put(&t, " s (gs4_stable_dt); the step was not taken");
         return gs4i_fail(sim, GS4_ERROR_UNSTABLE, line);
     }
     return gs4i_step(sim, dt);
@@ -10715,9 +14058,10 @@ GS4_API int gs4_step(gs4_sim *sim, gs4_real dt)
     return gs4i_try_step(sim, dt);
 }
 
-#define GS4I_MAX_STEPS 1e8              /* of one gs4_advance: beyond, it would seem to hang */
+#define GS4I_MAX_STEPS 1e8 /* of one gs4_advance: beyond, it would seem to hang */
 
-/* What part of a refused step to try: half, or as much as is stable by what it saw. Liquids that thicken have little to say at rest. */
+/* What part of a refused step to try: half, or as much as is stable by what it saw. Liquids that
+ * thicken have little to say at rest. */
 static double gs4i_less(const gs4_sim *sim)
 {
     const double part = (double)sim->stage_limit / (double)sim->rule.dt;
@@ -10733,12 +14077,17 @@ GS4_API int gs4_advance(gs4_sim *sim, gs4_real duration)
     for (left = (double)duration; left > 0;) {
         double fraction = (double)sim->desc.cfl, dt, steps;
         int tries, result = GS4_OK;
-        for (tries = 0; tries < 8; tries++, fraction *= gs4i_less(sim)) {    /* a refused step is tried again, shorter */
+        /* a refused step is tried again, shorter */
+        for (tries = 0; tries < 8; tries++, fraction *= gs4i_less(sim)) {
             dt = fraction * (double)gs4i_limit_now(sim);
-            if (sim->desc.max_dt > 0 && dt > (double)sim->desc.max_dt) dt = (double)sim->desc.max_dt;
+            if (sim->desc.max_dt > 0 && dt > (double)sim->desc.max_dt)
+                dt = (double)sim->desc.max_dt;
             steps = ceil(left / dt * (1 - 1e-9));
             if (!(steps < GS4I_MAX_STEPS))
-                return gs4i_fail_value(sim, GS4_ERROR_UNSTABLE, "the stable step is ", dt, " s, so short that the rest would take more than 1e8 steps; a larger cell_size, or less viscosity, sound_speed or speed, would do");
+                return gs4i_fail_value(
+                    sim, GS4_ERROR_UNSTABLE, "the stable step is ", dt,
+                    " s, so short that the rest would take more than 1e8 steps; a larger "
+                    "cell_size, or less viscosity, sound_speed or speed, would do");
             dt = left / steps;
             result = gs4i_try_step(sim, GS4I_C(dt));
             if (result != GS4_ERROR_UNSTABLE) break;
@@ -10749,22 +14098,26 @@ GS4_API int gs4_advance(gs4_sim *sim, gs4_real duration)
     return GS4_OK;
 }
 
-/* --- looking -------------------------------------------------------------------------------------------------- */
+/* --- looking ---------------------------------------------------------------------------------- */
 
 static gs4_real *gs4i_field_data(const gs4_sim *sim, gs4_field field, int *components)
 {
     *components = 1;
     if (!sim || sim->particles.count == 0) return NULL;
     switch (field) {
-    case GS4_FIELD_POSITION:     *components = 3; return sim->particles.position;
-    case GS4_FIELD_VELOCITY:     *components = 3; return sim->particles.velocity;
+    case GS4_FIELD_POSITION: *components = 3; return sim->particles.position;
+    case GS4_FIELD_VELOCITY: *components = 3; return sim->particles.velocity;
     case GS4_FIELD_VOLUME_RATIO: return sim->particles.velocity + 3;
-    case GS4_FIELD_MASS:         return sim->particles.position + 3;
-    case GS4_FIELD_STRESS:       *components = 6; return sim->particles.elastic_reals ? sim->particles.elastic : NULL;
-    case GS4_FIELD_DEFORMATION:  *components = 9; return sim->particles.deformation_reals ? sim->particles.deformation : NULL;
-    case GS4_FIELD_TEMPERATURE:  return sim->particles.heat;
+    case GS4_FIELD_MASS: return sim->particles.position + 3;
+    case GS4_FIELD_STRESS:
+        *components = 6;
+        return sim->particles.elastic_reals ? sim->particles.elastic : NULL;
+    case GS4_FIELD_DEFORMATION:
+        *components = 9;
+        return sim->particles.deformation_reals ? sim->particles.deformation : NULL;
+    case GS4_FIELD_TEMPERATURE: return sim->particles.heat;
     case GS4_FIELD_LIQUID_FRACTION: return sim->particles.heat ? sim->particles.heat + 1 : NULL;
-    case GS4_FIELD_FLUX:         *components = 3; return sim->particles.flux;
+    case GS4_FIELD_FLUX: *components = 3; return sim->particles.flux;
     }
     return NULL;
 }
@@ -10776,7 +14129,10 @@ GS4_API gs4_view gs4_particles(const gs4_sim *sim, gs4_field field)
     v.data = gs4i_field_data(sim, field, &components);
     v.count = v.data ? sim->particles.count : 0;
     v.components = v.data ? components : 0;
-    v.stride = !v.data ? 0 : field == GS4_FIELD_STRESS ? sim->particles.elastic_reals : field == GS4_FIELD_DEFORMATION ? sim->particles.deformation_reals : 4;
+    v.stride = !v.data                          ? 0
+               : field == GS4_FIELD_STRESS      ? sim->particles.elastic_reals
+               : field == GS4_FIELD_DEFORMATION ? sim->particles.deformation_reals
+                                                : 4;
     return v;
 }
 
@@ -10784,18 +14140,32 @@ GS4_API gs4_edit gs4_edit_particles(gs4_sim *sim, gs4_field field)
 {
     gs4_edit e;
     int components = 0;
-    e.data = field == GS4_FIELD_POSITION || field == GS4_FIELD_VELOCITY || field == GS4_FIELD_TEMPERATURE ? gs4i_field_data(sim, field, &components) : NULL;
+    e.data =
+        field == GS4_FIELD_POSITION || field == GS4_FIELD_VELOCITY || field == GS4_FIELD_TEMPERATURE
+            ? gs4i_field_data(sim, field, &components)
+            : NULL;
     e.count = e.data ? sim->particles.count : 0;
     e.components = e.data ? components : 0;
     e.stride = e.data ? 4 : 0;
-    if (sim && !e.data) gs4i_bad_argument(sim, "only position, velocity and, in a scene with heat, temperature can be edited");
-    if (e.data && field == GS4_FIELD_VELOCITY) { sim->unturned = 1; gs4i_forget_turning(sim); }
+    if (sim && !e.data)
+        gs4i_bad_argument(
+            sim, "only position, velocity and, in a scene with heat, temperature can be edited");
+    if (e.data && field == GS4_FIELD_VELOCITY) {
+        sim->unturned = 1;
+        gs4i_forget_turning(sim);
+    }
     if (e.data) sim->edited = sim->afresh = sim->unsorted = sim->unseen = 1;
     return e;
 }
 
-GS4_API const uint32_t *gs4_particle_ids(const gs4_sim *sim) { return sim ? sim->particles.id : NULL; }
-GS4_API const uint8_t *gs4_particle_materials(const gs4_sim *sim) { return sim ? sim->particles.material : NULL; }
+GS4_API const uint32_t *gs4_particle_ids(const gs4_sim *sim)
+{
+    return sim ? sim->particles.id : NULL;
+}
+GS4_API const uint8_t *gs4_particle_materials(const gs4_sim *sim)
+{
+    return sim ? sim->particles.material : NULL;
+}
 
 GS4_API gs4_stats gs4_get_stats(gs4_sim *sim)
 {
@@ -10804,27 +14174,36 @@ GS4_API gs4_stats gs4_get_stats(gs4_sim *sim)
     int c;
     memset(&s, 0, sizeof s);
     if (!sim) return s;
-    s.time = sim->time; s.steps = sim->steps; s.dt = sim->last_dt;
+    s.time = sim->time;
+    s.steps = sim->steps;
+    s.dt = sim->last_dt;
     s.particles = sim->particles.count;
-    s.stress_substeps = sim->split; s.stress_bounded = sim->bounded;
+    s.stress_substeps = sim->split;
+    s.stress_bounded = sim->bounded;
     s.active_cells = sim->grid.active * GS4I_BLOCK_NODES;
     s.memory_bytes = sim->memory.bytes;
     s.min_volume_ratio = s.max_volume_ratio = 1;
-    s.heat_iterations = sim->conduction.iterations; s.solver_residual = sim->conduction.residual;
+    s.heat_iterations = sim->conduction.iterations;
+    s.solver_residual = sim->conduction.residual;
     for (i = 0; i < (size_t)sim->particles.count; i++) {
         const gs4_real *x = sim->particles.position + 4 * i, *v = sim->particles.velocity + 4 * i;
-        const double m = (double)x[3], J = (double)v[3], v2 = (double)v[0] * (double)v[0] + (double)v[1] * (double)v[1] + (double)v[2] * (double)v[2];
+        const double m = (double)x[3], J = (double)v[3],
+                     v2 = (double)v[0] * (double)v[0] + (double)v[1] * (double)v[1]
+                          + (double)v[2] * (double)v[2];
         s.mass += m;
         for (c = 0; c < 3; c++) {
             const int c1 = (c + 1) % 3, c2 = (c + 2) % 3;
             s.momentum[c] += m * (double)v[c];
-            s.angular_momentum[c] += m * ((double)x[c1] * (double)v[c2] - (double)x[c2] * (double)v[c1]);
+            s.angular_momentum[c] +=
+                m * ((double)x[c1] * (double)v[c2] - (double)x[c2] * (double)v[c1]);
         }
         s.kinetic_energy += 0.5 * m * v2;
         if (sim->particles.heat) {
             const gs4i_law *law = &sim->laws[sim->particles.material[i]];
-            const double T = (double)sim->particles.heat[4 * i], fraction = (double)sim->particles.heat[4 * i + 1];
-            s.thermal_energy += m * (double)law->capacity * (T + (law->latent > 0 ? fraction * (double)law->latent : 0));
+            const double T = (double)sim->particles.heat[4 * i],
+                         fraction = (double)sim->particles.heat[4 * i + 1];
+            s.thermal_energy += m * (double)law->capacity
+                                * (T + (law->latent > 0 ? fraction * (double)law->latent : 0));
             if (i == 0 || T < s.min_temperature) s.min_temperature = T;
             if (i == 0 || T > s.max_temperature) s.max_temperature = T;
         }
@@ -10836,11 +14215,13 @@ GS4_API gs4_stats gs4_get_stats(gs4_sim *sim)
     s.seconds_total = sim->seconds[GS4I_CLOCK_TOTAL];
     s.seconds_sort = sim->seconds[GS4I_CLOCK_SORT];
     s.seconds_solve = sim->seconds[GS4I_CLOCK_SOLVE];
-    s.seconds_transfer = s.seconds_total - s.seconds_sort - s.seconds_solve;    /* stress is evaluated within the transfers */
+    /* stress is evaluated within the transfers */
+    s.seconds_transfer = s.seconds_total - s.seconds_sort - s.seconds_solve;
     return s;
 }
 
-/* Sum over particles and nodes, so that neither their order in memory nor that of the blocks matters. */
+/* Sum over particles and nodes, so that neither their order in memory nor that of the blocks
+ * matters. */
 GS4_API uint64_t gs4_state_hash(const gs4_sim *sim)
 {
     const gs4i_particles *p;
@@ -10852,30 +14233,44 @@ GS4_API uint64_t gs4_state_hash(const gs4_sim *sim)
     for (i = 0; i < (size_t)p->count; i++) {
         h = gs4i_hash_bytes(gs4i_mix(p->id[i]), p->position + 4 * i, 4 * sizeof(gs4_real));
         h = gs4i_hash_bytes(h ^ p->material[i], p->velocity + 4 * i, 4 * sizeof(gs4_real));
-        for (k = 0; k < 3 && p->affine[k]; k++) h = gs4i_hash_bytes(h, p->affine[k] + 4 * i, 3 * sizeof(gs4_real));
+        for (k = 0; k < 3 && p->affine[k]; k++)
+            h = gs4i_hash_bytes(h, p->affine[k] + 4 * i, 3 * sizeof(gs4_real));
         if (p->with_rates) {
             h = gs4i_hash_bytes(h, p->rate + 4 * i, 4 * sizeof(gs4_real));
             h = gs4i_hash_bytes(h, p->lag + 4 * i, 3 * sizeof(gs4i_half));
         }
-        if (p->elastic_reals) h = gs4i_hash_bytes(h, p->elastic + (size_t)p->elastic_reals * i, (size_t)p->elastic_reals * sizeof(gs4_real));
-        if (p->deformation_reals) h = gs4i_hash_bytes(h, p->deformation + (size_t)p->deformation_reals * i, (size_t)p->deformation_reals * sizeof(gs4_real));
-        if (p->with_heat) h = gs4i_hash_bytes(h ^ p->liquid[i], p->heat + 4 * i, 4 * sizeof(gs4_real));
-        if (p->with_flux) { h = gs4i_hash_bytes(h, p->flux + 4 * i, 3 * sizeof(gs4_real)); h = gs4i_hash_bytes(h, p->flux_rate + 4 * i, 3 * sizeof(gs4_real)); }
+        if (p->elastic_reals)
+            h = gs4i_hash_bytes(h, p->elastic + (size_t)p->elastic_reals * i,
+                                (size_t)p->elastic_reals * sizeof(gs4_real));
+        if (p->deformation_reals)
+            h = gs4i_hash_bytes(h, p->deformation + (size_t)p->deformation_reals * i,
+                                (size_t)p->deformation_reals * sizeof(gs4_real));
+        if (p->with_heat)
+            h = gs4i_hash_bytes(h ^ p->liquid[i], p->heat + 4 * i, 4 * sizeof(gs4_real));
+        if (p->with_flux) {
+            h = gs4i_hash_bytes(h, p->flux + 4 * i, 3 * sizeof(gs4_real));
+            h = gs4i_hash_bytes(h, p->flux_rate + 4 * i, 3 * sizeof(gs4_real));
+        }
         sum += h;
     }
     for (s = 0; sim->grid.memory && s < sim->grid.active; s++)
         for (n = 0; n < GS4I_BLOCK_NODES; n++) {
             const gs4_real *ag = sim->grid.memory + (size_t)s * GS4I_NODE_REALS + 4 * n;
-            if (ag[3] > 0) sum += gs4i_hash_bytes(gs4i_mix(64 * (uint64_t)sim->grid.block[s] + n), ag, 4 * sizeof(gs4_real));
+            if (ag[3] > 0)
+                sum += gs4i_hash_bytes(gs4i_mix(64 * (uint64_t)sim->grid.block[s] + n), ag,
+                                       4 * sizeof(gs4_real));
         }
     for (s = 0; s < sim->boundary.body_count; s++) {
-        sum += gs4i_hash_bytes((uint64_t)s + 1, sim->boundary.bodies[s].at, sizeof sim->boundary.bodies[s].at);
-        sum += gs4i_hash_bytes((uint64_t)s + 2, sim->boundary.bodies[s].turn, sizeof sim->boundary.bodies[s].turn);
+        sum += gs4i_hash_bytes((uint64_t)s + 1, sim->boundary.bodies[s].at,
+                               sizeof sim->boundary.bodies[s].at);
+        sum += gs4i_hash_bytes((uint64_t)s + 2, sim->boundary.bodies[s].turn,
+                               sizeof sim->boundary.bodies[s].turn);
     }
-    return gs4i_hash_bytes(sum ^ (uint64_t)p->count, &sim->time, sizeof sim->time) ^ gs4i_mix(sim->steps);
+    return gs4i_hash_bytes(sum ^ (uint64_t)p->count, &sim->time, sizeof sim->time)
+           ^ gs4i_mix(sim->steps);
 }
 
-/* --- files ------------------------------------------------------------------------------------------------------ */
+/* --- files ------------------------------------------------------------------------------------ */
 
 GS4_API int gs4_write_ply(gs4_sim *sim, const char *path)
 {
@@ -10898,9 +14293,12 @@ GS4_API int gs4_save(gs4_sim *sim, const char *path)
     return gs4i_save(sim, path);
 }
 
-GS4_API int gs4_load(gs4_sim *sim, const char *path) { return sim ? gs4i_load(sim, path) : GS4_ERROR_ARGUMENT; }
+GS4_API int gs4_load(gs4_sim *sim, const char *path)
+{
+    return sim ? gs4i_load(sim, path) : GS4_ERROR_ARGUMENT;
+}
 
-/* --- one material point ---------------------------------------------------------------------------------- */
+/* --- one material point ----------------------------------------------------------------------- */
 
 /* The sentence of a call without a simulation. */
 static int gs4i_say(const gs4_sim *fake, int result)
@@ -10911,21 +14309,33 @@ static int gs4i_say(const gs4_sim *fake, int result)
 
 /* A batch whose particles are all this point. */
 typedef struct gs4i_point_batch {
-    gs4i_batch_laws laws; gs4i_history_laws past; gs4i_gradient L; gs4i_law law;
+    gs4i_batch_laws laws;
+    gs4i_history_laws past;
+    gs4i_gradient L;
+    gs4i_law law;
     gs4i_elastic e;
-    gs4i_deformation d; gs4i_lanes J;   /* of solids, and det F */
+    gs4i_deformation d;
+    gs4i_lanes J; /* of solids, and det F */
 } gs4i_point_batch;
 
-/* F of a solid point: zero means identity. Its determinant must be above 0 by more than rounding. */
+/* F of a solid point: zero means identity. Its determinant must be above 0 by more than
+ * rounding. */
 static int gs4i_take_point_deformation(gs4_sim *fake, const gs4_real given[9], gs4i_point_batch *q)
 {
     double F[3][3], U[3][3], s[3], V[3][3];
     int i, n, zero = 1;
-    for (i = 0; i < 9; i++) { GS4I_TRY(gs4i_check(fake, "deformation", given[i], GS4I_FINITE)); zero &= given[i] == 0; }
+    for (i = 0; i < 9; i++) {
+        GS4I_TRY(gs4i_check(fake, "deformation", given[i], GS4I_FINITE));
+        zero &= given[i] == 0;
+    }
     for (i = 0; i < 9; i++) F[i / 3][i % 3] = zero ? i % 4 == 0 : (double)given[i];
     gs4i_svd(F, U, s, V);
-    if (!(s[2] > 4 * (double)GS4I_EPSILON * s[0]) || !(s[0] * s[0] < (double)GS4I_HUGE) || !(s[0] * s[1] * s[2] > 1 / (double)GS4I_HUGE))
-        return gs4i_fail_value(fake, GS4_ERROR_ARGUMENT, "deformation has the determinant ", s[0] * s[1] * s[2], "; it must be above 0 by more than rounding: neither flat nor turned inside out (all zero: identity)");
+    if (!(s[2] > 4 * (double)GS4I_EPSILON * s[0]) || !(s[0] * s[0] < (double)GS4I_HUGE)
+        || !(s[0] * s[1] * s[2] > 1 / (double)GS4I_HUGE))
+        return gs4i_fail_value(fake, GS4_ERROR_ARGUMENT, "deformation has the determinant ",
+                               s[0] * s[1] * s[2],
+                               "; it must be above 0 by more than rounding: neither flat nor "
+                               "turned inside out (all zero: identity)");
     for (n = 0; n < GS4I_BATCH; n++) {
         for (i = 0; i < 9; i++) GS4I_NTH(q->d.F[i / 3][i % 3], n) = GS4I_C(F[i / 3][i % 3]);
         GS4I_NTH(q->J, n) = GS4I_C(s[0] * s[1] * s[2]);
@@ -10933,13 +14343,15 @@ static int gs4i_take_point_deformation(gs4_sim *fake, const gs4_real given[9], g
     return GS4_OK;
 }
 
-static int gs4i_make_point_batch(gs4_sim *fake, const gs4_material *material, const gs4_point *point, const gs4_real L[9], gs4i_point_batch *q)
+static int gs4i_make_point_batch(gs4_sim *fake, const gs4_material *material,
+                                 const gs4_point *point, const gs4_real L[9], gs4i_point_batch *q)
 {
     int i, n;
     memset(fake, 0, sizeof *fake);
     memset(q, 0, sizeof *q);
     fake->grid.h = 1;
-    if (!material || !point || !L) return gs4i_bad_argument(fake, "material, point or velocity_gradient is NULL");
+    if (!material || !point || !L)
+        return gs4i_bad_argument(fake, "material, point or velocity_gradient is NULL");
     GS4I_TRY(gs4i_check(fake, "temperature", point->temperature, GS4I_FINITE));
     fake->desc.ambient_temperature = point->temperature;
     GS4I_TRY(gs4i_check_material(fake, material));
@@ -10950,39 +14362,55 @@ static int gs4i_make_point_batch(gs4_sim *fake, const gs4_material *material, co
     }
     q->law.is = *material;
     gs4i_set_law(&q->law, point->temperature);
-    if (material->can_melt && !(point->temperature > material->melting_temperature)) gs4i_freeze_law(&q->law);
+    if (material->can_melt && !(point->temperature > material->melting_temperature))
+        gs4i_freeze_law(&q->law);
     for (n = 0; n < GS4I_BATCH; n++) {
         q->laws.of[n] = &q->law;
         GS4I_NTH(q->laws.temperature, n) = q->law.temperature;
         for (i = 0; i < 9; i++) GS4I_NTH(q->L[i / 3][i % 3], n) = L[i];
-        for (i = 0; i < 6; i++) { GS4I_NTH(q->e.s[i], n) = point->stress[i]; GS4I_NTH(q->e.rate[i], n) = point->stress_rate[i]; }
+        for (i = 0; i < 6; i++) {
+            GS4I_NTH(q->e.s[i], n) = point->stress[i];
+            GS4I_NTH(q->e.rate[i], n) = point->stress_rate[i];
+        }
     }
     if (q->law.varies) {
         const gs4_real mu = gs4i_viscosity_of(&q->law, point->temperature, q->L, 0);
         if (!(mu >= 0 && mu < GS4I_HUGE))
-            return gs4i_fail_value(fake, GS4_ERROR_ARGUMENT, "the viscosity at this temperature and shear rate is ", (double)mu, "; it must be 0 or a finite number above that is not absurdly large");
+            return gs4i_fail_value(
+                fake, GS4_ERROR_ARGUMENT, "the viscosity at this temperature and shear rate is ",
+                (double)mu, "; it must be 0 or a finite number above that is not absurdly large");
     }
     gs4i_take_elastic_laws(&q->laws, &q->past.elastic);
-    return gs4i_take_solid_laws(&q->laws, &q->past.solid) ? gs4i_take_point_deformation(fake, point->deformation, q) : GS4_OK;
+    return gs4i_take_solid_laws(&q->laws, &q->past.solid)
+               ? gs4i_take_point_deformation(fake, point->deformation, q)
+               : GS4_OK;
 }
 
-/* F of a point in a flow that is steady over the step: no rates are needed, and the same for every member of the family. */
-static int gs4i_step_solid_point(gs4_sim *fake, gs4i_point_batch *q, gs4i_rule *rule, gs4_point *point)
+/* F of a point in a flow that is steady over the step: no rates are needed, and the same for
+ * every member of the family. */
+static int gs4i_step_solid_point(gs4_sim *fake, gs4i_point_batch *q, gs4i_rule *rule,
+                                 gs4_point *point)
 {
     gs4i_solid_count count = { 0, 0, 0 };
-    const double div = (double)GS4I_NTH(q->L[0][0], 0) + (double)GS4I_NTH(q->L[1][1], 0) + (double)GS4I_NTH(q->L[2][2], 0);
+    const double div = (double)GS4I_NTH(q->L[0][0], 0) + (double)GS4I_NTH(q->L[1][1], 0)
+                       + (double)GS4I_NTH(q->L[2][2], 0);
     int i;
-    for (i = 0; i < GS4I_BATCH; i++) GS4I_NTH(q->J, i) = GS4I_C((double)GS4I_NTH(q->J, i) * exp(div * (double)rule->dt));
+    for (i = 0; i < GS4I_BATCH; i++)
+        GS4I_NTH(q->J, i) = GS4I_C((double)GS4I_NTH(q->J, i) * exp(div * (double)rule->dt));
     gs4i_family(rule, 0, 0, 1);
     gs4i_correct_solid(&q->past.solid, &q->d, rule, q->L, q->J, 1, &count);
-    for (i = 0; i < 9; i++) count.failed |= !(gs4i_abs(GS4I_NTH(q->d.F[i / 3][i % 3], 0)) < GS4I_HUGE);
+    for (i = 0; i < 9; i++)
+        count.failed |= !(gs4i_abs(GS4I_NTH(q->d.F[i / 3][i % 3], 0)) < GS4I_HUGE);
     if (count.failed)
-        return gs4i_fail(fake, GS4_ERROR_UNSTABLE, "the solid would be stretched, sheared or turned by more than a factor of e^8 in one step; nothing has changed; a smaller dt would do");
+        return gs4i_fail(fake, GS4_ERROR_UNSTABLE,
+                         "the solid would be stretched, sheared or turned by more than a factor of "
+                         "e^8 in one step; nothing has changed; a smaller dt would do");
     for (i = 0; i < 9; i++) point->deformation[i] = GS4I_NTH(q->d.F[i / 3][i % 3], 0);
     return GS4_OK;
 }
 
-GS4_API int gs4_point_step(const gs4_material *material, gs4_point *point, const gs4_real velocity_gradient[9], gs4_real dt, gs4_real rho_inf,
+GS4_API int gs4_point_step(const gs4_material *material, gs4_point *point,
+                           const gs4_real velocity_gradient[9], gs4_real dt, gs4_real rho_inf,
                            gs4_real rho_inf_spurious)
 {
     gs4_sim fake;
@@ -10994,24 +14422,35 @@ GS4_API int gs4_point_step(const gs4_material *material, gs4_point *point, const
     if (r == GS4_OK) r = gs4i_check(&fake, "rho_inf", rho_inf, GS4I_FRACTION);
     if (r == GS4_OK) r = gs4i_check(&fake, "rho_inf_spurious", rho_inf_spurious, GS4I_FRACTION);
     if (r == GS4_OK && rho_inf_spurious > rho_inf)
-        r = gs4i_fail_value(&fake, GS4_ERROR_ARGUMENT, "rho_inf_spurious is ", (double)rho_inf_spurious, ", which is more than rho_inf");
+        r = gs4i_fail_value(&fake, GS4_ERROR_ARGUMENT, "rho_inf_spurious is ",
+                            (double)rho_inf_spurious, ", which is more than rho_inf");
     if (r != GS4_OK) return gs4i_say(&fake, r);
     memset(&rule, 0, sizeof rule);
     rule.dt = dt;
-    if (q.law.shear_modulus > 0) return gs4i_say(&fake, gs4i_step_solid_point(&fake, &q, &rule, point));
+    if (q.law.shear_modulus > 0)
+        return gs4i_say(&fake, gs4i_step_solid_point(&fake, &q, &rule, point));
     if (!(q.law.inv_lambda > 0)) return GS4_OK;
     for (i = 0; i < 6; i++) afresh &= point->stress_rate[i] == 0;
     gs4i_family(&rule, rho_inf, rho_inf_spurious, afresh);
     rule.afresh = afresh;
     gs4i_correct_elastic(&q.past.elastic, &q.e, &rule, q.L, 1, &count);
-    for (i = 0; i < 6; i++) count.failed |= !(gs4i_abs(GS4I_NTH(q.e.s[i], 0)) < GS4I_HUGE && gs4i_abs(GS4I_NTH(q.e.rate[i], 0)) < GS4I_HUGE);
+    for (i = 0; i < 6; i++)
+        count.failed |= !(gs4i_abs(GS4I_NTH(q.e.s[i], 0)) < GS4I_HUGE
+                          && gs4i_abs(GS4I_NTH(q.e.rate[i], 0)) < GS4I_HUGE);
     if (count.failed)
-        return gs4i_say(&fake, gs4i_fail(&fake, GS4_ERROR_UNSTABLE, "the non-local stress would overflow, or swings faster than it can be followed; nothing has changed; a smaller dt would do"));
-    for (i = 0; i < 6; i++) { point->stress[i] = GS4I_NTH(q.e.s[i], 0); point->stress_rate[i] = GS4I_NTH(q.e.rate[i], 0); }
+        return gs4i_say(&fake,
+                        gs4i_fail(&fake, GS4_ERROR_UNSTABLE,
+                                  "the non-local stress would overflow, or swings faster than it "
+                                  "can be followed; nothing has changed; a smaller dt would do"));
+    for (i = 0; i < 6; i++) {
+        point->stress[i] = GS4I_NTH(q.e.s[i], 0);
+        point->stress_rate[i] = GS4I_NTH(q.e.rate[i], 0);
+    }
     return GS4_OK;
 }
 
-GS4_API int gs4_point_stress(const gs4_material *material, const gs4_point *point, const gs4_real velocity_gradient[9], gs4_real cauchy[6])
+GS4_API int gs4_point_stress(const gs4_material *material, const gs4_point *point,
+                             const gs4_real velocity_gradient[9], gs4_real cauchy[6])
 {
     gs4_sim fake;
     gs4i_point_batch q;
@@ -11026,8 +14465,10 @@ GS4_API int gs4_point_stress(const gs4_material *material, const gs4_point *poin
     if (q.law.shear_modulus > 0) gs4i_solid_stress(&q.past.solid, q.d.F, q.J, solid, stiffness);
     for (i = 0; i < 3; i++)
         for (j = i; j < 3; j++)
-            cauchy[gs4i_place[i][j]] = mu * (velocity_gradient[3 * i + j] + velocity_gradient[3 * j + i]) + (q.law.inv_lambda > 0 ? point->stress[gs4i_place[i][j]] : 0)
-                                      + GS4I_NTH(solid[gs4i_place[i][j]], 0);
+            cauchy[gs4i_place[i][j]] =
+                mu * (velocity_gradient[3 * i + j] + velocity_gradient[3 * j + i])
+                + (q.law.inv_lambda > 0 ? point->stress[gs4i_place[i][j]] : 0)
+                + GS4I_NTH(solid[gs4i_place[i][j]], 0);
     return GS4_OK;
 }
 
@@ -11038,12 +14479,22 @@ GS4_API int gs4_material_preset(const char *name, gs4_material *material)
     char line[320];
     size_t i;
     memset(&fake, 0, sizeof fake);
-    if (!name || !material) return gs4i_say(&fake, gs4i_bad_argument(&fake, "gs4_material_preset needs a name and a place for the material"));
+    if (!name || !material)
+        return gs4i_say(
+            &fake, gs4i_bad_argument(
+                       &fake, "gs4_material_preset needs a name and a place for the material"));
     if (gs4i_preset(name, material) == GS4_OK) return GS4_OK;
-    t.at = line; t.left = sizeof line;
+    t.at = line;
+    t.left = sizeof line;
     gs4i_put(&t, "there is no such preset; there are");
-    for (i = 0; i < sizeof gs4i_presets / sizeof gs4i_presets[0]; i++) { gs4i_put(&t, i ? ", " : " "); gs4i_put(&t, gs4i_presets[i].name); }
-    for (i = 0; i < sizeof gs4i_melts / sizeof gs4i_melts[0]; i++) { gs4i_put(&t, ", "); gs4i_put(&t, gs4i_melts[i].name); }
+    for (i = 0; i < sizeof gs4i_presets / sizeof gs4i_presets[0]; i++) {
+        gs4i_put(&t, i ? ", " : " ");
+        gs4i_put(&t, gs4i_presets[i].name);
+    }
+    for (i = 0; i < sizeof gs4i_melts / sizeof gs4i_melts[0]; i++) {
+        gs4i_put(&t, ", ");
+        gs4i_put(&t, gs4i_melts[i].name);
+    }
     return gs4i_say(&fake, gs4i_bad_argument(&fake, line));
 }
 
@@ -11053,16 +14504,20 @@ GS4_API int gs4_material_preset(const char *name, gs4_material *material)
 #pragma GCC pop_options
 #endif
 
-/* --- the elliptic solver by itself ------------------------------------------------------------------------ */
+/* --- the elliptic solver by itself ------------------------------------------------------------ */
 
 struct gs4_poisson {
-    gs4i_memory memory; gs4i_tasks tasks;
+    gs4i_memory memory;
+    gs4i_tasks tasks;
     gs4_poisson_desc desc;
     gs4i_solver solver;
     double setup_seconds;
 };
 
-static double gs4i_poisson_now(const gs4_poisson *p) { return p->desc.now ? p->desc.now(p->desc.now_user) : 0; }
+static double gs4i_poisson_now(const gs4_poisson *p)
+{
+    return p->desc.now ? p->desc.now(p->desc.now_user) : 0;
+}
 
 /* All but the arrays' contents; fills in the defaults. */
 static int gs4i_check_poisson(gs4_sim *fake, gs4_poisson_desc *d)
@@ -11070,21 +14525,32 @@ static int gs4i_check_poisson(gs4_sim *fake, gs4_poisson_desc *d)
     static const char *const cells[3] = { "cells[0] is ", "cells[1] is ", "cells[2] is " };
     int a;
     for (a = 0; a < 3; a++)
-        if (d->cells[a] < 1 || d->cells[a] > 1 << 21) return gs4i_fail_value(fake, GS4_ERROR_ARGUMENT, cells[a], d->cells[a], "; it must be from 1 to 2097152");
-    if ((double)d->cells[1] * d->cells[2] > INT32_MAX || (double)d->cells[0] * d->cells[1] * d->cells[2] > 16.0 * INT32_MAX)
+        if (d->cells[a] < 1 || d->cells[a] > 1 << 21)
+            return gs4i_fail_value(fake, GS4_ERROR_ARGUMENT, cells[a], d->cells[a],
+                                   "; it must be from 1 to 2097152");
+    if ((double)d->cells[1] * d->cells[2] > INT32_MAX
+        || (double)d->cells[0] * d->cells[1] * d->cells[2] > 16.0 * INT32_MAX)
         return gs4i_bad_argument(fake, "cells: more than 2^31 rows or 2^35 cells in all");
     GS4I_TRY(gs4i_check(fake, "cell_size", d->cell_size, GS4I_POSITIVE));
     if (d->cell_size < GS4I_C(1e-9) || d->cell_size > GS4I_C(1e9))
-        return gs4i_fail_value(fake, GS4_ERROR_ARGUMENT, "cell_size is ", (double)d->cell_size, "; it must be from 1e-9 to 1e9");
+        return gs4i_fail_value(fake, GS4_ERROR_ARGUMENT, "cell_size is ", (double)d->cell_size,
+                               "; it must be from 1e-9 to 1e9");
     if (!d->kind) return gs4i_bad_argument(fake, "kind is NULL; it must be an array of gs4_cell");
     GS4I_TRY(gs4i_check(fake, "tolerance", d->tolerance, GS4I_FRACTION));
-    if (d->max_iterations < 0) return gs4i_fail_value(fake, GS4_ERROR_ARGUMENT, "max_iterations is ", d->max_iterations, "; it must be 0 or above");
-    if (d->threads < 0 || d->threads > 1024) return gs4i_fail_value(fake, GS4_ERROR_ARGUMENT, "threads is ", d->threads, "; it must be from 0 to 1024");
+    if (d->max_iterations < 0)
+        return gs4i_fail_value(fake, GS4_ERROR_ARGUMENT, "max_iterations is ", d->max_iterations,
+                               "; it must be 0 or above");
+    if (d->threads < 0 || d->threads > 1024)
+        return gs4i_fail_value(fake, GS4_ERROR_ARGUMENT, "threads is ", d->threads,
+                               "; it must be from 0 to 1024");
 #ifndef GS4_PTHREADS
     if (d->threads > 1 && !d->parallel_for)
-        return gs4i_fail_value(fake, GS4_ERROR_ARGUMENT, "threads is ", d->threads, "; more than 1 needs GS4_PTHREADS defined with the implementation, or parallel_for");
+        return gs4i_fail_value(
+            fake, GS4_ERROR_ARGUMENT, "threads is ", d->threads,
+            "; more than 1 needs GS4_PTHREADS defined with the implementation, or parallel_for");
 #endif
-    if (!d->allocator.alloc_fn != !d->allocator.free_fn) return gs4i_bad_argument(fake, "allocator: both functions or neither");
+    if (!d->allocator.alloc_fn != !d->allocator.free_fn)
+        return gs4i_bad_argument(fake, "allocator: both functions or neither");
     if (d->threads == 0) d->threads = 1;
     if (d->tolerance == 0) d->tolerance = sizeof(gs4_real) == 8 ? GS4I_C(1e-6) : GS4I_C(1e-4);
     if (d->max_iterations == 0) d->max_iterations = 200;
@@ -11096,19 +14562,26 @@ static int gs4i_init_poisson(gs4_sim *fake, gs4_poisson *p)
     const gs4_poisson_desc *d = &p->desc;
     const double start = gs4i_poisson_now(p);
     int r;
-    p->tasks.parallel_for = d->parallel_for; p->tasks.user = d->parallel_user;
-    p->solver.memory = &p->memory; p->solver.tasks = &p->tasks;
+    p->tasks.parallel_for = d->parallel_for;
+    p->tasks.user = d->parallel_user;
+    p->solver.memory = &p->memory;
+    p->solver.tasks = &p->tasks;
 #ifdef GS4_PTHREADS
     if (d->threads > 1 && !d->parallel_for) {
         p->tasks.pool = gs4i_pool_create(&p->memory, d->threads - 1);
-        if (!p->tasks.pool) return gs4i_fail(fake, GS4_ERROR_MEMORY, "the threads could not be started");
+        if (!p->tasks.pool)
+            return gs4i_fail(fake, GS4_ERROR_MEMORY, "the threads could not be started");
     }
 #endif
     r = gs4i_solver_setup(&p->solver, d);
     p->setup_seconds = gs4i_poisson_now(p) - start;
-    p->desc.kind = NULL; p->desc.diagonal = p->desc.coefficient[0] = p->desc.coefficient[1] = p->desc.coefficient[2] = NULL;
+    p->desc.kind = NULL;
+    p->desc.diagonal = p->desc.coefficient[0] = p->desc.coefficient[1] = p->desc.coefficient[2] =
+        NULL;
     if (r == GS4_ERROR_MEMORY) return gs4i_fail_memory(fake);
-    return r == GS4_OK ? r : gs4i_fail_value(fake, r, p->solver.fault, p->solver.fault_value, p->solver.accepted);
+    return r == GS4_OK ? r
+                       : gs4i_fail_value(fake, r, p->solver.fault, p->solver.fault_value,
+                                         p->solver.accepted);
 }
 
 GS4_API int gs4_poisson_create(const gs4_poisson_desc *desc, gs4_poisson **out)
@@ -11118,39 +14591,60 @@ GS4_API int gs4_poisson_create(const gs4_poisson_desc *desc, gs4_poisson **out)
     gs4_poisson *p;
     gs4i_memory memory;
     int result;
-    memset(&fake, 0, sizeof fake); memset(&memory, 0, sizeof memory);
+    memset(&fake, 0, sizeof fake);
+    memset(&memory, 0, sizeof memory);
     if (out) *out = NULL;
-    if (!desc || !out) return gs4i_say(&fake, gs4i_bad_argument(&fake, "gs4_poisson_create needs a description and a place for the solver"));
+    if (!desc || !out)
+        return gs4i_say(
+            &fake, gs4i_bad_argument(
+                       &fake, "gs4_poisson_create needs a description and a place for the solver"));
     d = *desc;
     result = gs4i_check_poisson(&fake, &d);
     if (result != GS4_OK) return gs4i_say(&fake, result);
     memory.hook = d.allocator;
-    if (!memory.hook.alloc_fn) { memory.hook.alloc_fn = gs4i_default_alloc; memory.hook.free_fn = gs4i_default_free; }
+    if (!memory.hook.alloc_fn) {
+        memory.hook.alloc_fn = gs4i_default_alloc;
+        memory.hook.free_fn = gs4i_default_free;
+    }
     p = (gs4_poisson *)gs4i_alloc(&memory, 1, sizeof *p);
     if (!p) return gs4i_say(&fake, gs4i_fail_memory(&fake));
-    p->memory = memory; p->desc = d;
+    p->memory = memory;
+    p->desc = d;
     result = gs4i_init_poisson(&fake, p);
-    if (result == GS4_OK) { *out = p; return GS4_OK; }
+    if (result == GS4_OK) {
+        *out = p;
+        return GS4_OK;
+    }
     gs4_poisson_destroy(p);
     return gs4i_say(&fake, result);
 }
 
-GS4_API int gs4_poisson_solve(gs4_poisson *p, const gs4_real *rhs, gs4_real *x, gs4_solve_stats *stats)
+GS4_API int gs4_poisson_solve(gs4_poisson *p, const gs4_real *rhs, gs4_real *x,
+                              gs4_solve_stats *stats)
 {
     gs4_sim fake;
     gs4_solve_stats local;
     double start;
     int r;
-    memset(&fake, 0, sizeof fake); memset(&local, 0, sizeof local);
+    memset(&fake, 0, sizeof fake);
+    memset(&local, 0, sizeof local);
     if (stats) *stats = local;
-    if (!p || !rhs || !x) return gs4i_say(&fake, gs4i_bad_argument(&fake, "gs4_poisson_solve needs a solver, rhs and x"));
+    if (!p || !rhs || !x)
+        return gs4i_say(&fake,
+                        gs4i_bad_argument(&fake, "gs4_poisson_solve needs a solver, rhs and x"));
     start = gs4i_poisson_now(p);
-    r = gs4i_solver_solve(&p->solver, rhs, x, (double)p->desc.tolerance, p->desc.max_iterations, &local);
-    local.setup_seconds = p->setup_seconds; local.solve_seconds = gs4i_poisson_now(p) - start;
+    r = gs4i_solver_solve(&p->solver, rhs, x, (double)p->desc.tolerance, p->desc.max_iterations,
+                          &local);
+    local.setup_seconds = p->setup_seconds;
+    local.solve_seconds = gs4i_poisson_now(p) - start;
     local.memory_bytes = p->memory.bytes;
     if (stats) *stats = local;
-    if (r == GS4_ERROR_ARGUMENT) return gs4i_say(&fake, gs4i_fail_value(&fake, r, p->solver.fault, p->solver.fault_value, p->solver.accepted));
-    if (r != GS4_OK) return gs4i_say(&fake, gs4i_fail_value(&fake, r, p->solver.fault, local.residual, p->solver.accepted));
+    if (r == GS4_ERROR_ARGUMENT)
+        return gs4i_say(&fake, gs4i_fail_value(&fake, r, p->solver.fault, p->solver.fault_value,
+                                               p->solver.accepted));
+    if (r != GS4_OK)
+        return gs4i_say(
+            &fake, gs4i_fail_value(&fake, r, p->solver.fault, local.residual, p->solver.accepted));
     return r;
 }
 
@@ -11273,29 +14767,25 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 
 #endif /* GS4MPM_IMPLEMENTATION */
 
-/*
- * MIT License
+/*  MIT License
  *
  * Copyright (c) 2026 the authors of gs4mpm.h
  *
- * Permission is hereby granted, free of charge, to any person obtaining a copy
- * of this software and associated documentation files (the "Software"), to deal
- * in the Software without restriction, including without limitation the rights
- * to use, copy, modify, merge, publish, distribute, sublicense, and/or sell
- * copies of the Software, and to permit persons to whom the Software is
- * furnished to do so, subject to the following conditions:
+ * Permission is hereby granted, free of charge, to any person obtaining a copy of this software
+ * and associated documentation files (the "Software"), to deal in the Software without
+ * restriction, including without limitation the rights to use, copy, modify, merge, publish,
+ * distribute, sublicense, and/or sell copies of the Software, and to permit persons to whom the
+ * Software is furnished to do so, subject to the following conditions:
  *
- * The above copyright notice and this permission notice shall be included in all
- * copies or substantial portions of the Software.
+ * The above copyright notice and this permission notice shall be included in all copies or
+ * substantial portions of the Software.
  *
- * THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR
- * IMPLIED, INCLUDING BUT NOT LIMITED TO THE WARRANTIES OF MERCHANTABILITY,
- * FITNESS FOR A PARTICULAR PURPOSE AND NONINFRINGEMENT. IN NO EVENT SHALL THE
- * AUTHORS OR COPYRIGHT HOLDERS BE LIABLE FOR ANY CLAIM, DAMAGES OR OTHER
- * LIABILITY, WHETHER IN AN ACTION OF CONTRACT, TORT OR OTHERWISE, ARISING FROM,
- * OUT OF OR IN CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE
- * SOFTWARE.
+ * THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED, INCLUDING
+ * BUT NOT LIMITED TO THE WARRANTIES OF MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPOSE AND
+ * NONINFRINGEMENT. IN NO EVENT SHALL THE AUTHORS OR COPYRIGHT HOLDERS BE LIABLE FOR ANY CLAIM,
+ * DAMAGES OR OTHER LIABILITY, WHETHER IN AN ACTION OF CONTRACT, TORT OR OTHERWISE, ARISING FROM,
+ * OUT OF OR IN CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE SOFTWARE.
  *
- * CHANGES
- * 0.1.0  the explicit scheme: GS4 and symplectic Euler, Newtonian and viscoelastic liquids, solids, walls, bodies, emitters, frames, checkpoints.
- */
+ * CHANGES 0.1.0  the explicit scheme: GS4 and symplectic Euler, Newtonian and viscoelastic
+ * liquids, solids, walls, bodies, emitters, frames, checkpoints.
+ * */

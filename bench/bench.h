@@ -21,7 +21,10 @@ static void bench_machine(FILE *out)
     char line[256];
     FILE *f = fopen("/proc/cpuinfo", "r");
     while (f && fgets(line, sizeof line, f))
-        if (strncmp(line, "model name", 10) == 0) { fprintf(out, "# %s", line); break; }
+        if (strncmp(line, "model name", 10) == 0) {
+            fprintf(out, "# %s", line);
+            break;
+        }
     if (f) fclose(f);
 #ifdef __VERSION__
     fprintf(out, "# compiler %s\n", __VERSION__);
@@ -37,5 +40,9 @@ static int bench_ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-static double bench_median(double *v, int n) { qsort(v, (size_t)n, sizeof *v, bench_ascending); return v[n / 2]; }
+static double bench_median(double *v, int n)
+{
+    qsort(v, (size_t)n, sizeof *v, bench_ascending);
+    return v[n / 2];
+}
 #endif

@@ -1,10 +1,15 @@
-/* The elliptic solver alone: pools, closed boxes, walls and pores (tests/poisson_cases.h), white noise, residual 1e-8.
- *   cc -O3 -march=native bench/poisson.c -I. -lm -lpthread -o poisson && ./poisson [--cells N] [--largest N] [--repeats N] [--threads N]
- * With the struct solvers of HYPRE beside it in the same run, one process and one thread each (Debian: libhypre-dev, mpicc):
- *   mpicc -O3 -march=native -DBENCH_HYPRE -I/usr/include/hypre bench/poisson.c -I. -lm -lpthread -lHYPRE -o poisson && ./poisson --threads 1
- * CSV on standard output: sizes from --cells doubling to --largest, P1 to P5 at all of them and the hard ones at the first. `again` is
- * a setup in memory that is there already, as from step to step. `limit` is the time of a solve over that of its iterations at 60
- * bytes a cell, as fast as the same threads read. */
+/* The elliptic solver alone: pools, closed boxes, walls and pores (tests/poisson_cases.h), white
+ * noise, residual 1e-8.
+ *   cc -O3 -march=native bench/poisson.c -I. -lm -lpthread -o poisson
+ *   ./poisson [--cells N] [--largest N] [--repeats N] [--threads N]
+ * With the struct solvers of HYPRE beside it in the same run, one process and one thread each
+ * (Debian: libhypre-dev, mpicc):
+ *   mpicc -O3 -march=native -DBENCH_HYPRE -I/usr/include/hypre bench/poisson.c -I. \
+ *       -lm -lpthread -lHYPRE -o poisson && ./poisson --threads 1
+ * CSV on standard output: sizes from --cells doubling to --largest, P1 to P5 at all of them and
+ * the hard ones at the first. `again` is a setup in memory that is there already, as from step
+ * to step. `limit` is the time of a solve over that of its iterations at 60 bytes a cell, as
+ * fast as the same threads read. */
 #define _POSIX_C_SOURCE 200112L
 #define GS4_PTHREADS
 #define GS4MPM_IMPLEMENTATION
@@ -15,7 +20,11 @@
 #include "peers/hypre_pfmg.c"
 #endif
 
-typedef struct reading { const double *v; size_t count; double sums[64]; } reading;
+typedef struct reading {
+    const double *v;
+    size_t count;
+    double sums[64];
+} reading;
 
 static void read_part(int index, void *context)
 {
@@ -24,7 +33,8 @@ static void read_part(int index, void *context)
     double s[16] = { 0 };
     size_t i;
     int l;
-    for (i = 0; i + 16 <= r->count / 64; i += 16) for (l = 0; l < 16; l++) s[l] += v[i + (size_t)l];
+    for (i = 0; i + 16 <= r->count / 64; i += 16)
+        for (l = 0; l < 16; l++) s[l] += v[i + (size_t)l];
     r->sums[index] = s[0];
     for (l = 1; l < 16; l++) r->sums[index] += s[l];
 }
@@ -65,7 +75,10 @@ static void measure(const char *name, int n, int repeats, int threads)
     p.desc.threads = threads;
     for (k = 0; k < repeats; k++) {
         start = bench_now(NULL);
-        if (gs4_poisson_create(&p.desc, &s) < 0) { puts(gs4_last_error(NULL)); exit(1); }
+        if (gs4_poisson_create(&p.desc, &s) < 0) {
+            puts(gs4_last_error(NULL));
+            exit(1);
+        }
         setup[k] = bench_now(NULL) - start;
         start = bench_now(NULL);
         if (gs4i_solver_setup(&s->solver, &p.desc) != GS4_OK) exit(1);
@@ -77,18 +90,24 @@ static void measure(const char *name, int n, int repeats, int threads)
         if (k == repeats - 1) {
             speed = read_speed(&s->tasks);
             k = repeats;
-            printf("%s,%d,%.0f,%d,%.2e,%.4f,%.4f,%.4f", name, n, unknowns, stats.iterations, stats.residual, bench_median(setup, k), bench_median(again, k), bench_median(solve, k));
-            printf(",%.2f,%.2f,%.1f", 1e9 * solve[k / 2] / unknowns / stats.iterations, solve[k / 2] / unknowns / stats.iterations / (60 / speed), (double)stats.memory_bytes / (double)p.count);
+            printf("%s,%d,%.0f,%d,%.2e,%.4f,%.4f,%.4f", name, n, unknowns, stats.iterations,
+                   stats.residual, bench_median(setup, k), bench_median(again, k),
+                   bench_median(solve, k));
+            printf(",%.2f,%.2f,%.1f", 1e9 * solve[k / 2] / unknowns / stats.iterations,
+                   solve[k / 2] / unknowns / stats.iterations / (60 / speed),
+                   (double)stats.memory_bytes / (double)p.count);
         }
         gs4_poisson_destroy(s);
     }
 #ifdef BENCH_HYPRE
     {
         const hypre_result h = hypre_pfmg(&p, 1e-8, 200);
-        printf(",%d,%.2e,%.3f,%.3f,%.1f", h.iterations, h.residual, h.setup, h.solve, (h.setup + h.solve) / (setup[repeats / 2] + solve[repeats / 2]));
+        printf(",%d,%.2e,%.3f,%.3f,%.1f", h.iterations, h.residual, h.setup, h.solve,
+               (h.setup + h.solve) / (setup[repeats / 2] + solve[repeats / 2]));
     }
 #endif
-    printf("\n"); fflush(stdout);
+    printf("\n");
+    fflush(stdout);
     poisson_free(&p);
 }
 
@@ -103,15 +122,18 @@ int main(int count, char **values)
         if (strcmp(values[i], "--threads") == 0) threads = value;
     }
     bench_machine(stdout);
-    printf("# gs4_real of %d bytes, %d threads, medians of %d\n", gs4_real_size(), threads, repeats);
-    printf("problem,n,unknowns,iterations,residual,setup s,again s,solve s,ns per unknown and iteration,limit,bytes per cell");
+    printf("# gs4_real of %d bytes, %d threads, medians of %d\n", gs4_real_size(), threads,
+           repeats);
+    printf("problem,n,unknowns,iterations,residual,setup s,again s,solve s,ns per unknown and "
+           "iteration,limit,bytes per cell");
 #ifdef BENCH_HYPRE
     hypre_begin();
     printf(",PFMG iterations,residual,setup s,solve s,times gs4mpm");
 #endif
     printf("\n");
     for (size = n; size <= largest; size *= 2)
-        for (q = 0; q < (size == n ? POISSON_CASES : 5); q++) measure(poisson_names[q], size, repeats, threads);
+        for (q = 0; q < (size == n ? POISSON_CASES : 5); q++)
+            measure(poisson_names[q], size, repeats, threads);
 #ifdef BENCH_HYPRE
     hypre_end();
 #endif

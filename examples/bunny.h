@@ -1,25 +1,36 @@
-/* bunny.h - the Stanford bunny as a closed triangle mesh, for gs4_mesh(). Include gs4mpm.h before it.
+/* bunny.h - the Stanford bunny as a closed triangle mesh, for gs4_mesh(). Include gs4mpm.h
+ * before it.
  *
  *     gs4_shape rabbit = gs4_mesh(&bunny_vertices[0][0], BUNNY_VERTEX_COUNT,
  *                                 &bunny_triangles[0][0], BUNNY_TRIANGLE_COUNT);
  *
- * y is up, the largest extent (x) is 1, x and z are centred on 0 and the lowest point is y = 0; height 0.975,
- * depth 0.761, volume 0.19979. Multiply a copy of the vertices to get another size.
+ * y is up, the largest extent (x) is 1, x and z are centred on 0 and the lowest point is y = 0;
+ * height 0.975, depth 0.761, volume 0.19979. Multiply a copy of the vertices to get another
+ * size.
  *
- * Source: the npm package "bunny", version 1.0.1, by Mikola Lysenko, which states "Public Domain"; a coarse copy
- * of the Stanford Bunny of the Stanford Computer Graphics Laboratory, scanned by Greg Turk and Marc Levoy in 1994.
- * Changes: moved and scaled as above, rounded to 1e-5, written as C. Vertices, triangles and their order are
- * the package's own; nothing had to be mended. The surface is closed (every directed edge occurs once and its
- * reverse once), one piece of genus 0, has no unused or repeated vertex, and winds counter-clockwise as seen from
+ * Source: the npm package "bunny", version 1.0.1, by Mikola Lysenko, which states "Public
+ * Domain"; a coarse copy of the Stanford Bunny of the Stanford Computer Graphics Laboratory,
+ * scanned by Greg Turk and Marc Levoy in 1994. Changes: moved and scaled as above, rounded to
+ * 1e-5, written as C. Vertices, triangles and their order are the package's own; nothing had to
+ * be mended. The surface is closed (every directed edge occurs once and its reverse once), one
+ * piece of genus 0, has no unused or repeated vertex, and winds counter-clockwise as seen from
  * outside. */
 #ifndef BUNNY_H
 #define BUNNY_H
 
-enum { BUNNY_VERTEX_COUNT = 1839, BUNNY_TRIANGLE_COUNT = 3674 };
+enum {
+    BUNNY_VERTEX_COUNT = 1839,
+    BUNNY_TRIANGLE_COUNT = 3674
+};
 
-/* a vertex in units of 1e-5, so that float and double builds both get the nearest value and neither a warning */
-#define BUNNY_V(x, y, z) {(gs4_real)(x) / 100000, (gs4_real)(y) / 100000, (gs4_real)(z) / 100000}
+/* a vertex in units of 1e-5, so that float and double builds both get the nearest value and
+ * neither a warning */
+#define BUNNY_V(x, y, z)                                                       \
+    {                                                                          \
+        (gs4_real)(x) / 100000, (gs4_real)(y) / 100000, (gs4_real)(z) / 100000 \
+    }
 
+/* clang-format off */
 static const gs4_real bunny_vertices[][3] = {
 BUNNY_V(13189,1269,25331),BUNNY_V(10600,1435,28209),BUNNY_V(5794,1606,27906),BUNNY_V(2591,1487,28150),
 BUNNY_V(685,1361,30015),BUNNY_V(-2755,1403,30954),BUNNY_V(-4403,2828,25778),BUNNY_V(-10156,994,26532),
@@ -482,8 +493,10 @@ BUNNY_V(-6571,2665,-9291),BUNNY_V(-9011,2813,-1751),BUNNY_V(-20635,889,24376),BU
 BUNNY_V(-5537,2849,-6421),BUNNY_V(-18005,654,22113),BUNNY_V(-3460,2611,-10497),BUNNY_V(-14068,400,6241),
 BUNNY_V(-11397,599,6604),BUNNY_V(-14422,619,19556),BUNNY_V(-25240,15094,11633)
 };
+/* clang-format on */
 #undef BUNNY_V
 
+/* clang-format off */
 static const int bunny_triangles[][3] = {
 {2,1661,3},{1676,7,6},{712,1694,9},{3,1674,1662},{11,1672,0},{1705,0,1},{5,6,1674},{4,5,1674},{7,8,712},{2,1662,10},
 {1,10,1705},{11,1690,1672},{1705,11,0},{5,1676,6},{7,9,6},{7,712,9},{2,3,1662},{3,4,1674},{1,2,10},{12,82,1837},
@@ -991,5 +1004,6 @@ static const int bunny_triangles[][3] = {
 {1836,1835,22},{1837,1833,12},{1280,1830,1833},{1667,1275,1728},{16,1767,1084},{589,1765,1838},{1765,1781,1838},
 {1781,1737,1838},{1737,982,1838},{982,1053,1838},{1053,816,1838},{816,589,1838}
 };
+/* clang-format on */
 
 #endif

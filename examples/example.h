@@ -1,18 +1,19 @@
-/* example.h - what the examples share: options, the loop over frames, the progress line, files. MIT licence, as gs4mpm.h.
+/* example.h - what the examples share: options, the loop over frames, the progress line, files.
+ * MIT licence, as gs4mpm.h.
  *
  *     int main(int argc, char **argv)
  *     {
  *         example e = {0};
  *         e.name = "drop"; e.frames = 60; e.cells = 64;       // the defaults
- *         example_options(&e, argc, argv);                    // --frames N --cells N --threads N --out DIR
+ *         example_options(&e, argc, argv);  // --frames N --cells N --threads N --out DIR
  *         gs4_sim *sim = example_create(&e, &desc);           // threads and clock filled in
- *         ...                                                 // the scene; example_need(sim, result) wherever it can fail
- *         while (example_frame(&e, sim)) { }                  // DIR/drop_0001.ply and .png and so on
+ *         ...                            // the scene; example_need() where it can fail
+ *         while (example_frame(&e, sim)) { }      // DIR/drop_0001.ply and .png and so on
  *         gs4_destroy(sim);
  *     }
  *
- * It holds the implementation of gs4mpm.h, so include it first and in one file only. It needs POSIX for the clock, the
- * threads and mkdir; the library itself needs none of it. */
+ * It holds the implementation of gs4mpm.h, so include it first and in one file only. It needs
+ * POSIX for the clock, the threads and mkdir; the library itself needs none of it. */
 #ifndef EXAMPLE_H
 #define EXAMPLE_H
 #ifndef _POSIX_C_SOURCE
@@ -29,28 +30,49 @@
 #include <time.h>
 #include <unistd.h>
 
-typedef enum example_colour { EXAMPLE_PLAIN = 0, EXAMPLE_MATERIAL, EXAMPLE_SPEED, EXAMPLE_TEMPERATURE } example_colour;
+typedef enum example_colour {
+    EXAMPLE_PLAIN = 0,
+    EXAMPLE_MATERIAL,
+    EXAMPLE_SPEED,
+    EXAMPLE_TEMPERATURE
+} example_colour;
 
-/* For EXAMPLE_TEMPERATURE, where look.palette is not set: what is solid is grey, what is liquid has a colour. */
-static const float example_melt[6][3] = {{0.33f, 0.42f, 0.56f}, {0.45f, 0.49f, 0.57f}, {0.57f, 0.54f, 0.55f},
-                                         {0.86f, 0.24f, 0.16f}, {0.97f, 0.55f, 0.13f}, {1.00f, 0.90f, 0.42f}};
+/* For EXAMPLE_TEMPERATURE, where look.palette is not set: what is solid is grey, what is liquid
+ * has a colour. */
+static const float example_melt[6][3] = { { 0.33f, 0.42f, 0.56f }, { 0.45f, 0.49f, 0.57f },
+                                          { 0.57f, 0.54f, 0.55f }, { 0.86f, 0.24f, 0.16f },
+                                          { 0.97f, 0.55f, 0.13f }, { 1.00f, 0.90f, 0.42f } };
 
 typedef struct example {
-    const char *name, *out;             /* files are OUT/NAME_0001.png; no `out`: the directory "out" */
-    int frames, cells, threads;         /* threads 0: two */
-    int row, rows;                      /* of a table of materials: --row 1 to rows, in the names of files too; rows 0: no such option */
-    double frame_time;                  /* s from frame to frame; 0: 1/30 */
-    example_colour colour;              /* what the pictures show: one colour, the number of the material, the speed or the temperature */
-    double melting;                     /* EXAMPLE_TEMPERATURE: 40 % of the palette go from look.low to this, solid, 20 % from solid to
-                                           liquid, 40 % from this to look.high: very nearly enthalpy, which stays in order where it is blurred */
+    /* files are OUT/NAME_0001.png; no `out`: the directory "out" */
+    const char *name, *out;
+    int frames, cells, threads; /* threads 0: two */
+    /* of a table of materials: --row 1 to rows, in the names of files too; rows 0: no such
+     * option */
+    int row, rows;
+    double frame_time; /* s from frame to frame; 0: 1/30 */
+    /* what the pictures show: one colour, the number of the material, the speed or the
+     * temperature */
+    example_colour colour;
+    /* EXAMPLE_TEMPERATURE: 40 % of the palette go from look.low to this, solid, 20 % from solid
+     * to liquid, 40 % from this to look.high: very nearly enthalpy, which stays in order where
+     * it is blurred */
+    double melting;
     preview_settings look;
-    int frame;                          /* how many are done */
-    double pace;                        /* s of waiting a frame, of late */
+    int frame;   /* how many are done */
+    double pace; /* s of waiting a frame, of late */
 } example;
 
 /* Numbers and vectors as the library wants them, float or double. */
 static gs4_real real(double x) { return (gs4_real)x; }
-static gs4_vec3 vec(double x, double y, double z) { gs4_vec3 v; v.x = real(x); v.y = real(y); v.z = real(z); return v; }
+static gs4_vec3 vec(double x, double y, double z)
+{
+    gs4_vec3 v;
+    v.x = real(x);
+    v.y = real(y);
+    v.z = real(z);
+    return v;
+}
 
 static double example_clock(void *user)
 {
@@ -61,7 +83,9 @@ static double example_clock(void *user)
 
 static void example_usage(const example *e, FILE *to)
 {
-    fprintf(to, "usage: %s%s [--frames N] [--cells N] [--threads N] [--out DIR]   (here %d frames, %d cells, %d threads, %s)\n",
+    fprintf(to,
+            "usage: %s%s [--frames N] [--cells N] [--threads N] [--out DIR]   (here %d frames, %d "
+            "cells, %d threads, %s)\n",
             e->name, e->rows ? " [--row N]" : "", e->frames, e->cells, e->threads, e->out);
 }
 
@@ -78,7 +102,8 @@ static int example_number(const example *e, const char *option, const char *text
     char *end, say[120];
     long n = strtol(text, &end, 10);
     sprintf(say, "%.20s takes a whole number from %d to %d, not ", option, low, high);
-    if (end == text || *end || n < low || n > high) example_misuse(e, say, *text ? text : "nothing");
+    if (end == text || *end || n < low || n > high)
+        example_misuse(e, say, *text ? text : "nothing");
     return (int)n;
 }
 
@@ -91,19 +116,30 @@ static void example_options(example *e, int argc, char **argv)
     if (e->rows && !e->row) e->row = 1;
     for (int i = 1; i < argc; ++i) {
         const char *o = argv[i], *value = i + 1 < argc ? argv[i + 1] : "";
-        if (!strcmp(o, "--help")) { example_usage(e, stdout); exit(0); }
-        if (!strcmp(o, "--frames")) e->frames = example_number(e, o, value, 1, 9999);
-        else if (!strcmp(o, "--cells")) e->cells = example_number(e, o, value, 8, 1024);
-        else if (!strcmp(o, "--threads")) e->threads = example_number(e, o, value, 1, 256);
-        else if (e->rows && !strcmp(o, "--row")) e->row = example_number(e, o, value, 1, e->rows);
-        else if (strcmp(o, "--out")) example_misuse(e, "there is no option ", o);
-        else if (!*value) example_misuse(e, "--out takes the name of a directory", "");
-        else e->out = value;
+        if (!strcmp(o, "--help")) {
+            example_usage(e, stdout);
+            exit(0);
+        }
+        if (!strcmp(o, "--frames"))
+            e->frames = example_number(e, o, value, 1, 9999);
+        else if (!strcmp(o, "--cells"))
+            e->cells = example_number(e, o, value, 8, 1024);
+        else if (!strcmp(o, "--threads"))
+            e->threads = example_number(e, o, value, 1, 256);
+        else if (e->rows && !strcmp(o, "--row"))
+            e->row = example_number(e, o, value, 1, e->rows);
+        else if (strcmp(o, "--out"))
+            example_misuse(e, "there is no option ", o);
+        else if (!*value)
+            example_misuse(e, "--out takes the name of a directory", "");
+        else
+            e->out = value;
         ++i;
     }
     if (strlen(e->out) > 900) example_misuse(e, "the name of the directory is too long: ", e->out);
     if (mkdir(e->out, 0777) && (stat(e->out, &is) || !S_ISDIR(is.st_mode))) {
-        fprintf(stderr, "%s: the directory %s cannot be made: %s\n", e->name, e->out, strerror(errno));
+        fprintf(stderr, "%s: the directory %s cannot be made: %s\n", e->name, e->out,
+                strerror(errno));
         exit(1);
     }
 }
@@ -125,20 +161,28 @@ static gs4_sim *example_create(const example *e, gs4_sim_desc *desc)
     return sim;
 }
 
-static double example_share(double x, double low, double high) { return fmax(0, fmin(1, (x - low) / (high - low))); }
+static double example_share(double x, double low, double high)
+{
+    return fmax(0, fmin(1, (x - low) / (high - low)));
+}
 
 /* What the colour stands for, a number a particle; NULL: out of memory. */
 static gs4_real *example_numbers(const example *e, gs4_sim *sim)
 {
-    const gs4_view T = gs4_particles(sim, GS4_FIELD_TEMPERATURE), liquid = gs4_particles(sim, GS4_FIELD_LIQUID_FRACTION);
+    const gs4_view T = gs4_particles(sim, GS4_FIELD_TEMPERATURE),
+                   liquid = gs4_particles(sim, GS4_FIELD_LIQUID_FRACTION);
     const uint8_t *material = gs4_particle_materials(sim);
     const int count = gs4_get_stats(sim).particles;
     gs4_real *number = (gs4_real *)malloc((size_t)count * sizeof *number);
     for (int i = 0; number && i < count; ++i) {
-        if (e->colour == EXAMPLE_MATERIAL) { number[i] = (gs4_real)material[i]; continue; }
-        number[i] = real(0.4 * example_share((double)T.data[i * T.stride], (double)e->look.low, e->melting)
-                       + 0.2 * (double)liquid.data[i * liquid.stride]
-                       + 0.4 * example_share((double)T.data[i * T.stride], e->melting, (double)e->look.high));
+        if (e->colour == EXAMPLE_MATERIAL) {
+            number[i] = (gs4_real)material[i];
+            continue;
+        }
+        number[i] = real(
+            0.4 * example_share((double)T.data[i * T.stride], (double)e->look.low, e->melting)
+            + 0.2 * (double)liquid.data[i * liquid.stride]
+            + 0.4 * example_share((double)T.data[i * T.stride], e->melting, (double)e->look.high));
     }
     return number;
 }
@@ -155,18 +199,27 @@ static void example_write(const example *e, gs4_sim *sim)
     example_need(sim, gs4_write_ply(sim, path));
     strcpy(strrchr(path, '.'), ".png");
     if (e->colour == EXAMPLE_TEMPERATURE) {
-        look.low = 0; look.high = 1;
-        if (!look.palette) { look.palette = example_melt; look.palette_count = 6; }
+        look.low = 0;
+        look.high = 1;
+        if (!look.palette) {
+            look.palette = example_melt;
+            look.palette_count = 6;
+        }
     }
     if (e->colour == EXAMPLE_MATERIAL || e->colour == EXAMPLE_TEMPERATURE) {
         gs4_real *number = example_numbers(e, sim);
-        failed = !number ? 2 : preview_write_png(path, &look, x.count, x.data, x.stride, number, 1, 1);
+        failed =
+            !number ? 2 : preview_write_png(path, &look, x.count, x.data, x.stride, number, 1, 1);
         free(number);
     } else if (e->colour == EXAMPLE_SPEED)
-        failed = preview_write_png(path, &look, x.count, x.data, x.stride, v.data, v.components, v.stride);
+        failed = preview_write_png(path, &look, x.count, x.data, x.stride, v.data, v.components,
+                                   v.stride);
     else
         failed = preview_write_png(path, &look, x.count, x.data, x.stride, NULL, 0, 0);
-    if (failed) { fprintf(stderr, "\n%s: %s\n", path, failed == 1 ? "cannot be written" : "out of memory"); exit(1); }
+    if (failed) {
+        fprintf(stderr, "\n%s: %s\n", path, failed == 1 ? "cannot be written" : "out of memory");
+        exit(1);
+    }
 }
 
 /* Simulates and writes one frame; 0 when all are done. */
@@ -174,7 +227,10 @@ static int example_frame(example *e, gs4_sim *sim)
 {
     double start = example_clock(NULL), waited;
     gs4_stats before = gs4_get_stats(sim), s;
-    if (e->frame == e->frames) { if (isatty(2)) fputc('\n', stderr); return 0; }
+    if (e->frame == e->frames) {
+        if (isatty(2)) fputc('\n', stderr);
+        return 0;
+    }
     example_need(sim, gs4_advance(sim, real(e->frame_time)));
     s = gs4_get_stats(sim);
     ++e->frame;
@@ -182,10 +238,11 @@ static int example_frame(example *e, gs4_sim *sim)
     waited = example_clock(NULL) - start;
     e->pace = e->frame > 1 ? 0.7 * e->pace + 0.3 * waited : waited;
     waited = e->pace * (e->frames - e->frame);
-    fprintf(stderr, "%s frame %d/%d   t %.3f s   dt %.2g s   %d particles   %.2f ms/step   %d:%02d left%s",
+    fprintf(stderr,
+            "%s frame %d/%d   t %.3f s   dt %.2g s   %d particles   %.2f ms/step   %d:%02d left%s",
             isatty(2) ? "\r" : "", e->frame, e->frames, s.time, s.dt, s.particles,
-            1e3 * (s.seconds_total - before.seconds_total) / (double)(s.steps - before.steps), (int)waited / 60, (int)waited % 60,
-            isatty(2) ? "  " : "\n");
+            1e3 * (s.seconds_total - before.seconds_total) / (double)(s.steps - before.steps),
+            (int)waited / 60, (int)waited % 60, isatty(2) ? "  " : "\n");
     return 1;
 }
 

@@ -2,30 +2,39 @@
  *     cc -O3 -march=native examples/lava.c -Iexamples -I. -lm -lpthread -o lava
  *     ./lava                              pictures and particles in out/
  *
- * After figure 1 of "Augmented MPM" (2014), whose mountain is colder away from the source too. The spring gives basalt of 1180 degrees,
- * which freezes at 1070; the ground is a row of slabs from 1150 down to 200 degrees. The slope is 18 degrees steep and 12 m long. Lava
- * conducts 15 000 times too well here: what takes a week takes a minute. */
+ * After figure 1 of "Augmented MPM" (2014), whose mountain is colder away from the source too.
+ * The spring gives basalt of 1180 degrees, which freezes at 1070; the ground is a row of slabs
+ * from 1150 down to 200 degrees. The slope is 18 degrees steep and 12 m long. Lava conducts 15
+ * 000 times too well here: what takes a week takes a minute. */
 #include "example.h"
 
-enum { SLABS = 8 };
+enum {
+    SLABS = 8
+};
 
 int main(int argc, char **argv)
 {
     const double length = 12, tilt = 18 * 3.14159265 / 180, faster = 15000;
-    const float glow[6][3] = {{0.10f, 0.09f, 0.10f}, {0.17f, 0.13f, 0.13f}, {0.30f, 0.12f, 0.09f},
-                              {0.80f, 0.20f, 0.04f}, {0.98f, 0.52f, 0.08f}, {1.00f, 0.86f, 0.35f}};
-    example e = {0};
-    gs4_sim_desc desc = {0};
+    const float glow[6][3] = { { 0.10f, 0.09f, 0.10f }, { 0.17f, 0.13f, 0.13f },
+                               { 0.30f, 0.12f, 0.09f }, { 0.80f, 0.20f, 0.04f },
+                               { 0.98f, 0.52f, 0.08f }, { 1.00f, 0.86f, 0.35f } };
+    example e = { 0 };
+    gs4_sim_desc desc = { 0 };
     gs4_material m;
-    gs4_collider ground = {0};
-    gs4_emitter spring = {0};
-    preview_solid things[SLABS] = {{0}};
+    gs4_collider ground = { 0 };
+    gs4_emitter spring = { 0 };
+    preview_solid things[SLABS] = { { 0 } };
     gs4_sim *sim;
-    e.name = "lava"; e.frames = 50; e.cells = 40; e.frame_time = 0.6;
+    e.name = "lava";
+    e.frames = 50;
+    e.cells = 40;
+    e.frame_time = 0.6;
     example_options(&e, argc, argv);
 
     desc.cell_size = real(length / e.cells);
-    desc.cells[0] = e.cells; desc.cells[1] = e.cells / 4; desc.cells[2] = e.cells * 2 / 3;
+    desc.cells[0] = e.cells;
+    desc.cells[1] = e.cells / 4;
+    desc.cells[2] = e.cells * 2 / 3;
     desc.origin = vec(-length / 2, -length / 16, -length / 3);
     desc.gravity = vec(9.81 * sin(tilt), -9.81 * cos(tilt), 0);
     desc.cfl = real(0.8);
@@ -34,23 +43,31 @@ int main(int argc, char **argv)
     sim = example_create(&e, &desc);
 
     example_need(sim, gs4_material_preset("lava", &m));
-    m.sound_speed = 20;                             /* ten times what anything here moves at, and as much as the crust needs */
+    /* ten times what anything here moves at, and as much as the crust needs */
+    m.sound_speed = 20;
     m.conductivity = real((double)m.conductivity * faster);
     example_need(sim, gs4_add_material(sim, &m));
 
     for (int i = 0; i < SLABS; ++i) {
-        const double x = length * ((double)i / SLABS - 0.5), T = 1150 - 950 * pow((double)i / (SLABS - 1), 1.4);
-        const double from = i ? x : x - length, to = i + 1 < SLABS ? x + length / SLABS : x + length;
+        const double x = length * ((double)i / SLABS - 0.5),
+                     T = 1150 - 950 * pow((double)i / (SLABS - 1), 1.4);
+        const double from = i ? x : x - length,
+                     to = i + 1 < SLABS ? x + length / SLABS : x + length;
         ground.shape = gs4_box(vec(from, -2, -length), vec(to, 0, length));
         ground.contact = GS4_WALL_STICK;
-        ground.is_isothermal = 1; ground.temperature = real(T);
+        ground.is_isothermal = 1;
+        ground.temperature = real(T);
         example_need(sim, gs4_add_collider(sim, &ground));
         things[i].kind = PREVIEW_BOX;
-        things[i].a[0] = (float)x; things[i].a[1] = -0.5f; things[i].a[2] = (float)(-length / 3);
-        things[i].b[0] = (float)to; things[i].b[2] = (float)(length / 3);
+        things[i].a[0] = (float)x;
+        things[i].a[1] = -0.5f;
+        things[i].a[2] = (float)(-length / 3);
+        things[i].b[0] = (float)to;
+        things[i].b[2] = (float)(length / 3);
         if (i + 1 == SLABS) things[i].b[0] = (float)(length / 2);
         things[i].colour[0] = (float)(0.34 + 0.10 * (T - 200) / 950);
-        things[i].colour[1] = 0.33f; things[i].colour[2] = (float)(0.36 - 0.06 * (T - 200) / 950);
+        things[i].colour[1] = 0.33f;
+        things[i].colour[2] = (float)(0.36 - 0.06 * (T - 200) / 950);
     }
     spring.shape = gs4_cylinder(vec(-4.6, 0.9, 0), vec(-4.6, 1.5, 0), real(0.7));
     spring.fill.velocity = vec(0.3, -0.5, 0);
@@ -58,15 +75,27 @@ int main(int argc, char **argv)
     spring.fill.jitter = real(0.5);
     example_need(sim, gs4_add_emitter(sim, &spring));
 
-    e.look.solids = things; e.look.solid_count = SLABS;
-    e.look.eye[0] = 6; e.look.eye[1] = 8; e.look.eye[2] = 14; e.look.target[0] = -0.3f;
-    e.look.up[0] = (float)-sin(tilt); e.look.up[1] = (float)cos(tilt);
+    e.look.solids = things;
+    e.look.solid_count = SLABS;
+    e.look.eye[0] = 6;
+    e.look.eye[1] = 8;
+    e.look.eye[2] = 14;
+    e.look.target[0] = -0.3f;
+    e.look.up[0] = (float)-sin(tilt);
+    e.look.up[1] = (float)cos(tilt);
     e.look.field_of_view = 34;
-    e.look.width = 640; e.look.height = 420;
-    e.look.palette = glow; e.look.palette_count = 6; e.look.low = 300; e.look.high = 1180; e.look.shine = 0.25f;
+    e.look.width = 640;
+    e.look.height = 420;
+    e.look.palette = glow;
+    e.look.palette_count = 6;
+    e.look.low = 300;
+    e.look.high = 1180;
+    e.look.shine = 0.25f;
     e.look.radius = 0.29f * (float)desc.cell_size;
-    e.colour = EXAMPLE_TEMPERATURE; e.melting = (double)m.melting_temperature;
-    while (example_frame(&e, sim)) { }
+    e.colour = EXAMPLE_TEMPERATURE;
+    e.melting = (double)m.melting_temperature;
+    while (example_frame(&e, sim)) {
+    }
     gs4_destroy(sim);
     return 0;
 }

@@ -2,38 +2,83 @@
  *     cc -O3 -march=native examples/letters.c -Iexamples -I. -lm -lpthread -o letters
  *     ./letters                           pictures and particles in out/; two minutes on two cores
  *
- * After figure 9 of "Augmented MPM" (2014), with the explicit scheme, hence softer: shear moduli from 20 to 150 kPa. Blue and green are
- * elastic; red, yellow and orange yield at 4 to 10 % of strain and keep the shape that the fall gave them. */
+ * After figure 9 of "Augmented MPM" (2014), with the explicit scheme, hence softer: shear moduli
+ * from 20 to 150 kPa. Blue and green are elastic; red, yellow and orange yield at 4 to 10 % of
+ * strain and keep the shape that the fall gave them. */
 #include "example.h"
 
-enum { LETTERS = 6, MOST_POINTS = 16 };
+enum {
+    LETTERS = 6,
+    MOST_POINTS = 16
+};
 
 /* A letter as the path of a pen, x and y in heights of the letter; a negative x lifts the pen. */
 typedef struct letter {
-    double path[MOST_POINTS][2]; int points;
+    double path[MOST_POINTS][2];
+    int points;
     double middle[3], size, tilt, thick;
 } letter;
 
-static const struct { double path[MOST_POINTS][2]; int points; } pens[4] = {
-    {{{0.62, 0.84}, {0.50, 0.97}, {0.22, 0.97}, {0.06, 0.80}, {0.06, 0.20}, {0.22, 0.03}, {0.50, 0.03}, {0.64, 0.18}, {0.64, 0.46}, {0.40, 0.46}}, 10},     /* G */
-    {{{0.62, 0.84}, {0.50, 0.97}, {0.20, 0.97}, {0.06, 0.84}, {0.06, 0.66}, {0.20, 0.53}, {0.50, 0.47}, {0.64, 0.34}, {0.64, 0.16}, {0.50, 0.03}, {0.20, 0.03}, {0.06, 0.16}}, 12},
-    {{{0.50, 0.03}, {0.50, 0.97}, {0.04, 0.34}, {0.68, 0.34}}, 4},                                                                                           /* 4 */
-    {{{0.06, 0.03}, {0.06, 0.97}, {0.40, 0.45}, {0.74, 0.97}, {0.74, 0.03}}, 5}                                                                              /* M */
+static const struct {
+    double path[MOST_POINTS][2];
+    int points;
+} pens[4] = {
+    /* G */
+    { { { 0.62, 0.84 },
+        { 0.50, 0.97 },
+        { 0.22, 0.97 },
+        { 0.06, 0.80 },
+        { 0.06, 0.20 },
+        { 0.22, 0.03 },
+        { 0.50, 0.03 },
+        { 0.64, 0.18 },
+        { 0.64, 0.46 },
+        { 0.40, 0.46 } },
+      10 },
+    { { { 0.62, 0.84 },
+        { 0.50, 0.97 },
+        { 0.20, 0.97 },
+        { 0.06, 0.84 },
+        { 0.06, 0.66 },
+        { 0.20, 0.53 },
+        { 0.50, 0.47 },
+        { 0.64, 0.34 },
+        { 0.64, 0.16 },
+        { 0.50, 0.03 },
+        { 0.20, 0.03 },
+        { 0.06, 0.16 } },
+      12 },
+    /* 4 */
+    { { { 0.50, 0.03 }, { 0.50, 0.97 }, { 0.04, 0.34 }, { 0.68, 0.34 } }, 4 },
+    /* M */
+    { { { 0.06, 0.03 }, { 0.06, 0.97 }, { 0.40, 0.45 }, { 0.74, 0.97 }, { 0.74, 0.03 } }, 5 }
 };
-static const struct { double path[MOST_POINTS][2]; int points; } pen_p = {
-    {{0.06, 0.03}, {0.06, 0.97}, {0.46, 0.97}, {0.62, 0.84}, {0.62, 0.62}, {0.46, 0.48}, {0.06, 0.48}}, 7};
+static const struct {
+    double path[MOST_POINTS][2];
+    int points;
+} pen_p = { { { 0.06, 0.03 },
+              { 0.06, 0.97 },
+              { 0.46, 0.97 },
+              { 0.62, 0.84 },
+              { 0.62, 0.62 },
+              { 0.46, 0.48 },
+              { 0.06, 0.48 } },
+            7 };
 
 /* Distance to the round bar that the pen drew, with flat front and back. */
 static gs4_real letter_distance(gs4_vec3 at, void *user)
 {
     const letter *l = (const letter *)user;
-    const double X = ((double)at.x - l->middle[0]) / l->size, Y = ((double)at.y - l->middle[1]) / l->size;
-    const double x = cos(l->tilt) * X + sin(l->tilt) * Y + 0.37, y = -sin(l->tilt) * X + cos(l->tilt) * Y + 0.5;
+    const double X = ((double)at.x - l->middle[0]) / l->size,
+                 Y = ((double)at.y - l->middle[1]) / l->size;
+    const double x = cos(l->tilt) * X + sin(l->tilt) * Y + 0.37,
+                 y = -sin(l->tilt) * X + cos(l->tilt) * Y + 0.5;
     const double side = fabs((double)at.z - l->middle[2]) / l->size - 1.3 * l->thick;
     double best = 1e9;
     for (int i = 0; i + 1 < l->points; ++i) {
         const double *a = l->path[i], *b = l->path[i + 1], dx = b[0] - a[0], dy = b[1] - a[1];
-        const double t = fmin(1, fmax(0, ((x - a[0]) * dx + (y - a[1]) * dy) / (dx * dx + dy * dy)));
+        const double t =
+            fmin(1, fmax(0, ((x - a[0]) * dx + (y - a[1]) * dy) / (dx * dx + dy * dy)));
         best = fmin(best, hypot(x - a[0] - t * dx, y - a[1] - t * dy));
     }
     return real(l->size * fmax(best - l->thick, side));
@@ -41,24 +86,35 @@ static gs4_real letter_distance(gs4_vec3 at, void *user)
 
 int main(int argc, char **argv)
 {
-    static const int which[LETTERS] = {0, 1, 2, 3, 4, 3};                   /* G S 4 above M P M; 4 is the P */
-    static const double stiff[LETTERS] = {150e3, 40e3, 50e3, 60e3, 20e3, 30e3};  /* shear moduli, Pa */
-    static const double yields[LETTERS] = {0, 0.05, 0, 0.04, 0, 0.1};
-    static const double place[LETTERS][3] = {{-0.16, 0.29, 0.3}, {0.0, 0.32, -0.35}, {0.17, 0.30, 0.25}, {-0.17, 0.10, -0.2}, {0.01, 0.14, 0.4}, {0.18, 0.095, -0.3}};
-    const float colours[LETTERS][3] = {{0.15f, 0.25f, 0.70f}, {0.85f, 0.20f, 0.25f}, {0.20f, 0.50f, 0.85f}, {0.95f, 0.65f, 0.10f}, {0.25f, 0.65f, 0.40f}, {0.90f, 0.40f, 0.15f}};
+    /* G S 4 above M P M; 4 is the P */
+    static const int which[LETTERS] = { 0, 1, 2, 3, 4, 3 };
+    /* shear moduli, Pa */
+    static const double stiff[LETTERS] = { 150e3, 40e3, 50e3, 60e3, 20e3, 30e3 };
+    static const double yields[LETTERS] = { 0, 0.05, 0, 0.04, 0, 0.1 };
+    static const double place[LETTERS][3] = { { -0.16, 0.29, 0.3 }, { 0.0, 0.32, -0.35 },
+                                              { 0.17, 0.30, 0.25 }, { -0.17, 0.10, -0.2 },
+                                              { 0.01, 0.14, 0.4 },  { 0.18, 0.095, -0.3 } };
+    const float colours[LETTERS][3] = { { 0.15f, 0.25f, 0.70f }, { 0.85f, 0.20f, 0.25f },
+                                        { 0.20f, 0.50f, 0.85f }, { 0.95f, 0.65f, 0.10f },
+                                        { 0.25f, 0.65f, 0.40f }, { 0.90f, 0.40f, 0.15f } };
     static letter letters[LETTERS];
     const double width = 0.66;
-    example e = {0};
-    gs4_sim_desc desc = {0};
-    gs4_material m = {0};
-    gs4_fill fill = {0};
-    preview_solid floor = {0};
+    example e = { 0 };
+    gs4_sim_desc desc = { 0 };
+    gs4_material m = { 0 };
+    gs4_fill fill = { 0 };
+    preview_solid floor = { 0 };
     gs4_sim *sim;
-    e.name = "letters"; e.frames = 72; e.cells = 110; e.frame_time = 1.0 / 90;
+    e.name = "letters";
+    e.frames = 72;
+    e.cells = 110;
+    e.frame_time = 1.0 / 90;
     example_options(&e, argc, argv);
 
     desc.cell_size = real(width / e.cells);
-    desc.cells[0] = e.cells; desc.cells[1] = e.cells * 4 / 5; desc.cells[2] = e.cells * 2 / 5;
+    desc.cells[0] = e.cells;
+    desc.cells[1] = e.cells * 4 / 5;
+    desc.cells[2] = e.cells * 2 / 5;
     desc.origin = vec(-width / 2, 0, -width / 5);
     desc.gravity = vec(0, -9.81, 0);
     for (int i = 0; i < 6; ++i) desc.walls[i] = i == 2 ? GS4_WALL_SEPARATE : GS4_WALL_OPEN;
@@ -69,31 +125,44 @@ int main(int argc, char **argv)
         const double r = 0.11;
         memcpy(l->path, which[i] == 4 ? pen_p.path : pens[which[i]].path, sizeof l->path);
         l->points = which[i] == 4 ? pen_p.points : pens[which[i]].points;
-        l->size = 0.13; l->thick = 0.085; l->tilt = place[i][2];
-        l->middle[0] = place[i][0]; l->middle[1] = place[i][1];
+        l->size = 0.13;
+        l->thick = 0.085;
+        l->tilt = place[i][2];
+        l->middle[0] = place[i][0];
+        l->middle[1] = place[i][1];
         m.density = 1000;
         m.solid = yields[i] > 0 ? GS4_FIXED_COROTATED : GS4_NEO_HOOKEAN;
         m.shear_modulus = real(stiff[i]);
         m.yield_compression = m.yield_stretch = real(yields[i]);
         m.sound_speed = real(fmax(16, sqrt(10 * stiff[i] / 1000)));
-        m.viscosity = 3;                            /* a little damping */
+        m.viscosity = 3; /* a little damping */
         fill.material = example_need(sim, gs4_add_material(sim, &m));
         fill.velocity = vec(0, -0.8, 0);
         fill.angular_velocity = vec(i % 2 ? 0.6 : -0.4, 0, i % 2 ? -2 : 2);
-        example_need(sim, gs4_add_particles(sim, gs4_sdf(letter_distance, l, vec(l->middle[0] - r, l->middle[1] - r, -0.03),
-                                                         vec(l->middle[0] + r, l->middle[1] + r, 0.03)), &fill));
+        example_need(sim, gs4_add_particles(sim,
+                                            gs4_sdf(letter_distance, l,
+                                                    vec(l->middle[0] - r, l->middle[1] - r, -0.03),
+                                                    vec(l->middle[0] + r, l->middle[1] + r, 0.03)),
+                                            &fill));
     }
 
     floor.kind = PREVIEW_FLOOR;
-    e.look.solids = &floor; e.look.solid_count = 1;
-    e.look.eye[0] = 0.12f; e.look.eye[1] = 0.36f; e.look.eye[2] = 0.95f;
+    e.look.solids = &floor;
+    e.look.solid_count = 1;
+    e.look.eye[0] = 0.12f;
+    e.look.eye[1] = 0.36f;
+    e.look.eye[2] = 0.95f;
     e.look.target[1] = 0.14f;
     e.look.field_of_view = 32;
-    e.look.width = 900; e.look.height = 700;
-    e.look.palette = colours; e.look.palette_count = LETTERS; e.look.high = LETTERS - 1;
+    e.look.width = 900;
+    e.look.height = 700;
+    e.look.palette = colours;
+    e.look.palette_count = LETTERS;
+    e.look.high = LETTERS - 1;
     e.look.shine = 0.4f;
     e.colour = EXAMPLE_MATERIAL;
-    while (example_frame(&e, sim)) { }
+    while (example_frame(&e, sim)) {
+    }
     gs4_destroy(sim);
     return 0;
 }

@@ -1,25 +1,41 @@
-/* rheometer.c - flow curves of three liquids from one material point each, as CSV and as a chart.
+/* rheometer.c - flow curves of three liquids from one material point each, as CSV and as a
+ * chart.
  *     cc -O3 -march=native examples/rheometer.c -I. -lm -o rheometer
  *     ./rheometer                         rheometer.csv and rheometer.svg in out/ (--out DIR)
  *
- * Shows gs4_point_step and gs4_point_stress: the code that particles run, without a simulation around it. Against the rate from 0.01
- * to 100 /s: viscosity and normal stress differences N1 = s_xx - s_yy and -N2 = s_zz - s_yy in steady shear, viscosity in steady
- * uniaxial stretching, and the viscosity while shear at 10 /s starts. Newtonian: constants, and three times as much in stretching.
- * Oldroyd-B: N1 = 2 G0 (lambda rate)^2, no N2, no steady stretching above 1 / (2 lambda). Pom-Pom: thins, overshoots, and hardens in
- * stretching before it thins. */
+ * Shows gs4_point_step and gs4_point_stress: the code that particles run, without a simulation
+ * around it. Against the rate from 0.01 to 100 /s: viscosity and normal stress differences N1 =
+ * s_xx - s_yy and -N2 = s_zz - s_yy in steady shear, viscosity in steady uniaxial stretching,
+ * and the viscosity while shear at 10 /s starts. Newtonian: constants, and three times as much
+ * in stretching. Oldroyd-B: N1 = 2 G0 (lambda rate)^2, no N2, no steady stretching above 1 / (2
+ * lambda). Pom-Pom: thins, overshoots, and hardens in stretching before it thins. */
 #define GS4MPM_IMPLEMENTATION
 #include "gs4mpm.h"
 #include <errno.h>
 #include <sys/stat.h>
 
-enum { MATERIALS = 3, PANELS = 5, RATES = 33, POINTS = 64 };
-static const char *const names[MATERIALS] = {"Newtonian", "Oldroyd-B", "Pom-Pom"};
-static const char *const titles[PANELS] = {"viscosity in shear, Pa s", "N1 in shear, Pa", "-N2 in shear, Pa",
-                                           "viscosity in stretching, Pa s", "viscosity when shear of 10 /s starts, Pa s"};
-static const char *const keys[PANELS] = {"shear_viscosity", "N1", "minus_N2", "stretch_viscosity", "startup_viscosity"};
-typedef struct curve { double x[POINTS], y[POINTS]; int count; } curve;
+enum {
+    MATERIALS = 3,
+    PANELS = 5,
+    RATES = 33,
+    POINTS = 64
+};
+static const char *const names[MATERIALS] = { "Newtonian", "Oldroyd-B", "Pom-Pom" };
+static const char *const titles[PANELS] = { "viscosity in shear, Pa s", "N1 in shear, Pa",
+                                            "-N2 in shear, Pa", "viscosity in stretching, Pa s",
+                                            "viscosity when shear of 10 /s starts, Pa s" };
+static const char *const keys[PANELS] = { "shear_viscosity", "N1", "minus_N2", "stretch_viscosity",
+                                          "startup_viscosity" };
+typedef struct curve {
+    double x[POINTS], y[POINTS];
+    int count;
+} curve;
 
-static void add(curve *c, double x, double y) { c->x[c->count] = x; c->y[c->count++] = y; }
+static void add(curve *c, double x, double y)
+{
+    c->x[c->count] = x;
+    c->y[c->count++] = y;
+}
 
 static void need(int result)
 {
@@ -29,7 +45,8 @@ static void need(int result)
 }
 
 /* Flows at velocity gradient L for a time and leaves Cauchy stress (without pressure) in s. */
-static void flow(const gs4_material *m, gs4_point *p, const gs4_real L[9], double time, int steps, gs4_real s[6])
+static void flow(const gs4_material *m, gs4_point *p, const gs4_real L[9], double time, int steps,
+                 gs4_real s[6])
 {
     for (int i = 0; i < steps; ++i) need(gs4_point_step(m, p, L, (gs4_real)(time / steps), 0, 0));
     need(gs4_point_stress(m, p, L, s));
@@ -39,26 +56,30 @@ static void flow(const gs4_material *m, gs4_point *p, const gs4_real L[9], doubl
 static void sweep(const gs4_material *m, curve curves[PANELS])
 {
     for (int i = 0; i < RATES; ++i) {
-        const double rate = pow(10, -2 + 4.0 * i / (RATES - 1)), lambda = (double)m->relaxation_time;
-        const gs4_real r = (gs4_real)rate, shear[9] = {0, r, 0, 0, 0, 0, 0, 0, 0}, stretch[9] = {r, 0, 0, 0, -r / 2, 0, 0, 0, -r / 2};
+        const double rate = pow(10, -2 + 4.0 * i / (RATES - 1)),
+                     lambda = (double)m->relaxation_time;
+        const gs4_real r = (gs4_real)rate, shear[9] = { 0, r, 0, 0, 0, 0, 0, 0, 0 },
+                       stretch[9] = { r, 0, 0, 0, -r / 2, 0, 0, 0, -r / 2 };
         const double time = 20 * (lambda > 0 ? lambda : 1);
         const int steps = 2000 + (int)(50 * time * rate);
-        gs4_point p = {{0}, {0}, {0}, 0}, q = p;
+        gs4_point p = { { 0 }, { 0 }, { 0 }, 0 }, q = p;
         gs4_real s[6];
         flow(m, &p, shear, time, steps, s);
         add(&curves[0], rate, (double)s[3] / rate);
         if (lambda > 0) add(&curves[1], rate, (double)(s[0] - s[1]));
         if (m->anisotropy > 0) add(&curves[2], rate, (double)(s[2] - s[1]));
-        if (m->liquid == GS4_OLDROYD_B && 2 * lambda * rate > 0.98) continue;    /* it would stretch for ever */
-        flow(m, &q, stretch, time * (m->liquid == GS4_OLDROYD_B ? 1 / (1 - 2 * lambda * rate) : 1), steps, s);
+        /* it would stretch for ever */
+        if (m->liquid == GS4_OLDROYD_B && 2 * lambda * rate > 0.98) continue;
+        flow(m, &q, stretch, time * (m->liquid == GS4_OLDROYD_B ? 1 / (1 - 2 * lambda * rate) : 1),
+             steps, s);
         add(&curves[3], rate, (double)(s[0] - s[1]) / rate);
     }
 }
 
 static void start_up(const gs4_material *m, curve *c)
 {
-    const gs4_real L[9] = {0, 10, 0, 0, 0, 0, 0, 0, 0};
-    gs4_point p = {{0}, {0}, {0}, 0};
+    const gs4_real L[9] = { 0, 10, 0, 0, 0, 0, 0, 0, 0 };
+    gs4_point p = { { 0 }, { 0 }, { 0 }, 0 };
     gs4_real s[6];
     for (double t = 0, next = 0.01; c->count < 41; next *= pow(10, 0.075)) {
         flow(m, &p, L, next - t, 40, s);
@@ -67,32 +88,55 @@ static void start_up(const gs4_material *m, curve *c)
     }
 }
 
-/* Five charts of two decades each way and more: rates (or seconds) to the right, both axes logarithmic. */
+/* Five charts of two decades each way and more: rates (or seconds) to the right, both axes
+ * logarithmic. */
 static void draw(FILE *f, curve curves[MATERIALS][PANELS])
 {
-    static const int low[PANELS] = {-1, -2, -4, 0, -1}, high[PANELS] = {2, 5, 2, 3, 2};
-    static const char *const colours[MATERIALS] = {"#bbb", "#06c", "#c40"};
-    fputs("<svg xmlns='http://www.w3.org/2000/svg' width='1080' height='640' font-family='sans-serif' font-size='12'>\n<rect width='1080' height='640' fill='white'/>\n", f);
+    static const int low[PANELS] = { -1, -2, -4, 0, -1 }, high[PANELS] = { 2, 5, 2, 3, 2 };
+    static const char *const colours[MATERIALS] = { "#bbb", "#06c", "#c40" };
+    fputs("<svg xmlns='http://www.w3.org/2000/svg' width='1080' height='640' "
+          "font-family='sans-serif' font-size='12'>\n<rect width='1080' height='640' "
+          "fill='white'/>\n",
+          f);
     for (int k = 0; k < PANELS; ++k) {
-        const double left = 60 + k % 3 * 355, top = 45 + k / 3 * 310, w = 280, h = 225, dy = h / (high[k] - low[k]);
+        const double left = 60 + k % 3 * 355, top = 45 + k / 3 * 310, w = 280, h = 225,
+                     dy = h / (high[k] - low[k]);
         fprintf(f, "<text x='%g' y='%g' font-size='14'>%s</text>\n", left, top - 12, titles[k]);
         for (int d = -2; d <= 2; ++d)
-            fprintf(f, "<path d='M%g %gv%g' stroke='#ddd'/><text x='%g' y='%g' text-anchor='middle'>%g</text>\n", left + (d + 2) * w / 4, top, h, left + (d + 2) * w / 4, top + h + 16, pow(10, d));
+            fprintf(f,
+                    "<path d='M%g %gv%g' stroke='#ddd'/><text x='%g' y='%g' "
+                    "text-anchor='middle'>%g</text>\n",
+                    left + (d + 2) * w / 4, top, h, left + (d + 2) * w / 4, top + h + 16,
+                    pow(10, d));
         for (int d = low[k]; d <= high[k]; ++d)
-            fprintf(f, "<path d='M%g %gh%g' stroke='#ddd'/><text x='%g' y='%g' text-anchor='end'>%g</text>\n", left, top + (high[k] - d) * dy, w, left - 6, top + (high[k] - d) * dy + 4, pow(10, d));
-        fprintf(f, "<text x='%g' y='%g' text-anchor='middle'>%s</text>\n", left + w / 2, top + h + 34, k == 4 ? "s" : "rate, 1/s");
+            fprintf(f,
+                    "<path d='M%g %gh%g' stroke='#ddd'/><text x='%g' y='%g' "
+                    "text-anchor='end'>%g</text>\n",
+                    left, top + (high[k] - d) * dy, w, left - 6, top + (high[k] - d) * dy + 4,
+                    pow(10, d));
+        fprintf(f, "<text x='%g' y='%g' text-anchor='middle'>%s</text>\n", left + w / 2,
+                top + h + 34, k == 4 ? "s" : "rate, 1/s");
         for (int m = 0; m < MATERIALS; ++m) {
             const curve *c = &curves[m][k];
-            fprintf(f, "<path fill='none' stroke='%s' stroke-width='%g' d='", colours[m], m ? 2.5 : 6.0);
-            for (int i = 0, n = 0; i < c->count; ++i) {         /* what lies outside of the chart is left out */
-                const double x = left + (log10(c->x[i]) + 2) * w / 4, y = c->y[i] > 0 ? top + (high[k] - log10(c->y[i])) * dy : -1;
-                if (y >= top && y <= top + h && x <= left + w) fprintf(f, "%s%.1f %.1f ", n++ ? "L" : "M", x, y); else n = 0;
+            fprintf(f, "<path fill='none' stroke='%s' stroke-width='%g' d='", colours[m],
+                    m ? 2.5 : 6.0);
+            /* what lies outside of the chart is left out */
+            for (int i = 0, n = 0; i < c->count; ++i) {
+                const double x = left + (log10(c->x[i]) + 2) * w / 4,
+                             y = c->y[i] > 0 ? top + (high[k] - log10(c->y[i])) * dy : -1;
+                if (y >= top && y <= top + h && x <= left + w)
+                    fprintf(f, "%s%.1f %.1f ", n++ ? "L" : "M", x, y);
+                else
+                    n = 0;
             }
             fputs("'/>\n", f);
         }
     }
     for (int m = 0; m < MATERIALS; ++m)
-        fprintf(f, "<path d='M800 %dh40' stroke='%s' stroke-width='2.5'/><text x='850' y='%d' font-size='14'>%s</text>\n", 420 + 30 * m, colours[m], 425 + 30 * m, names[m]);
+        fprintf(f,
+                "<path d='M800 %dh40' stroke='%s' stroke-width='2.5'/><text x='850' y='%d' "
+                "font-size='14'>%s</text>\n",
+                420 + 30 * m, colours[m], 425 + 30 * m, names[m]);
     fputs("</svg>\n", f);
 }
 
@@ -102,7 +146,10 @@ static FILE *open_in(const char *directory, const char *name)
     FILE *f;
     sprintf(path, "%.900s/%s", directory, name);
     f = fopen(path, "w");
-    if (!f) { fprintf(stderr, "rheometer: %s cannot be written: %s\n", path, strerror(errno)); exit(1); }
+    if (!f) {
+        fprintf(stderr, "rheometer: %s cannot be written: %s\n", path, strerror(errno));
+        exit(1);
+    }
     return f;
 }
 
@@ -110,22 +157,35 @@ int main(int argc, char **argv)
 {
     static curve curves[MATERIALS][PANELS];
     const char *out = argc == 3 && !strcmp(argv[1], "--out") ? argv[2] : "out";
-    gs4_material m = {0};
+    gs4_material m = { 0 };
     FILE *f;
-    if (argc != 1 && out != argv[argc - 1]) { fputs("usage: rheometer [--out DIR]\n", stderr); return 2; }
+    if (argc != 1 && out != argv[argc - 1]) {
+        fputs("usage: rheometer [--out DIR]\n", stderr);
+        return 2;
+    }
     mkdir(out, 0777);
     f = open_in(out, "rheometer.csv");
     fputs("quantity,material,x,y\n", f);
     for (int i = 0; i < MATERIALS; ++i) {
-        m.density = 1000; m.viscosity = 10;
+        m.density = 1000;
+        m.viscosity = 10;
         m.liquid = (gs4_liquid)i;
-        if (i > 0) { m.local_fraction = (gs4_real)0.05; m.relaxation_time = 1; }        /* G0 = 9.5 Pa */
-        if (i == 2) { m.stretch_time = (gs4_real)0.5; m.anisotropy = (gs4_real)0.3; m.arms = 4; }
+        /* G0 = 9.5 Pa */
+        if (i > 0) {
+            m.local_fraction = (gs4_real)0.05;
+            m.relaxation_time = 1;
+        }
+        if (i == 2) {
+            m.stretch_time = (gs4_real)0.5;
+            m.anisotropy = (gs4_real)0.3;
+            m.arms = 4;
+        }
         sweep(&m, curves[i]);
         start_up(&m, &curves[i][4]);
         for (int k = 0; k < PANELS; ++k)
             for (int j = 0; j < curves[i][k].count; ++j)
-                fprintf(f, "%s,%s,%.6g,%.6g\n", keys[k], names[i], curves[i][k].x[j], curves[i][k].y[j]);
+                fprintf(f, "%s,%s,%.6g,%.6g\n", keys[k], names[i], curves[i][k].x[j],
+                        curves[i][k].y[j]);
     }
     fclose(f);
     f = open_in(out, "rheometer.svg");

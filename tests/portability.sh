@@ -9,8 +9,8 @@ set -u
 cd "$(dirname "$0")/.." || exit 1
 CC=${CC:-cc}
 
-quick='layout names snippets few_warnings few_hashes link'
-full='warnings tsan hashes asan arm hashes_double wasm windows tiny musl i386 layout names units snippets link frames examples'
+quick='form layout names snippets few_warnings few_hashes link'
+full='warnings tsan hashes asan arm hashes_double wasm windows tiny musl i386 form layout names units snippets link frames examples'
 
 # A transfer kernel may be longer than 60 lines; nothing else.
 long_functions=''
@@ -207,6 +207,16 @@ prefix() {
 }
 
 compiles_until() { prefix "$1" > "$tmp/prefix.c" && $CC -std=c99 -fsyntax-only -Wall -Wextra -Wpedantic -Werror -Wno-unused -DGS4_PTHREADS "$tmp/prefix.c"; }
+
+# .clang-format, and what it does not hold: comments within 100 columns (manual and reference tables aside)
+form() {
+    have clang-format || return
+    sources=$(ls gs4mpm.h tests/*.[ch] bench/*.[ch] bench/peers/*.c examples/*.[ch])
+    check "all sources have the form of .clang-format" clang-format --dry-run --Werror $sources
+    awk 'FNR == 1 { data = 0 } /clang-format off/ { data = 1 } /clang-format on/ { data = 0 }
+         length > 100 && !data { print FILENAME ":" FNR }' $sources > "$tmp/m"
+    check "no line is wider than 100 columns" refused grep . "$tmp/m"
+}
 
 layout() {
     banners > "$tmp/banners"; cut -d' ' -f2 "$tmp/banners" > "$tmp/sections"

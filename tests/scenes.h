@@ -5,11 +5,13 @@
 static gs4_vec3 at(double x, double y, double z)
 {
     gs4_vec3 v;
-    v.x = (gs4_real)x; v.y = (gs4_real)y; v.z = (gs4_real)z;
+    v.x = (gs4_real)x;
+    v.y = (gs4_real)y;
+    v.z = (gs4_real)z;
     return v;
 }
 
-static int scene_sharp;                 /* the next cubes have sharpened gradients */
+static int scene_sharp; /* the next cubes have sharpened gradients */
 
 /* A cube of n^3 cells, side 1, all walls slip, no gravity. */
 static gs4_sim_desc scene_cube(int n)
@@ -28,7 +30,9 @@ static gs4_material scene_liquid(double density, double viscosity, double sound_
 {
     gs4_material m;
     memset(&m, 0, sizeof m);
-    m.density = (gs4_real)density; m.viscosity = (gs4_real)viscosity; m.sound_speed = (gs4_real)sound_speed;
+    m.density = (gs4_real)density;
+    m.viscosity = (gs4_real)viscosity;
+    m.sound_speed = (gs4_real)sound_speed;
     return m;
 }
 
@@ -40,13 +44,16 @@ static gs4_fill scene_fill(gs4_vec3 velocity)
     return f;
 }
 
-/* Component c of a field of the particle whose id is `id`; fields are looked up by id because particles are sorted. */
+/* Component c of a field of the particle whose id is `id`; fields are looked up by id because
+ * particles are sorted. */
 static void scene_by_id(const gs4_sim *sim, gs4_field field, double *out)
 {
     const gs4_view v = gs4_particles(sim, field);
     const uint32_t *id = gs4_particle_ids(sim);
     int i, c;
     for (i = 0; i < v.count; i++)
-        for (c = 0; c < v.components; c++) out[(size_t)id[i] * (size_t)v.components + (size_t)c] = (double)v.data[(size_t)i * (size_t)v.stride + (size_t)c];
+        for (c = 0; c < v.components; c++)
+            out[(size_t)id[i] * (size_t)v.components + (size_t)c] =
+                (double)v.data[(size_t)i * (size_t)v.stride + (size_t)c];
 }
 #endif

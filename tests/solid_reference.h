@@ -2,10 +2,14 @@
  * and rotations, Kirchhoff stresses over the shear modulus; what the yield clamp leaves; neo-Hookean stress in simple loadings. */
 typedef struct reference_solid {
     const char *name;
-    double F[9], s[3], R[9];            /* s[2] < 0: turned inside out */
-    double corotated[9];                /* tau of |F - R|^2 + (J - 1)^2: with the dilation, for flat and inverted F too */
-    double split[9], neo_hookean[9];    /* tau of the two models; all 0 for flat and inverted F, which they do not know */
+    double F[9], s[3], R[9]; /* s[2] < 0: turned inside out */
+    double corotated
+        [9]; /* tau of |F - R|^2 + (J - 1)^2: with the dilation, for flat and inverted F too */
+    double split[9],
+        neo_hookean
+            [9]; /* tau of the two models; all 0 for flat and inverted F, which they do not know */
 } reference_solid;
+/* clang-format off */
 static const reference_solid reference_solids[] = {
     { "identity", { 1, 0, 0, 0, 1, 0, 0, 0, 1 },
       { 1, 1, 1 }, { 1, 0, 0, 0, 1, 0, 0, 0, 1 },
@@ -68,8 +72,12 @@ static const reference_solid reference_solids[] = {
       { 0 },
       { 0 } }
 };
+/* clang-format on */
 
-typedef struct reference_clamp { double compression, stretch, F[9], elastic[9]; } reference_clamp;
+typedef struct reference_clamp {
+    double compression, stretch, F[9], elastic[9];
+} reference_clamp;
+/* clang-format off */
 static const reference_clamp reference_clamps[] = {
     { 0.025, 0.0075, { 1, 0, 0, 0, 1, 0, 0, 0, 1 },
       { 1, 0, 0, 0, 1, 0, 0, 0, 1 } },
@@ -132,10 +140,19 @@ static const reference_clamp reference_clamps[] = {
     { 0.5, 0.5, { 0.9370836470703897, -0.07055695136023628, -0.005596877094149754, 0.03701936566443474, 0.2683038645301656, -0.9606351735801635, -0.2475479878573731, 0.5484831147840088, 0.0925935451529311 },
       { 0.9370836470703897, -0.07055695136023628, -0.005596877094149754, 0.03701936566443474, 0.2683038645301656, -0.9606351735801635, -0.2475479878573731, 0.5484831147840088, 0.0925935451529311 } }
 };
+/* clang-format on */
 
 /* G = 1, J = 1. Stretches: the stress along them, with none across; shear: s_xy and N1 = s_xx - s_yy. */
-typedef struct reference_rubber { int mode; double parameter, cauchy, N1; } reference_rubber;
-enum { REF_UNIAXIAL_STRETCH, REF_EQUIBIAXIAL_STRETCH, REF_SIMPLE_SHEAR };
+typedef struct reference_rubber {
+    int mode;
+    double parameter, cauchy, N1;
+} reference_rubber;
+enum {
+    REF_UNIAXIAL_STRETCH,
+    REF_EQUIBIAXIAL_STRETCH,
+    REF_SIMPLE_SHEAR
+};
+/* clang-format off */
 static const reference_rubber reference_rubbers[] = {
     { REF_UNIAXIAL_STRETCH, 0.5, -1.75, -3.5 },
     { REF_UNIAXIAL_STRETCH, 0.9, -0.3011111111111111, -0.3345679012345679 },
@@ -152,3 +169,4 @@ static const reference_rubber reference_rubbers[] = {
     { REF_SIMPLE_SHEAR, 1, 1.0, 1.0 },
     { REF_SIMPLE_SHEAR, 3, 3.0, 9.0 }
 };
+/* clang-format on */

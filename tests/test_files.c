@@ -1,5 +1,6 @@
-/* Memory that is refused, files that are damaged, places that cannot be written to. Run all with run_files().
- * Files go to a folder of their own below TMPDIR or /tmp, which is removed at the end. */
+/* Memory that is refused, files that are damaged, places that cannot be written to. Run all with
+ * run_files(). Files go to a folder of their own below TMPDIR or /tmp, which is removed at the
+ * end. */
 #if defined(__unix__) || defined(__APPLE__)
 #include <sys/resource.h>
 #include <sys/stat.h>
@@ -8,17 +9,21 @@
 #define FILES_UNIX 1
 #endif
 
-/* --- memory that can be refused -------------------------------------------------------------------------- */
+/* --- memory that can be refused --------------------------------------------------------------- */
 
 typedef struct files_memory {
-    long calls;                         /* asked so far */
-    long fail_at;                       /* the call, from 0, that is refused; -1: none */
-    int from_there_on;                  /* that and all after it */
-    long live, wrong;                   /* blocks now; blocks given back with another size, or misaligned requests */
-    size_t bytes, most;                 /* now, and at most */
+    long calls;        /* asked so far */
+    long fail_at;      /* the call, from 0, that is refused; -1: none */
+    int from_there_on; /* that and all after it */
+    /* blocks now; blocks given back with another size, or misaligned requests */
+    long live, wrong;
+    size_t bytes, most; /* now, and at most */
 } files_memory;
 
-typedef struct files_block { void *raw; size_t bytes; } files_block;
+typedef struct files_block {
+    void *raw;
+    size_t bytes;
+} files_block;
 
 static void *files_alloc(size_t bytes, size_t alignment, void *user)
 {
@@ -26,15 +31,18 @@ static void *files_alloc(size_t bytes, size_t alignment, void *user)
     const long call = m->calls++;
     files_block b;
     char *p;
-    if (m->fail_at >= 0 && (call == m->fail_at || (m->from_there_on && call > m->fail_at))) return NULL;
+    if (m->fail_at >= 0 && (call == m->fail_at || (m->from_there_on && call > m->fail_at)))
+        return NULL;
     if (bytes == 0 || alignment == 0 || (alignment & (alignment - 1))) m->wrong++;
-    b.raw = malloc(bytes + 2 * alignment + sizeof b); b.bytes = bytes;
+    b.raw = malloc(bytes + 2 * alignment + sizeof b);
+    b.bytes = bytes;
     if (!b.raw) return NULL;
     p = (char *)b.raw + sizeof b;
     p += alignment - (size_t)((uintptr_t)p & (alignment - 1));
     memcpy(p - sizeof b, &b, sizeof b);
-    memset(p, 0xcd, bytes);             /* zeroed is for the library to do */
-    m->live++; m->bytes += bytes;
+    memset(p, 0xcd, bytes); /* zeroed is for the library to do */
+    m->live++;
+    m->bytes += bytes;
     if (m->bytes > m->most) m->most = m->bytes;
     return p;
 }
@@ -45,12 +53,13 @@ static void files_free(void *memory, size_t bytes, void *user)
     files_block b;
     memcpy(&b, (char *)memory - sizeof b, sizeof b);
     if (b.bytes != bytes) m->wrong++;
-    m->live--; m->bytes -= b.bytes;
+    m->live--;
+    m->bytes -= b.bytes;
     memset(memory, 0xdd, b.bytes);
     free(b.raw);
 }
 
-/* --- a folder -------------------------------------------------------------------------------------------- */
+/* --- a folder --------------------------------------------------------------------------------- */
 
 static char files_folder[200];
 
@@ -69,8 +78,12 @@ static void files_begin(void)
     const char *base = getenv("TMPDIR");
     int i;
     for (i = 0; i < 1000; i++) {
-        sprintf(files_folder, "%.150s/gs4test_%ld_%d", base && *base ? base : "/tmp", (long)getpid(), i);
-        if (mkdir(files_folder, 0755) == 0) { strcat(files_folder, "/"); return; }
+        sprintf(files_folder, "%.150s/gs4test_%ld_%d", base && *base ? base : "/tmp",
+                (long)getpid(), i);
+        if (mkdir(files_folder, 0755) == 0) {
+            strcat(files_folder, "/");
+            return;
+        }
     }
 #endif
     strcpy(files_folder, "");
@@ -81,7 +94,8 @@ static void files_end(void)
 #ifdef FILES_UNIX
     if (!files_folder[0]) return;
     files_folder[strlen(files_folder) - 1] = 0;
-    CHECK(rmdir(files_folder) == 0);    /* fails when a test, or the library, has left something there */
+    /* fails when a test, or the library, has left something there */
+    CHECK(rmdir(files_folder) == 0);
 #endif
 }
 
@@ -106,9 +120,14 @@ static unsigned char *files_read(const char *path, size_t *size)
     long n;
     *size = 0;
     if (!f) return NULL;
-    fseek(f, 0, SEEK_END); n = ftell(f); rewind(f);
+    fseek(f, 0, SEEK_END);
+    n = ftell(f);
+    rewind(f);
     if (n >= 0) data = (unsigned char *)malloc((size_t)n + 1);
-    if (data) { *size = fread(data, 1, (size_t)n, f); data[*size] = 0; }
+    if (data) {
+        *size = fread(data, 1, (size_t)n, f);
+        data[*size] = 0;
+    }
     fclose(f);
     return data;
 }
@@ -122,45 +141,76 @@ static void files_write(const char *path, const void *data, size_t size)
     fclose(f);
 }
 
-/* --- the scene ------------------------------------------------------------------------------------------- */
+/* --- the scene -------------------------------------------------------------------------------- */
 
-static const int files_triangles[36] = { 0,2,1, 1,2,3, 4,5,6, 5,7,6, 0,1,4, 1,5,4, 2,6,3, 3,6,7, 0,4,2, 2,4,6, 1,3,5, 3,7,5 };
+static const int files_triangles[36] = { 0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
+                                         2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5 };
 static gs4_real files_cube[2][24];
 
 static void files_make_cube(gs4_real v[24], gs4_vec3 low, double side)
 {
     int i;
     for (i = 0; i < 8; i++) {
-        v[3 * i]     = low.x + (gs4_real)(i & 1 ? side : 0);
+        v[3 * i] = low.x + (gs4_real)(i & 1 ? side : 0);
         v[3 * i + 1] = low.y + (gs4_real)(i & 2 ? side : 0);
         v[3 * i + 2] = low.z + (gs4_real)(i & 4 ? side : 0);
     }
 }
 
-/* Whether the scene has heat, and with it all that a particle can carry: a solid that melts, its liquid viscoelastic; a flux that lags; a hot body, mouth and wall. */
+/* Whether the scene has heat, and with it all that a particle can carry: a solid that melts, its
+ * liquid viscoelastic; a flux that lags; a hot body, mouth and wall. */
 static int files_warm;
 
 static void files_warm_material(gs4_material *m, int which)
 {
     if (!files_warm) return;
-    m->heat_capacity = 1000; m->conductivity = (gs4_real)(which == 2 ? 0 : 100); m->viscous_heating = which == 4;
-    if (which == 0 || which == 3) { m->can_melt = 1; m->melting_temperature = 5; m->latent_heat = 500; m->solid = GS4_FIXED_COROTATED; m->shear_modulus = 1000; }
-    if (which == 1 || which == 3) { m->liquid = GS4_OLDROYD_B; m->local_fraction = (gs4_real)0.5; m->relaxation_time = (gs4_real)0.1; }
-    if (which == 1 || which == 5) { m->flux_relaxation_time = (gs4_real)0.01; m->fourier_fraction = (gs4_real)0.3; }
+    m->heat_capacity = 1000;
+    m->conductivity = (gs4_real)(which == 2 ? 0 : 100);
+    m->viscous_heating = which == 4;
+    if (which == 0 || which == 3) {
+        m->can_melt = 1;
+        m->melting_temperature = 5;
+        m->latent_heat = 500;
+        m->solid = GS4_FIXED_COROTATED;
+        m->shear_modulus = 1000;
+    }
+    if (which == 1 || which == 3) {
+        m->liquid = GS4_OLDROYD_B;
+        m->local_fraction = (gs4_real)0.5;
+        m->relaxation_time = (gs4_real)0.1;
+    }
+    if (which == 1 || which == 5) {
+        m->flux_relaxation_time = (gs4_real)0.01;
+        m->fourier_fraction = (gs4_real)0.3;
+    }
 }
 
 static gs4_sim_desc files_desc(int euler)
 {
     gs4_sim_desc d = scene_cube(8);
     d.gravity = at(0, 0, -10);
-    d.walls[1] = GS4_WALL_SEPARATE; d.walls[2] = d.walls[3] = GS4_WALL_PERIODIC; d.walls[5] = GS4_WALL_OPEN;
-    if (euler) d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER;
-    else { d.rho_inf = (gs4_real)0.6; d.rho_inf_spurious = (gs4_real)0.2; d.sharp_gradients = !files_warm; }
-    if (files_warm) { d.wall_is_isothermal[0] = d.air_is_isothermal = 1; d.wall_temperature[0] = 50; d.ambient_temperature = -3; }
+    d.walls[1] = GS4_WALL_SEPARATE;
+    d.walls[2] = d.walls[3] = GS4_WALL_PERIODIC;
+    d.walls[5] = GS4_WALL_OPEN;
+    if (euler)
+        d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER;
+    else {
+        d.rho_inf = (gs4_real)0.6;
+        d.rho_inf_spurious = (gs4_real)0.2;
+        d.sharp_gradients = !files_warm;
+    }
+    if (files_warm) {
+        d.wall_is_isothermal[0] = d.air_is_isothermal = 1;
+        d.wall_temperature[0] = 50;
+        d.ambient_temperature = -3;
+    }
     return d;
 }
 
-enum { FILES_MATERIALS = 6, FILES_STAGES = 15 };
+enum {
+    FILES_MATERIALS = 6,
+    FILES_STAGES = 15
+};
 
 /* One stage of making the scene; each is all or nothing. */
 static int files_build(gs4_sim *sim, int stage)
@@ -169,23 +219,62 @@ static int files_build(gs4_sim *sim, int stage)
     gs4_fill f = scene_fill(at(0.5, 0, -1));
     gs4_collider c;
     gs4_emitter e;
-    memset(&c, 0, sizeof c); memset(&e, 0, sizeof e);
+    memset(&c, 0, sizeof c);
+    memset(&e, 0, sizeof e);
     files_make_cube(files_cube[0], at(0.5, 0.5, 0.5), 0.25);
     files_make_cube(files_cube[1], at(0.7, 0.1, -0.05), 0.2);
-    c.pivot = at(0.8, 0.2, 0.05); c.temperature = 40; c.is_isothermal = files_warm;
+    c.pivot = at(0.8, 0.2, 0.05);
+    c.temperature = 40;
+    c.is_isothermal = files_warm;
     f.temperature = (gs4_real)(files_warm ? -2 : 0);
     switch (stage) {
-    case 0: case 1: case 2: case 3: case 4: case 5: m.density = (gs4_real)(1000 + 100 * stage); files_warm_material(&m, stage); return gs4_add_material(sim, &m);
-    case 6: return gs4_add_particles(sim, gs4_box(at(0.125, 0.125, 0.125), at(0.375, 0.375, 0.375)), &f);
-    case 7: f.material = files_warm ? 3 : 1; f.velocity = at(-1, 0.5, 0); return gs4_add_particles(sim, gs4_mesh(files_cube[0], 8, files_triangles, 12), &f);
-    case 8: c.shape = gs4_mesh(files_cube[1], 8, files_triangles, 12); c.angular_velocity = at(0, 0, 1); return gs4_add_collider(sim, &c);
-    case 9: c.shape = gs4_sphere(at(0.2, 0.8, 0.1), (gs4_real)0.15); c.contact = GS4_WALL_SEPARATE; c.friction = (gs4_real)0.2; c.velocity = at(0.1, 0, 0); return gs4_add_collider(sim, &c);
-    case 10: e.shape = gs4_box(at(0.25, 0.25, 0.8), at(0.5, 0.5, 0.9)); e.fill = f; e.fill.temperature *= -8; e.fill.velocity = at(0, 0, -1); e.travel = at(0.2, 0, 0); return gs4_add_emitter(sim, &e);
-    case 11: e.shape = gs4_sphere(at(0.7, 0.6, 0.9), (gs4_real)0.08); e.fill = f; e.fill.velocity = at(0, 0.3, -1.5); e.start = (gs4_real)0.01; return gs4_add_emitter(sim, &e);
+    case 0:
+    case 1:
+    case 2:
+    case 3:
+    case 4:
+    case 5:
+        m.density = (gs4_real)(1000 + 100 * stage);
+        files_warm_material(&m, stage);
+        return gs4_add_material(sim, &m);
+    case 6:
+        return gs4_add_particles(sim, gs4_box(at(0.125, 0.125, 0.125), at(0.375, 0.375, 0.375)),
+                                 &f);
+    case 7:
+        f.material = files_warm ? 3 : 1;
+        f.velocity = at(-1, 0.5, 0);
+        return gs4_add_particles(sim, gs4_mesh(files_cube[0], 8, files_triangles, 12), &f);
+    case 8:
+        c.shape = gs4_mesh(files_cube[1], 8, files_triangles, 12);
+        c.angular_velocity = at(0, 0, 1);
+        return gs4_add_collider(sim, &c);
+    case 9:
+        c.shape = gs4_sphere(at(0.2, 0.8, 0.1), (gs4_real)0.15);
+        c.contact = GS4_WALL_SEPARATE;
+        c.friction = (gs4_real)0.2;
+        c.velocity = at(0.1, 0, 0);
+        return gs4_add_collider(sim, &c);
+    case 10:
+        e.shape = gs4_box(at(0.25, 0.25, 0.8), at(0.5, 0.5, 0.9));
+        e.fill = f;
+        e.fill.temperature *= -8;
+        e.fill.velocity = at(0, 0, -1);
+        e.travel = at(0.2, 0, 0);
+        return gs4_add_emitter(sim, &e);
+    case 11:
+        e.shape = gs4_sphere(at(0.7, 0.6, 0.9), (gs4_real)0.08);
+        e.fill = f;
+        e.fill.velocity = at(0, 0.3, -1.5);
+        e.start = (gs4_real)0.01;
+        return gs4_add_emitter(sim, &e);
     case 12: c.shape = gs4_box(at(0, 0, 0), at(0.1, 0.1, 0.1)); return gs4_add_collider(sim, &c);
-    case 13: c.shape = gs4_plane(at(0, 0, 0.02), at(0.1, 0, 1)); c.contact = GS4_WALL_SLIP; return gs4_add_collider(sim, &c);
+    case 13:
+        c.shape = gs4_plane(at(0, 0, 0.02), at(0.1, 0, 1));
+        c.contact = GS4_WALL_SLIP;
+        return gs4_add_collider(sim, &c);
     default: {
-        const gs4_real x[6] = { (gs4_real)0.5, (gs4_real)0.5, (gs4_real)0.4, (gs4_real)0.55, (gs4_real)0.5, (gs4_real)0.4 };
+        const gs4_real x[6] = { (gs4_real)0.5,  (gs4_real)0.5, (gs4_real)0.4,
+                                (gs4_real)0.55, (gs4_real)0.5, (gs4_real)0.4 };
         f.material = 5;
         return gs4_add_points(sim, x, 2, (gs4_real)1e-4, &f);
     }
@@ -211,9 +300,11 @@ static int files_steps(gs4_sim *sim, int count)
     return r;
 }
 
-/* --- memory refused at every place ----------------------------------------------------------------------- */
+/* --- memory refused at every place ------------------------------------------------------------ */
 
-enum { FILES_RUN = 5 };                 /* steps of the scenario */
+enum {
+    FILES_RUN = 5
+}; /* steps of the scenario */
 
 /* The grid is long, so that what is loaded may be out of reach of what was there. */
 static gs4_sim_desc files_long_desc(int euler)
@@ -233,29 +324,39 @@ static int files_do(gs4_sim *sim, int stage)
     case 0: return gs4_save(sim, files_path("memory.sav"));
     case 1: return gs4_write_ply(sim, files_path("memory.ply"));
     case 2: return gs4_write_raw(sim, files_path("memory.npy"));
-    case 3: return gs4_load(sim, files_path("memory_late.sav"));        /* more particles, in more blocks */
+    /* more particles, in more blocks */
+    case 3: return gs4_load(sim, files_path("memory_late.sav"));
     case 4: return files_steps(sim, 1);
-    case 5: return gs4_load(sim, files_path("memory.sav"));             /* fewer again */
+    case 5: return gs4_load(sim, files_path("memory.sav")); /* fewer again */
     default: return files_steps(sim, 1);
     }
 }
-enum { FILES_ALL = FILES_STAGES + FILES_RUN + 7 };
+enum {
+    FILES_ALL = FILES_STAGES + FILES_RUN + 7
+};
 
-/* The whole scenario with one refusal; what was refused is done again. Returns the hash at the end. */
-static uint64_t files_scenario(int euler, files_memory *m, long fail_at, int from_there_on, long *refused)
+/* The whole scenario with one refusal; what was refused is done again. Returns the hash at the
+ * end. */
+static uint64_t files_scenario(int euler, files_memory *m, long fail_at, int from_there_on,
+                               long *refused)
 {
     gs4_sim_desc d = files_long_desc(euler);
     gs4_sim *sim = NULL;
     uint64_t hash = 0, before;
     int stage, r;
     memset(m, 0, sizeof *m);
-    m->fail_at = fail_at; m->from_there_on = from_there_on;
-    d.allocator.alloc_fn = files_alloc; d.allocator.free_fn = files_free; d.allocator.user = m;
+    m->fail_at = fail_at;
+    m->from_there_on = from_there_on;
+    d.allocator.alloc_fn = files_alloc;
+    d.allocator.free_fn = files_free;
+    d.allocator.user = m;
     *refused = 0;
     r = gs4_create(&d, &sim);
     if (r != GS4_OK) {
-        CHECK(r == GS4_ERROR_MEMORY && sim == NULL && m->live == 0 && m->bytes == 0 && gs4_last_error(NULL)[0]);
-        ++*refused; m->fail_at = -1;
+        CHECK(r == GS4_ERROR_MEMORY && sim == NULL && m->live == 0 && m->bytes == 0
+              && gs4_last_error(NULL)[0]);
+        ++*refused;
+        m->fail_at = -1;
         CHECK(gs4_create(&d, &sim) == GS4_OK);
     }
     for (stage = 0; stage < FILES_ALL && sim; stage++) {
@@ -265,13 +366,17 @@ static uint64_t files_scenario(int euler, files_memory *m, long fail_at, int fro
         ++*refused;
         if (r != GS4_ERROR_MEMORY || !gs4_last_error(sim)[0] || gs4_state_hash(sim) != before) {
             char line[200];
-            sprintf(line, "call %ld refused%s, integrator %d, stage %d: %d, hash %s", fail_at, from_there_on ? " and all after it" : "", euler, stage, r,
+            sprintf(line, "call %ld refused%s, integrator %d, stage %d: %d, hash %s", fail_at,
+                    from_there_on ? " and all after it" : "", euler, stage, r,
                     gs4_state_hash(sim) == before ? "as before" : "changed");
             test_report(0, __FILE__, __LINE__, line);
-        } else test_passed++;
-        CHECK(!files_leftover(files_path("memory.sav")) && !files_leftover(files_path("memory.ply")));
+        } else
+            test_passed++;
+        CHECK(!files_leftover(files_path("memory.sav"))
+              && !files_leftover(files_path("memory.ply")));
         m->fail_at = -1;
-        CHECK_RESULT(sim, files_do(sim, stage), 0);         /* and the same again, now that there is memory */
+        /* and the same again, now that there is memory */
+        CHECK_RESULT(sim, files_do(sim, stage), 0);
     }
     hash = gs4_state_hash(sim);
     CHECK(gs4_get_stats(sim).memory_bytes == m->bytes);
@@ -294,7 +399,9 @@ static void test_files_memory(void)
         int i;
         CHECK_RESULT(late, files_steps(late, 10), 0);
         x = gs4_edit_particles(late, GS4_FIELD_POSITION);
-        for (i = 0; i < x.count; i++) x.data[i * x.stride] = (gs4_real)(3.9 - 2.5 * (double)x.data[i * x.stride]);     /* spread over the rest of the grid */
+        /* spread over the rest of the grid */
+        for (i = 0; i < x.count; i++)
+            x.data[i * x.stride] = (gs4_real)(3.9 - 2.5 * (double)x.data[i * x.stride]);
         CHECK_RESULT(late, files_steps(late, 5), 0);
         CHECK_RESULT(late, gs4_save(late, files_path("memory_late.sav")), 0);
         gs4_destroy(late);
@@ -308,21 +415,28 @@ static void test_files_memory(void)
             CHECK(files_scenario(euler, &m, k, 1, &refused) == reference);
             CHECK(refused == 1);
         }
-        remove(files_path("memory.sav")); remove(files_path("memory.ply")); remove(files_path("memory.npy")); remove(files_path("memory_late.sav"));
+        remove(files_path("memory.sav"));
+        remove(files_path("memory.ply"));
+        remove(files_path("memory.npy"));
+        remove(files_path("memory_late.sav"));
         files_warm = 0;
     }
 }
 
-/* A state somewhere else in the grid, loaded while memory is refused: what the nodes remember here stays. */
+/* A state somewhere else in the grid, loaded while memory is refused: what the nodes remember
+ * here stays. */
 static gs4_sim *files_layer(gs4_vec3 high, files_memory *m)
 {
     gs4_sim_desc d = scene_cube(24);
     const gs4_material water = scene_liquid(1000, 0, 10);
     const gs4_fill f = scene_fill(at(1, 0, 0));
     gs4_sim *sim = NULL;
-    memset(m, 0, sizeof *m); m->fail_at = -1;
+    memset(m, 0, sizeof *m);
+    m->fail_at = -1;
     d.gravity = at(0, 0, -10);
-    d.allocator.alloc_fn = files_alloc; d.allocator.free_fn = files_free; d.allocator.user = m;
+    d.allocator.alloc_fn = files_alloc;
+    d.allocator.free_fn = files_free;
+    d.allocator.user = m;
     CHECK(gs4_create(&d, &sim) == GS4_OK);
     CHECK_RESULT(sim, gs4_add_material(sim, &water), 0);
     CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0, 0, 0), high), &f), 0);
@@ -348,11 +462,14 @@ static void test_files_load_refused(void)
             m.fail_at = -1;
             CHECK(r == GS4_OK || (r == GS4_ERROR_MEMORY && gs4_state_hash(column) == hash));
         }
-        if (r == GS4_OK && k >= 0) k = 1000;
+        if (r == GS4_OK && k >= 0)
+            k = 1000;
         else {
             CHECK_RESULT(column, files_steps(column, 5), 0);
             if (k < 0) reference = gs4_state_hash(column);
-            else CHECK(gs4_state_hash(column) == reference);        /* and it goes on as if nothing had been */
+            /* and it goes on as if nothing had been */
+            else
+                CHECK(gs4_state_hash(column) == reference);
         }
         gs4_destroy(column);
         CHECK(m.live == 0 && m.wrong == 0);
@@ -361,37 +478,58 @@ static void test_files_load_refused(void)
     remove(files_path("layer.sav"));
 }
 
-/* --- frames ---------------------------------------------------------------------------------------------- */
+/* --- frames ----------------------------------------------------------------------------------- */
 
 static double files_number(const unsigned char *p, const char *type)
 {
-    float f; double d; uint32_t u;
-    if (!strcmp(type, "float") || !strcmp(type, "<f4")) { memcpy(&f, p, 4); return (double)f; }
-    if (!strcmp(type, "double") || !strcmp(type, "<f8")) { memcpy(&d, p, 8); return d; }
-    if (!strcmp(type, "uint") || !strcmp(type, "<u4")) { memcpy(&u, p, 4); return (double)u; }
+    float f;
+    double d;
+    uint32_t u;
+    if (!strcmp(type, "float") || !strcmp(type, "<f4")) {
+        memcpy(&f, p, 4);
+        return (double)f;
+    }
+    if (!strcmp(type, "double") || !strcmp(type, "<f8")) {
+        memcpy(&d, p, 8);
+        return d;
+    }
+    if (!strcmp(type, "uint") || !strcmp(type, "<u4")) {
+        memcpy(&u, p, 4);
+        return (double)u;
+    }
     return (double)*p;
 }
 
 static size_t files_size_of(const char *type)
 {
-    return !strcmp(type, "uchar") || !strcmp(type, "|u1") ? 1 : !strcmp(type, "double") || !strcmp(type, "<f8") ? 8 : 4;
+    return !strcmp(type, "uchar") || !strcmp(type, "|u1")    ? 1
+           : !strcmp(type, "double") || !strcmp(type, "<f8") ? 8
+                                                             : 4;
 }
 
 /* What column `name`, component c, of particle i must hold; NAN: no such column. */
 static double files_expected(const gs4_sim *sim, const char *name, int c, int i)
 {
     static const char *const ply[] = { "x", "y", "z", "vx", "vy", "vz" };
-    const gs4_view x = gs4_particles(sim, GS4_FIELD_POSITION), v = gs4_particles(sim, GS4_FIELD_VELOCITY);
+    const gs4_view x = gs4_particles(sim, GS4_FIELD_POSITION),
+                   v = gs4_particles(sim, GS4_FIELD_VELOCITY);
     int k;
     for (k = 0; k < 6; k++)
-        if (!strcmp(name, ply[k])) return (double)(k < 3 ? x.data[(size_t)i * (size_t)x.stride + (size_t)k] : v.data[(size_t)i * (size_t)v.stride + (size_t)k - 3]);
+        if (!strcmp(name, ply[k]))
+            return (double)(k < 3 ? x.data[(size_t)i * (size_t)x.stride + (size_t)k]
+                                  : v.data[(size_t)i * (size_t)v.stride + (size_t)k - 3]);
     if (!strcmp(name, "position")) return (double)x.data[(size_t)i * (size_t)x.stride + (size_t)c];
     if (!strcmp(name, "velocity")) return (double)v.data[(size_t)i * (size_t)v.stride + (size_t)c];
-    if (!strcmp(name, "volume_ratio")) { const gs4_view j = gs4_particles(sim, GS4_FIELD_VOLUME_RATIO); return (double)j.data[(size_t)i * (size_t)j.stride]; }
-    if (!strncmp(name, "stress_", 7) || !strncmp(name, "flux_", 5) || !strcmp(name, "stress") || !strcmp(name, "flux")) {
+    if (!strcmp(name, "volume_ratio")) {
+        const gs4_view j = gs4_particles(sim, GS4_FIELD_VOLUME_RATIO);
+        return (double)j.data[(size_t)i * (size_t)j.stride];
+    }
+    if (!strncmp(name, "stress_", 7) || !strncmp(name, "flux_", 5) || !strcmp(name, "stress")
+        || !strcmp(name, "flux")) {
         static const char *const axes[9] = { "xx", "yy", "zz", "xy", "xz", "yz", "x", "y", "z" };
         const gs4_view s = gs4_particles(sim, name[0] == 's' ? GS4_FIELD_STRESS : GS4_FIELD_FLUX);
-        for (k = name[0] == 's' ? 0 : 6; strchr(name, '_') && k < 9; k++) if (!strcmp(strchr(name, '_') + 1, axes[k])) c = k % 6;
+        for (k = name[0] == 's' ? 0 : 6; strchr(name, '_') && k < 9; k++)
+            if (!strcmp(strchr(name, '_') + 1, axes[k])) c = k % 6;
         return s.data ? (double)s.data[(size_t)i * (size_t)s.stride + (size_t)c] : (double)NAN;
     }
     if (!strncmp(name, "F_", 2) || !strcmp(name, "deformation")) {
@@ -400,19 +538,27 @@ static double files_expected(const gs4_sim *sim, const char *name, int c, int i)
         return F.data ? (double)F.data[(size_t)i * (size_t)F.stride + (size_t)c] : (double)NAN;
     }
     if (!strcmp(name, "temperature") || !strcmp(name, "liquid_fraction")) {
-        const gs4_view T = gs4_particles(sim, name[0] == 't' ? GS4_FIELD_TEMPERATURE : GS4_FIELD_LIQUID_FRACTION);
+        const gs4_view T =
+            gs4_particles(sim, name[0] == 't' ? GS4_FIELD_TEMPERATURE : GS4_FIELD_LIQUID_FRACTION);
         return T.data ? (double)T.data[(size_t)i * (size_t)T.stride] : (double)NAN;
     }
-    if (!strcmp(name, "mass")) { const gs4_view m = gs4_particles(sim, GS4_FIELD_MASS); return (double)m.data[(size_t)i * (size_t)m.stride]; }
+    if (!strcmp(name, "mass")) {
+        const gs4_view m = gs4_particles(sim, GS4_FIELD_MASS);
+        return (double)m.data[(size_t)i * (size_t)m.stride];
+    }
     if (!strcmp(name, "id")) return (double)gs4_particle_ids(sim)[i];
     if (!strcmp(name, "material")) return (double)gs4_particle_materials(sim)[i];
     return (double)NAN;
 }
 
-typedef struct files_column { char name[40], type[16]; int numbers; } files_column;
+typedef struct files_column {
+    char name[40], type[16];
+    int numbers;
+} files_column;
 
 /* Records behind the header against the views. */
-static void files_compare(const gs4_sim *sim, const unsigned char *at_byte, size_t left, const files_column *c, int columns)
+static void files_compare(const gs4_sim *sim, const unsigned char *at_byte, size_t left,
+                          const files_column *c, int columns)
 {
     const int count = gs4_get_stats((gs4_sim *)(uintptr_t)sim).particles;
     size_t record = 0;
@@ -420,11 +566,14 @@ static void files_compare(const gs4_sim *sim, const unsigned char *at_byte, size
     for (k = 0; k < columns; k++) record += (size_t)c[k].numbers * files_size_of(c[k].type);
     CHECK(left == record * (size_t)count);
     if (left != record * (size_t)count) return;
-    for (i = 0; i < count; i++) for (k = 0; k < columns; k++) for (n = 0; n < c[k].numbers; n++) {
-        const double expected = files_expected(sim, c[k].name, n, i), value = files_number(at_byte, c[k].type);
-        wrong += !(value >= expected && value <= expected);
-        at_byte += files_size_of(c[k].type);
-    }
+    for (i = 0; i < count; i++)
+        for (k = 0; k < columns; k++)
+            for (n = 0; n < c[k].numbers; n++) {
+                const double expected = files_expected(sim, c[k].name, n, i),
+                             value = files_number(at_byte, c[k].type);
+                wrong += !(value >= expected && value <= expected);
+                at_byte += files_size_of(c[k].type);
+            }
     CHECK(wrong == 0);
 }
 
@@ -441,15 +590,26 @@ static void files_check_ply(const gs4_sim *sim, const char *path)
     CHECK(strncmp(line, "format binary_little_endian 1.0\n", 32) == 0);
     while ((end = strchr(line, '\n')) != NULL && columns < 32) {
         *end = 0;
-        if (strcmp(line, "end_header") == 0) { found = 1; break; }
-        if (strncmp(line, "element", 7) == 0) CHECK(sscanf(line, "element vertex %d", &vertices) == 1);
-        if (strncmp(line, "property", 8) == 0) { CHECK(sscanf(line, "property %15s %39s", c[columns].type, c[columns].name) == 2); c[columns++].numbers = 1; }
+        if (strcmp(line, "end_header") == 0) {
+            found = 1;
+            break;
+        }
+        if (strncmp(line, "element", 7) == 0)
+            CHECK(sscanf(line, "element vertex %d", &vertices) == 1);
+        if (strncmp(line, "property", 8) == 0) {
+            CHECK(sscanf(line, "property %15s %39s", c[columns].type, c[columns].name) == 2);
+            c[columns++].numbers = 1;
+        }
         line = end + 1;
     }
     CHECK(found && vertices == gs4_get_stats((gs4_sim *)(uintptr_t)sim).particles);
-    for (i = 0; i < columns; i++) for (k = 0; k < i; k++) CHECK(strcmp(c[i].name, c[k].name) != 0);
-    CHECK(columns == (files_warm ? 30 : 10) && !strcmp(c[0].name, "x") && !strcmp(c[3].name, "vx") && !strcmp(c[5].name, "vz"));
-    if (found) files_compare(sim, (unsigned char *)end + 1, size - (size_t)((unsigned char *)end + 1 - data), c, columns);
+    for (i = 0; i < columns; i++)
+        for (k = 0; k < i; k++) CHECK(strcmp(c[i].name, c[k].name) != 0);
+    CHECK(columns == (files_warm ? 30 : 10) && !strcmp(c[0].name, "x") && !strcmp(c[3].name, "vx")
+          && !strcmp(c[5].name, "vz"));
+    if (found)
+        files_compare(sim, (unsigned char *)end + 1,
+                      size - (size_t)((unsigned char *)end + 1 - data), c, columns);
     free(data);
 }
 
@@ -471,12 +631,18 @@ static void files_check_npy(const gs4_sim *sim, const char *path)
     while (p && columns < 32 && (p = strstr(p, "('")) != NULL) {
         CHECK(sscanf(p, "('%39[a-z_]', '%15[a-z0-9<|]'", c[columns].name, c[columns].type) == 2);
         shape_of = strchr(strchr(p, ',') + 1, '\'') + strlen(c[columns].type) + 2;
-        c[columns].numbers = strncmp(shape_of, ", (3,))", 7) == 0 ? 3 : strncmp(shape_of, ", (6,))", 7) == 0 ? 6 : strncmp(shape_of, ", (3, 3))", 9) == 0 ? 9 : 1;
-        columns++; p += 2;
+        c[columns].numbers = strncmp(shape_of, ", (3,))", 7) == 0     ? 3
+                             : strncmp(shape_of, ", (6,))", 7) == 0   ? 6
+                             : strncmp(shape_of, ", (3, 3))", 9) == 0 ? 9
+                                                                      : 1;
+        columns++;
+        p += 2;
     }
     p = strstr((char *)data + 10, "'shape': (");
-    CHECK(p && sscanf(p, "'shape': (%d,)", &shape) == 1 && shape == gs4_get_stats((gs4_sim *)(uintptr_t)sim).particles);
-    CHECK(columns == (files_warm ? 11 : 6) && c[0].numbers == 3 && c[1].numbers == 3 && c[2].numbers == 1);
+    CHECK(p && sscanf(p, "'shape': (%d,)", &shape) == 1
+          && shape == gs4_get_stats((gs4_sim *)(uintptr_t)sim).particles);
+    CHECK(columns == (files_warm ? 11 : 6) && c[0].numbers == 3 && c[1].numbers == 3
+          && c[2].numbers == 1);
     files_compare(sim, data + head, size - head, c, columns);
     free(data);
 }
@@ -493,7 +659,8 @@ static void test_files_frames(void)
         files_check_ply(sim, files_path("a.ply"));
         CHECK_RESULT(sim, files_steps(sim, 25), 0);
         CHECK(gs4_state_hash(sim) != h);
-        CHECK_RESULT(sim, gs4_write_ply(sim, files_path("a.ply")), 0);      /* over the one before */
+        /* over the one before */
+        CHECK_RESULT(sim, gs4_write_ply(sim, files_path("a.ply")), 0);
         CHECK_RESULT(sim, gs4_write_raw(sim, files_path("a.npy")), 0);
         CHECK(!files_leftover(files_path("a.ply")) && !files_leftover(files_path("a.npy")));
         files_check_ply(sim, files_path("a.ply"));
@@ -505,12 +672,14 @@ static void test_files_frames(void)
         files_check_ply(empty, files_path("a.ply"));
         files_check_npy(empty, files_path("a.npy"));
         if (warm) CHECK(gs4_get_stats(sim).max_temperature > gs4_get_stats(sim).min_temperature);
-        remove(files_path("a.ply")); remove(files_path("a.npy"));
-        gs4_destroy(sim); gs4_destroy(empty);
+        remove(files_path("a.ply"));
+        remove(files_path("a.npy"));
+        gs4_destroy(sim);
+        gs4_destroy(empty);
     }
 }
 
-/* --- places that cannot be written to -------------------------------------------------------------------- */
+/* --- places that cannot be written to --------------------------------------------------------- */
 
 typedef int (*files_writer)(gs4_sim *sim, const char *path);
 
@@ -520,8 +689,13 @@ static int files_write_with(gs4_sim *sim, int which, const char *path)
     return writers[which](sim, path);
 }
 
-#define FILES_REFUSED(call, code) do { const uint64_t files_h = gs4_state_hash(sim); CHECK_RESULT(sim, call, code); \
-    CHECK(gs4_last_error(sim)[0] != 0); CHECK(gs4_state_hash(sim) == files_h); } while (0)
+#define FILES_REFUSED(call, code)                     \
+    do {                                              \
+        const uint64_t files_h = gs4_state_hash(sim); \
+        CHECK_RESULT(sim, call, code);                \
+        CHECK(gs4_last_error(sim)[0] != 0);           \
+        CHECK(gs4_state_hash(sim) == files_h);        \
+    } while (0)
 
 static void test_files_places(void)
 {
@@ -539,7 +713,8 @@ static void test_files_places(void)
     {
         struct stat s;
         char long_path[6000];
-        memset(long_path, 'x', sizeof long_path); long_path[sizeof long_path - 1] = 0;
+        memset(long_path, 'x', sizeof long_path);
+        long_path[sizeof long_path - 1] = 0;
         CHECK(mkdir(files_path("folder"), 0755) == 0 && mkdir(files_path("full"), 0755) == 0);
         files_write(files_path("full/file"), "1234", 4);
         for (w = 0; w < 4; w++) {
@@ -547,35 +722,48 @@ static void test_files_places(void)
             FILES_REFUSED(files_write_with(sim, w, files_path("folder")), GS4_ERROR_IO);
             FILES_REFUSED(files_write_with(sim, w, files_path("folder/")), GS4_ERROR_IO);
             FILES_REFUSED(files_write_with(sim, w, long_path), GS4_ERROR_IO);
-            CHECK(stat(files_path("folder"), &s) == 0 && S_ISDIR(s.st_mode));           /* an empty folder is still one */
-            remove(files_path("folder")); mkdir(files_path("folder"), 0755);
-            CHECK(!files_leftover(files_path("full")) && !files_leftover(files_path("folder")) && !files_exists(files_path("folder/.tmp")));
-            if (files_exists("/dev/full") && w < 3) FILES_REFUSED(files_write_with(sim, w, "/dev/full"), GS4_ERROR_IO);
-            if (files_exists("/dev/null") && w < 3) CHECK_RESULT(sim, files_write_with(sim, w, "/dev/null"), 0);
+            /* an empty folder is still one */
+            CHECK(stat(files_path("folder"), &s) == 0 && S_ISDIR(s.st_mode));
+            remove(files_path("folder"));
+            mkdir(files_path("folder"), 0755);
+            CHECK(!files_leftover(files_path("full")) && !files_leftover(files_path("folder"))
+                  && !files_exists(files_path("folder/.tmp")));
+            if (files_exists("/dev/full") && w < 3)
+                FILES_REFUSED(files_write_with(sim, w, "/dev/full"), GS4_ERROR_IO);
+            if (files_exists("/dev/null") && w < 3)
+                CHECK_RESULT(sim, files_write_with(sim, w, "/dev/null"), 0);
         }
         if (files_exists("/dev/null")) FILES_REFUSED(gs4_load(sim, "/dev/null"), GS4_ERROR_FORMAT);
         CHECK(!files_exists("/dev/full.tmp") && !files_exists("/dev/null.tmp"));
         if (geteuid() != 0) {
             CHECK(chmod(files_path("folder"), 0555) == 0);
-            for (w = 0; w < 3; w++) FILES_REFUSED(files_write_with(sim, w, files_path("folder/file")), GS4_ERROR_IO);
-            CHECK(!files_exists(files_path("folder/file")) && !files_leftover(files_path("folder/file")));
+            for (w = 0; w < 3; w++)
+                FILES_REFUSED(files_write_with(sim, w, files_path("folder/file")), GS4_ERROR_IO);
+            CHECK(!files_exists(files_path("folder/file"))
+                  && !files_leftover(files_path("folder/file")));
         }
-        remove(files_path("full/file")); remove(files_path("full")); remove(files_path("folder"));
+        remove(files_path("full/file"));
+        remove(files_path("full"));
+        remove(files_path("folder"));
     }
 #endif
     CHECK_RESULT(sim, files_steps(sim, 3), 0);
     gs4_destroy(sim);
 }
 
-/* The disk is full in the midst of a file, or its neighbour cannot be made: the file from before is as it was. */
+/* The disk is full in the midst of a file, or its neighbour cannot be made: the file from before
+ * is as it was. */
 static void test_files_previous(void)
 {
     gs4_sim_desc d = files_desc(0);
     gs4_sim *sim;
     files_memory m;
     int w;
-    memset(&m, 0, sizeof m); m.fail_at = -1;
-    d.allocator.alloc_fn = files_alloc; d.allocator.free_fn = files_free; d.allocator.user = &m;
+    memset(&m, 0, sizeof m);
+    m.fail_at = -1;
+    d.allocator.alloc_fn = files_alloc;
+    d.allocator.free_fn = files_free;
+    d.allocator.user = &m;
     sim = files_scene(&d);
     CHECK_RESULT(sim, files_steps(sim, 3), 0);
     for (w = 0; w < 3; w++) {
@@ -597,7 +785,8 @@ static void test_files_previous(void)
             CHECK(getrlimit(RLIMIT_FSIZE, &old) == 0);
             signal(SIGXFSZ, SIG_IGN);
             for (i = 0; i < sizeof limits / sizeof limits[0]; i++) {
-                low = old; low.rlim_cur = limits[i];
+                low = old;
+                low.rlim_cur = limits[i];
                 if (setrlimit(RLIMIT_FSIZE, &low) != 0) continue;
                 FILES_REFUSED(files_write_with(sim, w, path), GS4_ERROR_IO);
                 CHECK(setrlimit(RLIMIT_FSIZE, &old) == 0);
@@ -610,7 +799,8 @@ static void test_files_previous(void)
 #endif
         after = files_read(path, &size_after);
         CHECK(before && after && size == size_after && memcmp(before, after, size) == 0);
-        free(before); free(after);
+        free(before);
+        free(after);
         CHECK_RESULT(sim, files_write_with(sim, w, path), 0);
         CHECK(!files_leftover(path));
         remove(path);
@@ -619,9 +809,10 @@ static void test_files_previous(void)
     CHECK(m.live == 0);
 }
 
-/* --- checkpoints ----------------------------------------------------------------------------------------- */
+/* --- checkpoints ------------------------------------------------------------------------------ */
 
-/* Saved after n steps, loaded into a new simulation, into the same one later, and saved again from there: the same bits. */
+/* Saved after n steps, loaded into a new simulation, into the same one later, and saved again
+ * from there: the same bits. */
 static void files_continue(const gs4_sim_desc *d, int n)
 {
     gs4_sim *sim = files_scene(d), *other = files_scene(d);
@@ -630,7 +821,8 @@ static void files_continue(const gs4_sim_desc *d, int n)
     uint64_t saved, later;
     gs4_real limit;
     CHECK_RESULT(sim, files_steps(sim, n), 0);
-    saved = gs4_state_hash(sim); limit = gs4_stable_dt(sim);
+    saved = gs4_state_hash(sim);
+    limit = gs4_stable_dt(sim);
     CHECK_RESULT(sim, gs4_save(sim, files_path("c.sav")), 0);
     CHECK(gs4_state_hash(sim) == saved && !files_leftover(files_path("c.sav")));
     CHECK_RESULT(sim, files_steps(sim, 20), 0);
@@ -643,35 +835,39 @@ static void files_continue(const gs4_sim_desc *d, int n)
     CHECK(gs4_state_hash(other) == later);
     CHECK(gs4_get_stats(other).steps == gs4_get_stats(sim).steps);
     CHECK_CLOSE(gs4_get_stats(other).time, gs4_get_stats(sim).time, 0);
-    CHECK_RESULT(sim, gs4_load(sim, files_path("c.sav")), 0);               /* back in time */
+    CHECK_RESULT(sim, gs4_load(sim, files_path("c.sav")), 0); /* back in time */
     CHECK(gs4_state_hash(sim) == saved);
     CHECK_RESULT(sim, files_steps(sim, 20), 0);
     CHECK(gs4_state_hash(sim) == later);
     CHECK_RESULT(other, gs4_load(other, files_path("c.sav")), 0);
     a = files_read(files_path("c.sav"), &size);
-    CHECK_RESULT(other, gs4_save(other, files_path("c.sav")), 0);           /* the file's own copy of itself */
+    /* the file's own copy of itself */
+    CHECK_RESULT(other, gs4_save(other, files_path("c.sav")), 0);
     b = files_read(files_path("c.sav"), &size_again);
     CHECK(size == size_again);
-    free(a); free(b);
+    free(a);
+    free(b);
     remove(files_path("c.sav"));
-    gs4_destroy(sim); gs4_destroy(other);
+    gs4_destroy(sim);
+    gs4_destroy(other);
 }
 
 static void test_files_continue(void)
 {
     static const int steps[] = { 0, 1, 2, 7, 40 };
     int which, i;
-    for (which = 0; which < 4; which++) for (i = 0; i < 5; i++) {
-        const int euler = which % 2;
-        gs4_sim_desc d;
-        files_warm = which / 2;
-        d = files_desc(euler);
-        files_continue(&d, steps[i]);
-        d.flip_decay_time = (gs4_real)(euler ? 0 : INFINITY);
-        d.max_particles = 3000;
-        if (steps[i] == 7) files_continue(&d, steps[i]);
-        files_warm = 0;
-    }
+    for (which = 0; which < 4; which++)
+        for (i = 0; i < 5; i++) {
+            const int euler = which % 2;
+            gs4_sim_desc d;
+            files_warm = which / 2;
+            d = files_desc(euler);
+            files_continue(&d, steps[i]);
+            d.flip_decay_time = (gs4_real)(euler ? 0 : INFINITY);
+            d.max_particles = 3000;
+            if (steps[i] == 7) files_continue(&d, steps[i]);
+            files_warm = 0;
+        }
 }
 
 /* The sound speed that a scene has chosen for itself holds for what is frozen, too. */
@@ -684,9 +880,15 @@ static void test_files_continue_frozen(void)
     gs4_edit v;
     int i;
     d.gravity = at(0, -10, 0);
-    m.heat_capacity = 1000; m.conductivity = 1; m.can_melt = 1; m.solid = GS4_NEO_HOOKEAN; m.shear_modulus = 1000; f.temperature = -5;
+    m.heat_capacity = 1000;
+    m.conductivity = 1;
+    m.can_melt = 1;
+    m.solid = GS4_NEO_HOOKEAN;
+    m.shear_modulus = 1000;
+    f.temperature = -5;
     CHECK(gs4_create(&d, &sim) == GS4_OK && gs4_create(&d, &other) == GS4_OK);
-    CHECK_RESULT(sim, gs4_add_material(sim, &m), 0); CHECK_RESULT(other, gs4_add_material(other, &m), 0);
+    CHECK_RESULT(sim, gs4_add_material(sim, &m), 0);
+    CHECK_RESULT(other, gs4_add_material(other, &m), 0);
     CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0.2, 0, 0.2), at(0.7, 0.5, 0.7)), &f), 0);
     CHECK_RESULT(sim, files_steps(sim, 5), 0);
     v = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
@@ -694,10 +896,12 @@ static void test_files_continue_frozen(void)
     CHECK_RESULT(sim, gs4_step(sim, (gs4_real)1e-4), 0);
     CHECK_RESULT(sim, gs4_save(sim, files_path("f.sav")), 0);
     CHECK_RESULT(other, gs4_load(other, files_path("f.sav")), 0);
-    CHECK_RESULT(sim, files_steps(sim, 20), 0); CHECK_RESULT(other, files_steps(other, 20), 0);
+    CHECK_RESULT(sim, files_steps(sim, 20), 0);
+    CHECK_RESULT(other, files_steps(other, 20), 0);
     CHECK(gs4_state_hash(sim) == gs4_state_hash(other));
     remove(files_path("f.sav"));
-    gs4_destroy(sim); gs4_destroy(other);
+    gs4_destroy(sim);
+    gs4_destroy(other);
 }
 
 /* After something was changed by hand, and while particles leave. */
@@ -710,7 +914,8 @@ static void test_files_continue_edited(void)
         gs4_edit v;
         uint64_t h;
         d.walls[0] = d.walls[1] = GS4_WALL_OPEN;
-        sim = files_scene(&d); other = files_scene(&d);
+        sim = files_scene(&d);
+        other = files_scene(&d);
         CHECK_RESULT(sim, files_steps(sim, 10), 0);
         v = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
         for (i = 0; i < v.count; i += 3) v.data[i * v.stride] += (gs4_real)2;
@@ -720,14 +925,17 @@ static void test_files_continue_edited(void)
         CHECK_RESULT(sim, files_steps(sim, 30), 0);
         h = gs4_state_hash(sim);
         CHECK_RESULT(other, gs4_load(other, files_path("e.sav")), 0);
-        for (i = 0; i < 30; i++) {                          /* saving and loading at every step changes nothing */
+        /* saving and loading at every step changes nothing */
+        for (i = 0; i < 30; i++) {
             CHECK_RESULT(other, files_steps(other, 1), 0);
             CHECK_RESULT(other, gs4_save(other, files_path("f.sav")), 0);
             CHECK_RESULT(other, gs4_load(other, files_path("f.sav")), 0);
         }
         CHECK(gs4_state_hash(other) == h);
-        remove(files_path("e.sav")); remove(files_path("f.sav"));
-        gs4_destroy(sim); gs4_destroy(other);
+        remove(files_path("e.sav"));
+        remove(files_path("f.sav"));
+        gs4_destroy(sim);
+        gs4_destroy(other);
     }
 }
 
@@ -749,10 +957,11 @@ static void test_files_bad_edit(void)
         if (r == GS4_OK) CHECK_RESULT(other, gs4_step(other, (gs4_real)1e-4), GS4_ERROR_ARGUMENT);
     }
     remove(files_path("n.sav"));
-    gs4_destroy(sim); gs4_destroy(other);
+    gs4_destroy(sim);
+    gs4_destroy(other);
 }
 
-/* --- damaged checkpoints ----------------------------------------------------------------------------------- */
+/* --- damaged checkpoints ---------------------------------------------------------------------- */
 
 /* A small scene, so that its file can be cut at every place. */
 static gs4_sim *files_small(int euler, int steps)
@@ -760,7 +969,8 @@ static gs4_sim *files_small(int euler, int steps)
     gs4_sim_desc d = files_desc(euler);
     gs4_sim *sim = NULL;
     int stage;
-    d.cells[0] = d.cells[1] = d.cells[2] = 4; d.cell_size = (gs4_real)0.25;
+    d.cells[0] = d.cells[1] = d.cells[2] = 4;
+    d.cell_size = (gs4_real)0.25;
     CHECK(gs4_create(&d, &sim) == GS4_OK);
     for (stage = 0; stage < 7; stage++) CHECK_RESULT(sim, files_build(sim, stage), 0);
     CHECK_RESULT(sim, files_build(sim, 9), 0);
@@ -770,16 +980,19 @@ static gs4_sim *files_small(int euler, int steps)
 }
 
 /* Loading this must fail with FORMAT and change nothing. */
-static void files_reject(gs4_sim *sim, uint64_t hash, const void *data, size_t size, const char *what, size_t where)
+static void files_reject(gs4_sim *sim, uint64_t hash, const void *data, size_t size,
+                         const char *what, size_t where)
 {
     const char *path = files_path("bad.sav");
     int r;
     files_write(path, data, size);
     r = gs4_load(sim, path);
-    if (r == GS4_ERROR_FORMAT && gs4_last_error(sim)[0] && gs4_state_hash(sim) == hash) test_passed++;
+    if (r == GS4_ERROR_FORMAT && gs4_last_error(sim)[0] && gs4_state_hash(sim) == hash)
+        test_passed++;
     else {
         char line[200];
-        sprintf(line, "%.100s %lu: %d, %s", what, (unsigned long)where, r, gs4_state_hash(sim) == hash ? "state as before" : "state changed");
+        sprintf(line, "%.100s %lu: %d, %s", what, (unsigned long)where, r,
+                gs4_state_hash(sim) == hash ? "state as before" : "state changed");
         test_report(0, __FILE__, __LINE__, line);
     }
     remove(path);
@@ -795,25 +1008,31 @@ static void test_files_damaged(void)
         size_t size = 0, n, i;
         unsigned char *data, *more;
         files_warm = which / 2;
-        sim = files_small(euler, 12); to = files_small(euler, 5);
+        sim = files_small(euler, 12);
+        to = files_small(euler, 5);
         hash = gs4_state_hash(to);
         CHECK_RESULT(sim, gs4_save(sim, files_path("good.sav")), 0);
         data = files_read(files_path("good.sav"), &size);
         CHECK(data && size > 2000);
-        for (n = 0; n < size; n += n < 600 ? 1 : n < 20000 ? 97 : 997) files_reject(to, hash, data, n, "cut to", n);
+        for (n = 0; n < size; n += n < 600 ? 1 : n < 20000 ? 97 : 997)
+            files_reject(to, hash, data, n, "cut to", n);
         for (n = 1; n <= 16; n++) files_reject(to, hash, data, size - n, "cut short by", n);
         for (i = 0; i < 300; i++) {
-            const size_t at_byte = i < 60 ? i * 4 : i < 100 ? size - 1 - (i - 60) : (size_t)(gs4i_mix(i) % size);
+            const size_t at_byte = i < 60    ? i * 4
+                                   : i < 100 ? size - 1 - (i - 60)
+                                             : (size_t)(gs4i_mix(i) % size);
             data[at_byte] ^= (unsigned char)(1u << (i % 8));
             files_reject(to, hash, data, size, "bit flipped at byte", at_byte);
             data[at_byte] ^= (unsigned char)(1u << (i % 8));
         }
         more = (unsigned char *)malloc(size + 100);
         if (more) {
-            memcpy(more, data, size); memset(more + size, 0, 100);
+            memcpy(more, data, size);
+            memset(more + size, 0, 100);
             files_reject(to, hash, more, size + 1, "longer by", 1);
             files_reject(to, hash, more, size + 100, "longer by", 100);
-            memcpy(more, data + size / 2, size - size / 2); memcpy(more + size - size / 2, data, size / 2);
+            memcpy(more, data + size / 2, size - size / 2);
+            memcpy(more + size - size / 2, data, size / 2);
             files_reject(to, hash, more, size, "halves swapped", 0);
             for (i = 0; i < size; i++) more[i] = (unsigned char)gs4i_mix(i);
             for (n = 1; n <= size; n *= 3) files_reject(to, hash, more, n, "noise of length", n);
@@ -826,12 +1045,15 @@ static void test_files_damaged(void)
         CHECK_RESULT(sim, gs4_write_ply(sim, files_path("x.ply")), 0);
         CHECK_RESULT(to, gs4_load(to, files_path("x.ply")), GS4_ERROR_FORMAT);
         CHECK(gs4_state_hash(to) == hash);
-        CHECK_RESULT(to, gs4_load(to, files_path("good.sav")), 0);          /* and the whole file still works */
+        /* and the whole file still works */
+        CHECK_RESULT(to, gs4_load(to, files_path("good.sav")), 0);
         CHECK(gs4_state_hash(to) == gs4_state_hash(sim));
         CHECK_RESULT(to, files_steps(to, 3), 0);
         free(data);
-        remove(files_path("good.sav")); remove(files_path("x.ply"));
-        gs4_destroy(sim); gs4_destroy(to);
+        remove(files_path("good.sav"));
+        remove(files_path("x.ply"));
+        gs4_destroy(sim);
+        gs4_destroy(to);
         files_warm = 0;
     }
 }
@@ -843,19 +1065,24 @@ static void test_files_endless(void)
     gs4_sim *sim = NULL;
     files_memory m;
     unsigned char *junk = (unsigned char *)calloc(1, 6000000);
-    memset(&m, 0, sizeof m); m.fail_at = -1;
-    d.allocator.alloc_fn = files_alloc; d.allocator.free_fn = files_free; d.allocator.user = &m;
+    memset(&m, 0, sizeof m);
+    m.fail_at = -1;
+    d.allocator.alloc_fn = files_alloc;
+    d.allocator.free_fn = files_free;
+    d.allocator.user = &m;
     CHECK(gs4_create(&d, &sim) == GS4_OK);
     if (junk) files_write(files_path("junk"), junk, 6000000);
     m.most = 0;
     CHECK_RESULT(sim, gs4_load(sim, files_path("junk")), GS4_ERROR_FORMAT);
     CHECK(m.most < 2000000);
-    if (m.most < 2000000 && files_exists("/dev/zero")) CHECK_RESULT(sim, gs4_load(sim, "/dev/zero"), GS4_ERROR_FORMAT);
-    free(junk); remove(files_path("junk"));
+    if (m.most < 2000000 && files_exists("/dev/zero"))
+        CHECK_RESULT(sim, gs4_load(sim, "/dev/zero"), GS4_ERROR_FORMAT);
+    free(junk);
+    remove(files_path("junk"));
     gs4_destroy(sim);
 }
 
-/* --- checkpoints of another scene ---------------------------------------------------------------------------- */
+/* --- checkpoints of another scene ------------------------------------------------------------- */
 
 static void test_files_other_desc(void)
 {
@@ -885,7 +1112,7 @@ static void test_files_other_desc(void)
         case 12: o.ambient_temperature = 1; break;
         case 13: o.air_is_isothermal = 1; break;
         case 14: o.sharp_gradients = 0; break;
-        default: o = files_desc(1); break;                  /* the other integrator */
+        default: o = files_desc(1); break; /* the other integrator */
         }
         sim = files_scene(&o);
         CHECK_RESULT(sim, files_steps(sim, 3), 0);
@@ -894,12 +1121,17 @@ static void test_files_other_desc(void)
         CHECK_RESULT(sim, files_steps(sim, 3), 0);
         gs4_destroy(sim);
     }
-    {                                                       /* the other precision: the size of gs4_real stands behind magic and version */
+    /* the other precision: the size of gs4_real stands behind magic and version */
+    {
         gs4_sim *sim = files_scene(&d);
         const uint32_t other = sizeof(gs4_real) == 8 ? 4 : 8;
         data = files_read(files_path("d.sav"), &size);
         CHECK(data != NULL && size > 16);
-        if (data) { memcpy(data + 12, &other, 4); files_write(files_path("d.sav"), data, size); free(data); }
+        if (data) {
+            memcpy(data + 12, &other, 4);
+            files_write(files_path("d.sav"), data, size);
+            free(data);
+        }
         FILES_REFUSED(gs4_load(sim, files_path("d.sav")), GS4_ERROR_FORMAT);
         CHECK(strstr(gs4_last_error(sim), "precision") != NULL);
         gs4_destroy(sim);
@@ -908,9 +1140,16 @@ static void test_files_other_desc(void)
     gs4_destroy(from);
 }
 
-static gs4_real files_viscosity(gs4_real temperature, gs4_real rate, void *user) { (void)temperature; (void)rate; (void)user; return (gs4_real)0.1; }
+static gs4_real files_viscosity(gs4_real temperature, gs4_real rate, void *user)
+{
+    (void)temperature;
+    (void)rate;
+    (void)user;
+    return (gs4_real)0.1;
+}
 
-/* A scene whose numbers of materials, colliders and emitters agree with the file, but which is another one. */
+/* A scene whose numbers of materials, colliders and emitters agree with the file, but which is
+ * another one. */
 static gs4_sim *files_variant(int which)
 {
     const gs4_sim_desc d = files_desc(0);
@@ -924,21 +1163,37 @@ static gs4_sim *files_variant(int which)
     if (which == 1) m.density = 2000;
     if (which == 2) m.viscosity = 1;
     if (which == 3) m.sound_speed = 7;
-    if (which == 4) { m.viscosity_law = GS4_VISCOSITY_CALLBACK; m.viscosity_fn = files_viscosity; }
+    if (which == 4) {
+        m.viscosity_law = GS4_VISCOSITY_CALLBACK;
+        m.viscosity_fn = files_viscosity;
+    }
     CHECK_RESULT(sim, gs4_add_material(sim, &m), 0);
-    memset(&c, 0, sizeof c); memset(&e, 0, sizeof e);
-    c.shape = which == 5 ? gs4_box(at(0.4, 0.4, 0), at(0.6, 0.6, 0.2)) : gs4_sphere(at(0.5, 0.5, 0.1), (gs4_real)(which == 6 ? 0.05 : 0.1));
+    memset(&c, 0, sizeof c);
+    memset(&e, 0, sizeof e);
+    c.shape = which == 5 ? gs4_box(at(0.4, 0.4, 0), at(0.6, 0.6, 0.2))
+                         : gs4_sphere(at(0.5, 0.5, 0.1), (gs4_real)(which == 6 ? 0.05 : 0.1));
     if (which == 7) c.contact = GS4_WALL_SLIP;
-    e.shape = which == 8 ? gs4_sphere(at(0.5, 0.5, 0.8), (gs4_real)0.1) : gs4_box(at(0.4, 0.4, 0.7), at(0.6, 0.6, 0.9));
+    e.shape = which == 8 ? gs4_sphere(at(0.5, 0.5, 0.8), (gs4_real)0.1)
+                         : gs4_box(at(0.4, 0.4, 0.7), at(0.6, 0.6, 0.9));
     e.fill = scene_fill(at(0, 0, which == 9 ? -1.0 : -0.5));
     for (i = 0; i < 2; i++) {
-        if ((which == 10) != (i == 1)) CHECK_RESULT(sim, gs4_add_emitter(sim, &e), 0);      /* 10: in the other order */
-        else CHECK_RESULT(sim, gs4_add_collider(sim, &c), 0);
+        /* 10: in the other order */
+        if ((which == 10) != (i == 1))
+            CHECK_RESULT(sim, gs4_add_emitter(sim, &e), 0);
+        else
+            CHECK_RESULT(sim, gs4_add_collider(sim, &c), 0);
     }
-    if (which == 11) { CHECK_RESULT(sim, gs4_add_material(sim, &m), 0); }
-    if (which == 12) { CHECK_RESULT(sim, gs4_add_collider(sim, &c), 0); }
-    if (which == 13) { CHECK_RESULT(sim, gs4_add_emitter(sim, &e), 0); }
-    CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0.25, 0.25, 0.25), at(0.5, 0.5, 0.5)), &f), 0);
+    if (which == 11) {
+        CHECK_RESULT(sim, gs4_add_material(sim, &m), 0);
+    }
+    if (which == 12) {
+        CHECK_RESULT(sim, gs4_add_collider(sim, &c), 0);
+    }
+    if (which == 13) {
+        CHECK_RESULT(sim, gs4_add_emitter(sim, &e), 0);
+    }
+    CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0.25, 0.25, 0.25), at(0.5, 0.5, 0.5)), &f),
+                 0);
     CHECK_RESULT(sim, files_steps(sim, 5), 0);
     return sim;
 }
@@ -957,12 +1212,15 @@ static void test_files_padding(void)
         gs4i_copy_members(&m, &all);
         CHECK(gs4_create(&d, &sim[k]) == GS4_OK);
         CHECK_RESULT(sim[k], gs4_add_material(sim[k], &m), 0);
-        CHECK_RESULT(sim[k], gs4_add_particles(sim[k], gs4_box(at(0.25, 0.25, 0.25), at(0.5, 0.5, 0.5)), &f), 0);
+        CHECK_RESULT(
+            sim[k], gs4_add_particles(sim[k], gs4_box(at(0.25, 0.25, 0.25), at(0.5, 0.5, 0.5)), &f),
+            0);
         CHECK_RESULT(sim[k], files_steps(sim[k], 3), 0);
     }
     CHECK_RESULT(sim[0], gs4_save(sim[0], files_path("s.sav")), 0);
     CHECK_RESULT(sim[1], gs4_load(sim[1], files_path("s.sav")), 0);
-    gs4_destroy(sim[0]); gs4_destroy(sim[1]);
+    gs4_destroy(sim[0]);
+    gs4_destroy(sim[1]);
 }
 
 static void test_files_other_scene(void)
@@ -976,32 +1234,41 @@ static void test_files_other_scene(void)
         const int r = gs4_load(sim, files_path("s.sav"));
         char line[80];
         sprintf(line, "checkpoint loaded into variant %d of its scene: %d", which, r);
-        test_report(which == 0 ? r == GS4_OK : r == GS4_ERROR_FORMAT && gs4_last_error(sim)[0] && gs4_state_hash(sim) == h, __FILE__, __LINE__, line);
+        test_report(which == 0 ? r == GS4_OK
+                               : r == GS4_ERROR_FORMAT && gs4_last_error(sim)[0]
+                                     && gs4_state_hash(sim) == h,
+                    __FILE__, __LINE__, line);
         CHECK_RESULT(sim, files_steps(sim, 3), 0);
         gs4_destroy(sim);
     }
-    for (which = 0; which < 2; which++) {                   /* one has heat, the other has none; the descriptions agree */
+    /* one has heat, the other has none; the descriptions agree */
+    for (which = 0; which < 2; which++) {
         gs4_sim *other;
         int stage;
         for (stage = 0; stage < 2; stage++) {
             const gs4_sim_desc d = files_desc(0);
             gs4_material m = scene_liquid(1000, 0.1, 6);
             const gs4_fill f = scene_fill(at(0, 0, 0));
-            m.heat_capacity = 1000; m.conductivity = (gs4_real)(stage == which);
+            m.heat_capacity = 1000;
+            m.conductivity = (gs4_real)(stage == which);
             CHECK(gs4_create(&d, &other) == GS4_OK);
             CHECK_RESULT(other, gs4_add_material(other, &m), 0);
-            CHECK_RESULT(other, gs4_add_particles(other, gs4_box(at(0.25, 0.25, 0.25), at(0.5, 0.5, 0.5)), &f), 0);
+            CHECK_RESULT(
+                other,
+                gs4_add_particles(other, gs4_box(at(0.25, 0.25, 0.25), at(0.5, 0.5, 0.5)), &f), 0);
             CHECK_RESULT(other, files_steps(other, 5), 0);
-            if (stage == 0) CHECK_RESULT(other, gs4_save(other, files_path("s.sav")), 0);
+            if (stage == 0)
+                CHECK_RESULT(other, gs4_save(other, files_path("s.sav")), 0);
             else {
                 const uint64_t h = gs4_state_hash(other);
                 CHECK_RESULT(other, gs4_load(other, files_path("s.sav")), GS4_ERROR_FORMAT);
-                CHECK(strstr(gs4_last_error(other), "other materials") != NULL && gs4_state_hash(other) == h);
+                CHECK(strstr(gs4_last_error(other), "other materials") != NULL
+                      && gs4_state_hash(other) == h);
             }
             gs4_destroy(other);
         }
     }
-    {                                                       /* too many particles for here */
+    { /* too many particles for here */
         gs4_sim_desc d = files_desc(0);
         gs4_sim *big = files_scene(&d), *sim;
         CHECK_RESULT(big, files_steps(big, 10), 0);
@@ -1010,9 +1277,11 @@ static void test_files_other_scene(void)
         sim = files_scene(&d);
         {
             const uint64_t h = gs4_state_hash(sim);
-            CHECK(gs4_load(sim, files_path("s.sav")) < 0 && strstr(gs4_last_error(sim), "max_particles") && gs4_state_hash(sim) == h);
+            CHECK(gs4_load(sim, files_path("s.sav")) < 0
+                  && strstr(gs4_last_error(sim), "max_particles") && gs4_state_hash(sim) == h);
         }
-        gs4_destroy(sim); gs4_destroy(big);
+        gs4_destroy(sim);
+        gs4_destroy(big);
     }
     remove(files_path("s.sav"));
     gs4_destroy(from);

@@ -1,9 +1,16 @@
 /* Heat in material at rest and in motion, melting and freezing. */
 
-typedef struct heat_bar { int n; double F, tau, conductivity, dt, time; gs4_integrator integrator; double rho, spurious; int periodic; double about; } heat_bar;
+typedef struct heat_bar {
+    int n;
+    double F, tau, conductivity, dt, time;
+    gs4_integrator integrator;
+    double rho, spurious;
+    int periodic;
+    double about;
+} heat_bar;
 
-/* T = about + cos x, q_NL = 0 at the start in a bar with insulated ends at 0 and pi (periodic: 0 and 2 pi), density and capacity 1: amplitudes of
- * T and of the non-local flux at `time`. */
+/* T = about + cos x, q_NL = 0 at the start in a bar with insulated ends at 0 and pi (periodic: 0
+ * and 2 pi), density and capacity 1: amplitudes of T and of the non-local flux at `time`. */
 static void heat_mode(const heat_bar *b, double *a, double *flux)
 {
     const double length = acos(-1.0) * (b->periodic ? 2 : 1);
@@ -15,93 +22,153 @@ static void heat_mode(const heat_bar *b, double *a, double *flux)
     gs4_view x, q;
     gs4_edit T;
     int i, steps = (int)(b->time / b->dt + 0.5);
-    d.cells[1] = d.cells[2] = 4; d.cell_size = (gs4_real)(length / b->n);
-    d.rho_inf = (gs4_real)b->rho; d.rho_inf_spurious = (gs4_real)b->spurious; d.integrator = b->integrator;
+    d.cells[1] = d.cells[2] = 4;
+    d.cell_size = (gs4_real)(length / b->n);
+    d.rho_inf = (gs4_real)b->rho;
+    d.rho_inf_spurious = (gs4_real)b->spurious;
+    d.integrator = b->integrator;
     if (sizeof(gs4_real) == 8) d.solver_tolerance = (gs4_real)1e-9;
     if (b->periodic) d.walls[0] = d.walls[1] = GS4_WALL_PERIODIC;
-    m.heat_capacity = 1; m.conductivity = (gs4_real)b->conductivity; m.flux_relaxation_time = (gs4_real)b->tau; m.fourier_fraction = (gs4_real)b->F;
+    m.heat_capacity = 1;
+    m.conductivity = (gs4_real)b->conductivity;
+    m.flux_relaxation_time = (gs4_real)b->tau;
+    m.fourier_fraction = (gs4_real)b->F;
     sim = physics_create(&d, &m);
-    CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(length, 1e6, 1e6)), &f), GS4_OK);
-    x = gs4_particles(sim, GS4_FIELD_POSITION); T = gs4_edit_particles(sim, GS4_FIELD_TEMPERATURE);
-    for (i = 0; i < T.count; i++) T.data[(size_t)i * (size_t)T.stride] = (gs4_real)(b->about + cos((double)x.data[(size_t)i * (size_t)x.stride]));
+    CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(length, 1e6, 1e6)), &f),
+                 GS4_OK);
+    x = gs4_particles(sim, GS4_FIELD_POSITION);
+    T = gs4_edit_particles(sim, GS4_FIELD_TEMPERATURE);
+    for (i = 0; i < T.count; i++)
+        T.data[(size_t)i * (size_t)T.stride] =
+            (gs4_real)(b->about + cos((double)x.data[(size_t)i * (size_t)x.stride]));
     for (i = 0; i < steps; i++) CHECK_RESULT(sim, gs4_step(sim, (gs4_real)b->dt), GS4_OK);
-    x = gs4_particles(sim, GS4_FIELD_POSITION); q = gs4_particles(sim, GS4_FIELD_FLUX);
+    x = gs4_particles(sim, GS4_FIELD_POSITION);
+    q = gs4_particles(sim, GS4_FIELD_FLUX);
     T = gs4_edit_particles(sim, GS4_FIELD_TEMPERATURE);
     *a = *flux = 0;
     for (i = 0; i < T.count; i++) {
         const double at_x = (double)x.data[(size_t)i * (size_t)x.stride];
-        *a += ((double)T.data[(size_t)i * (size_t)T.stride] - b->about) * cos(at_x); norm += cos(at_x) * cos(at_x);
+        *a += ((double)T.data[(size_t)i * (size_t)T.stride] - b->about) * cos(at_x);
+        norm += cos(at_x) * cos(at_x);
         if (q.data) *flux += (double)q.data[(size_t)i * (size_t)q.stride] * sin(at_x);
     }
-    *a /= norm; *flux /= norm;
+    *a /= norm;
+    *flux /= norm;
     gs4_destroy(sim);
 }
 
-/* a' = -F kappa a - b, tau b' = (1 - F) kappa a - b, by many steps of a Taylor series of fourth order. */
-static void heat_mode_exact(double F, double tau, double conductivity, double time, double *a, double *b)
+/* a' = -F kappa a - b, tau b' = (1 - F) kappa a - b, by many steps of a Taylor series of fourth
+ * order. */
+static void heat_mode_exact(double F, double tau, double conductivity, double time, double *a,
+                            double *b)
 {
     const int steps = 20000;
     const double h = time / steps;
     int i, order;
-    *a = 1; *b = 0;
-    if (tau == 0) { *a = exp(-conductivity * time); return; }
+    *a = 1;
+    *b = 0;
+    if (tau == 0) {
+        *a = exp(-conductivity * time);
+        return;
+    }
     for (i = 0; i < steps; i++) {
         double da = *a, db = *b, sum_a = *a, sum_b = *b;
         for (order = 1; order <= 4; order++) {
-            const double na = -F * conductivity * da - db, nb = ((1 - F) * conductivity * da - db) / tau;
-            da = na * h / order; db = nb * h / order;
-            sum_a += da; sum_b += db;
+            const double na = -F * conductivity * da - db,
+                         nb = ((1 - F) * conductivity * da - db) / tau;
+            da = na * h / order;
+            db = nb * h / order;
+            sum_a += da;
+            sum_b += db;
         }
-        *a = sum_a; *b = sum_b;
+        *a = sum_a;
+        *b = sum_b;
     }
 }
 
-/* Fourier, Cattaneo (a wave where 4 kappa tau > 1) and mixed: spatial order >= 1.8. The exact solution agrees with rows of the shared reference, which was
- * made independently. */
+/* Fourier, Cattaneo (a wave where 4 kappa tau > 1) and mixed: spatial order >= 1.8. The exact
+ * solution agrees with rows of the shared reference, which was made independently. */
 static void test_heat_modes(void)
 {
     static const double cases[4][2] = { { 1, 0 }, { 0, 1 }, { 0.5, 1 }, { 0, 10 } };
-    static const double reference[4][2] = { { 0.3678794411714423, 0 }, { 0.6597001533917017, 0.533507195114693 },
-        { 0.4824163053713996, 0.219334403297799 }, { 0.9520249000369154, 0.09358471268634983 } };       /* heat_modes.csv: kappa 1, k 1, b0 0, t 1 */
+    static const double reference[4][2] = { { 0.3678794411714423, 0 },
+                                            { 0.6597001533917017, 0.533507195114693 },
+                                            /* heat_modes.csv: kappa 1, k 1, b0 0, t 1 */
+                                            { 0.4824163053713996, 0.219334403297799 },
+                                            { 0.9520249000369154, 0.09358471268634983 } };
     int c, i;
     for (c = 0; c < 4; c++)
         for (i = 0; i < (test_slow || c == 1 ? 2 : 1); i++) {
-            heat_bar bar = { c == 2 ? 16 : 8, cases[c][0], cases[c][1], 1, i ? 0.005 : 0.02, 1, physics_integrators[i], 0, 0, c == 2, 0 };
+            heat_bar bar = { c == 2 ? 16 : 8,
+                             cases[c][0],
+                             cases[c][1],
+                             1,
+                             i ? 0.005 : 0.02,
+                             1,
+                             physics_integrators[i],
+                             0,
+                             0,
+                             c == 2,
+                             0 };
             double exact, exact_flux, coarse, fine, flux;
             heat_mode_exact(bar.F, bar.tau, 1, 1, &exact, &exact_flux);
-            CHECK_CLOSE(exact, reference[c][0], 1e-12); CHECK_CLOSE(exact_flux, reference[c][1], 1e-12);
+            CHECK_CLOSE(exact, reference[c][0], 1e-12);
+            CHECK_CLOSE(exact_flux, reference[c][1], 1e-12);
             heat_mode(&bar, &coarse, &flux);
-            bar.n *= 2; if (i) bar.dt /= 4;
+            bar.n *= 2;
+            if (i) bar.dt /= 4;
             heat_mode(&bar, &fine, &flux);
-            if (test_filter[0]) printf("F %g tau %g, %s: error %.2e, %.2e with twice the cells, flux %.2e\n", bar.F, bar.tau, i ? "Euler" : "GS4", coarse - exact, fine - exact, flux - exact_flux);
+            if (test_filter[0])
+                printf("F %g tau %g, %s: error %.2e, %.2e with twice the cells, flux %.2e\n", bar.F,
+                       bar.tau, i ? "Euler" : "GS4", coarse - exact, fine - exact,
+                       flux - exact_flux);
             CHECK(fabs(fine - exact) < 0.002);
             CHECK(log2(fabs(coarse - exact) / fabs(fine - exact)) > 1.8);
-            CHECK_CLOSE(flux, exact_flux, (i ? 0.007 : 0.005) * exact_flux);     /* half a per cent at 32 cells a wave; Euler: and of first order in dt */
+            /* half a per cent at 32 cells a wave; Euler: and of first order in dt */
+            CHECK_CLOSE(flux, exact_flux, (i ? 0.007 : 0.005) * exact_flux);
         }
 }
 
-/* Second order in time for any member of the family that the explicit scheme takes, against a step 16 times smaller. With rho_inf = 1 all of them
- * are one where heat is: alpha_f = 1/2 and alpha_m = gamma, so y** = y and y += dt R whatever rho_s is. So (1, 1), which has no explicit step,
- * gives what (1, 0) and (1, 0.9) do. */
+/* Second order in time for any member of the family that the explicit scheme takes, against a
+ * step 16 times smaller. With rho_inf = 1 all of them are one where heat is: alpha_f = 1/2 and
+ * alpha_m = gamma, so y** = y and y += dt R whatever rho_s is. So (1, 1), which has no explicit
+ * step, gives what (1, 0) and (1, 0.9) do. */
 static void test_heat_order_in_time(void)
 {
-    static const double members[5][2] = { { 0, 0 }, { 0.5, 0 }, { 1, 0 }, { 0.5, 0.5 }, { 1, 0.9 } };
+    static const double members[5][2] = {
+        { 0, 0 }, { 0.5, 0 }, { 1, 0 }, { 0.5, 0.5 }, { 1, 0.9 }
+    };
     static const double kinds[3][2] = { { 1, 0 }, { 0, 1 }, { 0.5, 0.3 } };
     double crank_nicolson[3] = { 0, 0, 0 };
     int c, k;
     if (sizeof(gs4_real) != 8) return;
     for (c = 0; c < 5; c += test_slow ? 1 : 4)
         for (k = 0; k < 3; k++) {
-            heat_bar bar = { 16, kinds[k][0], kinds[k][1], 1, 0.02, 0.4, GS4_INTEGRATOR_GS4, members[c][0], members[c][1], 0, 0 };
+            heat_bar bar = { 16,
+                             kinds[k][0],
+                             kinds[k][1],
+                             1,
+                             0.02,
+                             0.4,
+                             GS4_INTEGRATOR_GS4,
+                             members[c][0],
+                             members[c][1],
+                             0,
+                             0 };
             double a[3], flux[3];
             heat_mode(&bar, &a[0], &flux[0]);
-            bar.dt = 0.01; heat_mode(&bar, &a[1], &flux[1]);
-            bar.dt = 0.01 / 16; heat_mode(&bar, &a[2], &flux[2]);
-            if (test_filter[0]) printf("(%g, %g) F %g tau %g: order %.2f, of the flux %.2f\n", bar.rho, bar.spurious, bar.F, bar.tau,
-                log2((a[0] - a[2]) / (a[1] - a[2])), bar.tau > 0 ? log2((flux[0] - flux[2]) / (flux[1] - flux[2])) : 0);
+            bar.dt = 0.01;
+            heat_mode(&bar, &a[1], &flux[1]);
+            bar.dt = 0.01 / 16;
+            heat_mode(&bar, &a[2], &flux[2]);
+            if (test_filter[0])
+                printf("(%g, %g) F %g tau %g: order %.2f, of the flux %.2f\n", bar.rho,
+                       bar.spurious, bar.F, bar.tau, log2((a[0] - a[2]) / (a[1] - a[2])),
+                       bar.tau > 0 ? log2((flux[0] - flux[2]) / (flux[1] - flux[2])) : 0);
             CHECK(log2(fabs(a[0] - a[2]) / fabs(a[1] - a[2])) > 1.9);
             if (c == 2) crank_nicolson[k] = a[0];
-            if (c == 4 && test_slow) CHECK_CLOSE(a[0], crank_nicolson[k], 1e-9);        /* to what the solver leaves */
+            /* to what the solver leaves */
+            if (c == 4 && test_slow) CHECK_CLOSE(a[0], crank_nicolson[k], 1e-9);
             if (bar.tau > 0) CHECK(log2(fabs(flux[0] - flux[2]) / fabs(flux[1] - flux[2])) > 1.9);
         }
 }
@@ -109,22 +176,31 @@ static void test_heat_order_in_time(void)
 /* Diffusion numbers to 1e9 and relaxation times from 1e-12 to 1e6 s: never above the start. */
 static void test_heat_stiff(void)
 {
-    static const double cases[7][3] = { { 1, 0, 1e7 }, { 1, 0, 1 }, { 0, 1e-12, 1 }, { 0.5, 1e-12, 1e7 }, { 0, 1e6, 1 }, { 0, 1e6, 1e9 }, { 0.3, 1, 1e-9 } };
+    static const double cases[7][3] = { { 1, 0, 1e7 },       { 1, 0, 1 },   { 0, 1e-12, 1 },
+                                        { 0.5, 1e-12, 1e7 }, { 0, 1e6, 1 }, { 0, 1e6, 1e9 },
+                                        { 0.3, 1, 1e-9 } };
     int c, i;
     for (c = 0; c < 7; c++)
         for (i = 0; i < 2; i++) {
-            heat_bar bar = { 8, cases[c][0], cases[c][1], cases[c][2], 10, 100, GS4_INTEGRATOR_GS4, i ? 0.9 : 0, i ? 0.5 : 0, 0, 0 };
+            heat_bar bar = { 8,   cases[c][0],        cases[c][1], cases[c][2], 10,
+                             100, GS4_INTEGRATOR_GS4, i ? 0.9 : 0, i ? 0.5 : 0, 0,
+                             0 };
             double a, flux;
             heat_mode(&bar, &a, &flux);
-            if (test_filter[0]) printf("F %g tau %g k %g: %.3g %.3g\n", bar.F, bar.tau, bar.conductivity, a, flux);
+            if (test_filter[0])
+                printf("F %g tau %g k %g: %.3g %.3g\n", bar.F, bar.tau, bar.conductivity, a, flux);
             CHECK(fabs(a) <= 1.0001);
         }
 }
 
-/* A Gaussian pulse spreads (shared reference heat_pulse: width 0.1 at the start, kappa 1, t 0.1), one-dimensional. */
+/* A Gaussian pulse spreads (shared reference heat_pulse: width 0.1 at the start, kappa 1, t
+ * 0.1), one-dimensional. */
 static void test_heat_pulse(void)
 {
-    static const double reference[4][2] = { { 0, 0.21821789023599 }, { 0.25, 0.188045609346 }, { 0.5, 0.12033216553018 }, { 1, 0.020176966452446 } };
+    static const double reference[4][2] = { { 0, 0.21821789023599 },
+                                            { 0.25, 0.188045609346 },
+                                            { 0.5, 0.12033216553018 },
+                                            { 1, 0.020176966452446 } };
     const int n = 128;
     gs4_sim_desc d = scene_cube(n);
     gs4_material m = scene_liquid(1, 0, 1e-3);
@@ -133,16 +209,24 @@ static void test_heat_pulse(void)
     gs4_view x, v;
     gs4_edit T;
     int i, r;
-    d.cells[1] = d.cells[2] = 4; d.cell_size = (gs4_real)(4.0 / n); d.origin = at(-2, 0, 0);
-    m.heat_capacity = 1; m.conductivity = 1;
+    d.cells[1] = d.cells[2] = 4;
+    d.cell_size = (gs4_real)(4.0 / n);
+    d.origin = at(-2, 0, 0);
+    m.heat_capacity = 1;
+    m.conductivity = 1;
     sim = physics_create(&d, &m);
     CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(-2, 0, 0), at(2, 1e6, 1e6)), &f), GS4_OK);
-    x = gs4_particles(sim, GS4_FIELD_POSITION); T = gs4_edit_particles(sim, GS4_FIELD_TEMPERATURE);
-    for (i = 0; i < T.count; i++) { const double X = (double)x.data[(size_t)i * (size_t)x.stride]; T.data[(size_t)i * (size_t)T.stride] = (gs4_real)exp(-50 * X * X); }
+    x = gs4_particles(sim, GS4_FIELD_POSITION);
+    T = gs4_edit_particles(sim, GS4_FIELD_TEMPERATURE);
+    for (i = 0; i < T.count; i++) {
+        const double X = (double)x.data[(size_t)i * (size_t)x.stride];
+        T.data[(size_t)i * (size_t)T.stride] = (gs4_real)exp(-50 * X * X);
+    }
     for (i = 0; i < 50; i++) CHECK_RESULT(sim, gs4_step(sim, (gs4_real)0.002), GS4_OK);
-    x = gs4_particles(sim, GS4_FIELD_POSITION); v = gs4_particles(sim, GS4_FIELD_TEMPERATURE);
+    x = gs4_particles(sim, GS4_FIELD_POSITION);
+    v = gs4_particles(sim, GS4_FIELD_TEMPERATURE);
     for (r = 0; r < 4; r++) {
-        double near = 0, far = 0;                           /* the two particles on both sides */
+        double near = 0, far = 0; /* the two particles on both sides */
         for (i = 0; i < v.count; i++) {
             const double to = (double)x.data[(size_t)i * (size_t)x.stride] - reference[r][0];
             if (to > 0 && to < 1.0 / 64) near = (double)v.data[(size_t)i * (size_t)v.stride];
@@ -153,7 +237,8 @@ static void test_heat_pulse(void)
     gs4_destroy(sim);
 }
 
-/* A ball of radius 1 and temperature 1 in air at 0: mean temperature at some times, in all over m c. */
+/* A ball of radius 1 and temperature 1 in air at 0: mean temperature at some times, in all over
+ * m c. */
 static void heat_ball(int n, double *mean)
 {
     static const double times[3] = { 0.03, 0.1, 0.2 };
@@ -163,38 +248,46 @@ static void heat_ball(int n, double *mean)
     gs4_sim *sim;
     double centre, time = 0;
     int r, i;
-    d.cell_size = (gs4_real)(1.0 / n); d.air_is_isothermal = 1;
+    d.cell_size = (gs4_real)(1.0 / n);
+    d.air_is_isothermal = 1;
     centre = 0.5 * (2 * n + 8) / n + 0.3 / n;
-    m.heat_capacity = 1; m.conductivity = 1;
+    m.heat_capacity = 1;
+    m.conductivity = 1;
     f.temperature = 1;
     sim = physics_create(&d, &m);
-    CHECK_RESULT(sim, gs4_add_particles(sim, gs4_sphere(at(centre, centre, centre), 1), &f), GS4_OK);
+    CHECK_RESULT(sim, gs4_add_particles(sim, gs4_sphere(at(centre, centre, centre), 1), &f),
+                 GS4_OK);
     for (r = 0; r < 3; r++) {
         const int steps = 10 * (r + 1);
-        for (i = 0; i < steps; i++) CHECK_RESULT(sim, gs4_step(sim, (gs4_real)((times[r] - time) / steps)), GS4_OK);
+        for (i = 0; i < steps; i++)
+            CHECK_RESULT(sim, gs4_step(sim, (gs4_real)((times[r] - time) / steps)), GS4_OK);
         time = times[r];
         mean[r] = gs4_get_stats(sim).thermal_energy / gs4_get_stats(sim).mass;
     }
     gs4_destroy(sim);
 }
 
-/* Free surfaces at the temperature of the air, against the series (shared reference heat_sphere). */
+/* Free surfaces at the temperature of the air, against the series (shared reference
+ * heat_sphere). */
 static void test_heat_surface(void)
 {
-    static const double reference[3] = { 0.503676985716496, 0.2295212619740368, 0.08450443389231788 };
+    static const double reference[3] = { 0.503676985716496, 0.2295212619740368,
+                                         0.08450443389231788 };
     double coarse[3], fine[3];
     int r;
     heat_ball(6, coarse);
     heat_ball(12, fine);
     for (r = 0; r < 3; r++) {
-        if (test_filter[0]) printf("mean %.4f and %.4f, exact %.4f\n", coarse[r], fine[r], reference[r]);
+        if (test_filter[0])
+            printf("mean %.4f and %.4f, exact %.4f\n", coarse[r], fine[r], reference[r]);
         CHECK(fabs(fine[r] / reference[r] - 1) < 0.045);
         CHECK(fabs(fine[r] / reference[r] - 1) < 0.6 * fabs(coarse[r] / reference[r] - 1));
     }
 }
 
-/* A bar between walls at 1 and 3: the straight line, in the midst and at the ends; and beside a material that conducts 1000 times better,
- * the temperature where they meet, which is nearly that of the wall behind the better one. */
+/* A bar between walls at 1 and 3: the straight line, in the midst and at the ends; and beside a
+ * material that conducts 1000 times better, the temperature where they meet, which is nearly
+ * that of the wall behind the better one. */
 static void test_heat_walls(void)
 {
     gs4_sim_desc d = scene_cube(16);
@@ -205,30 +298,44 @@ static void test_heat_walls(void)
     double worst = 0;
     int i, two;
     d.cells[1] = d.cells[2] = 4;
-    d.wall_is_isothermal[0] = d.wall_is_isothermal[1] = 1; d.wall_temperature[0] = 1; d.wall_temperature[1] = 3;
-    m.heat_capacity = 1; m.conductivity = 1;
-    better = m; better.conductivity = 1000;
+    d.wall_is_isothermal[0] = d.wall_is_isothermal[1] = 1;
+    d.wall_temperature[0] = 1;
+    d.wall_temperature[1] = 3;
+    m.heat_capacity = 1;
+    m.conductivity = 1;
+    better = m;
+    better.conductivity = 1000;
     for (two = 0; two < 2; two++) {
         sim = physics_create(&d, &m);
         if (two) CHECK_RESULT(sim, gs4_add_material(sim, &better), GS4_OK);
-        f.temperature = 2; f.material = 0;
-        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(two ? 0.5 : 1, 1, 1)), &f), GS4_OK);
+        f.temperature = 2;
+        f.material = 0;
+        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(two ? 0.5 : 1, 1, 1)), &f),
+                     GS4_OK);
         f.material = 1;
-        if (two) CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0.5, 0, 0), at(1, 1, 1)), &f), GS4_OK);
+        if (two)
+            CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0.5, 0, 0), at(1, 1, 1)), &f),
+                         GS4_OK);
         for (i = 0; i < 60; i++) CHECK_RESULT(sim, gs4_step(sim, (gs4_real)0.1), GS4_OK);
-        x = gs4_particles(sim, GS4_FIELD_POSITION); T = gs4_particles(sim, GS4_FIELD_TEMPERATURE);
+        x = gs4_particles(sim, GS4_FIELD_POSITION);
+        T = gs4_particles(sim, GS4_FIELD_TEMPERATURE);
         for (worst = 0, i = 0; i < T.count; i++) {
-            const double X = (double)x.data[(size_t)i * (size_t)x.stride], there = (double)T.data[(size_t)i * (size_t)T.stride];
-            const double exact = !two ? 1 + 2 * X : X > 0.5 ? 3 - (1 - X) * 2 * 2 / 1001 : 1 + X * 2 * 2 * 1000 / 1001;
+            const double X = (double)x.data[(size_t)i * (size_t)x.stride],
+                         there = (double)T.data[(size_t)i * (size_t)T.stride];
+            const double exact = !two      ? 1 + 2 * X
+                                 : X > 0.5 ? 3 - (1 - X) * 2 * 2 / 1001
+                                           : 1 + X * 2 * 2 * 1000 / 1001;
             worst = fmax(worst, fabs(there - exact));
         }
         if (test_filter[0]) printf("worst error %.2e\n", worst);
-        CHECK(worst < (two ? 0.13 : sizeof(gs4_real) == 8 ? 1e-4 : 1e-3));      /* two: half a cell of the step from 1 to 1000 */
+        /* two: half a cell of the step from 1 to 1000 */
+        CHECK(worst < (two ? 0.13 : sizeof(gs4_real) == 8 ? 1e-4 : 1e-3));
         gs4_destroy(sim);
     }
 }
 
-/* A bar that melts from its hot end (hot > 0) or freezes from its cold one: the front over its exact place 2 lambda sqrt(t). */
+/* A bar that melts from its hot end (hot > 0) or freezes from its cold one: the front over its
+ * exact place 2 lambda sqrt(t). */
 static double heat_front(int n, double hot, double cold, double lambda, double until, double number)
 {
     gs4_sim_desc d = scene_cube(n);
@@ -241,8 +348,12 @@ static double heat_front(int n, double hot, double cold, double lambda, double u
     double front = 0;
     int i;
     d.cells[1] = d.cells[2] = 4;
-    d.wall_is_isothermal[0] = 1; d.wall_temperature[0] = hot > 0 ? 1 : -1;
-    m.heat_capacity = 1; m.conductivity = 1; m.can_melt = 1; m.latent_heat = (gs4_real)(1 / fabs(hot));
+    d.wall_is_isothermal[0] = 1;
+    d.wall_temperature[0] = hot > 0 ? 1 : -1;
+    m.heat_capacity = 1;
+    m.conductivity = 1;
+    m.can_melt = 1;
+    m.latent_heat = (gs4_real)(1 / fabs(hot));
     sim = physics_create(&d, &m);
     f.temperature = (gs4_real)(cold == 0 ? (hot < 0 ? 1e-9 : 0) : -cold / hot);
     CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1, 1, 1)), &f), GS4_OK);
@@ -253,17 +364,25 @@ static double heat_front(int n, double hot, double cold, double lambda, double u
     return (hot > 0 ? front : 1 - front) / until;
 }
 
-/* Stefan's problem, melting and freezing, Stefan numbers 0.01 to 10, one and two phases (shared reference stefan_front: lambda). */
+/* Stefan's problem, melting and freezing, Stefan numbers 0.01 to 10, one and two phases (shared
+ * reference stefan_front: lambda). */
 static void test_heat_stefan(void)
 {
-    static const double cases[6][4] = { { 1, 0, 0.620062633313595496, 0.5 }, { -1, 0, 0.620062633313595496, 0.5 }, { 10, 0, 1.25697212127920327, 0.5 },
-        { 0.1, 0, 0.220016272742937856, 0.5 }, { 1, 1, 0.377759788203411083, 0.3 }, { 0.01, 0, 0.0705932765604293144, 0.5 } };
+    static const double cases[6][4] = {
+        { 1, 0, 0.620062633313595496, 0.5 }, { -1, 0, 0.620062633313595496, 0.5 },
+        { 10, 0, 1.25697212127920327, 0.5 }, { 0.1, 0, 0.220016272742937856, 0.5 },
+        { 1, 1, 0.377759788203411083, 0.3 }, { 0.01, 0, 0.0705932765604293144, 0.5 }
+    };
     int c;
     for (c = 0; c < (test_slow ? 6 : 4); c++) {
         const double number = c == 5 ? 10 : c == 3 ? 8 : 2;
-        const double fine = heat_front(test_slow ? 64 : 32, cases[c][0], cases[c][1], cases[c][2], cases[c][3], number);
-        const double coarse = heat_front(test_slow ? 32 : 16, cases[c][0], cases[c][1], cases[c][2], cases[c][3], number);
-        if (test_filter[0]) printf("Ste %g, %g: front %.4f and %.4f of the exact one\n", cases[c][0], cases[c][1], coarse, fine);
+        const double fine = heat_front(test_slow ? 64 : 32, cases[c][0], cases[c][1], cases[c][2],
+                                       cases[c][3], number);
+        const double coarse = heat_front(test_slow ? 32 : 16, cases[c][0], cases[c][1], cases[c][2],
+                                         cases[c][3], number);
+        if (test_filter[0])
+            printf("Ste %g, %g: front %.4f and %.4f of the exact one\n", cases[c][0], cases[c][1],
+                   coarse, fine);
         CHECK(fabs(fine - 1) < (test_slow ? 0.02 : 0.03));
         CHECK(fabs(fine - 1) < 0.75 * fabs(coarse - 1) || fabs(fine - 1) < 2e-3);
     }
@@ -280,17 +399,30 @@ static void test_heat_conserved(void)
         gs4_sim *sim;
         double before, after;
         const int steps = test_slow ? 1000 : 200;
-        d.gravity = at(0, -9.81, 0); d.integrator = physics_integrators[c];
+        d.gravity = at(0, -9.81, 0);
+        d.integrator = physics_integrators[c];
         d.solver_tolerance = (gs4_real)(sizeof(gs4_real) == 8 ? 1e-8 : 1e-5);
-        m.heat_capacity = 2000; m.conductivity = 50; m.can_melt = 1; m.melting_temperature = 20; m.latent_heat = 2e4; m.flux_relaxation_time = (gs4_real)0.01; m.fourier_fraction = (gs4_real)0.3;
+        m.heat_capacity = 2000;
+        m.conductivity = 50;
+        m.can_melt = 1;
+        m.melting_temperature = 20;
+        m.latent_heat = 2e4;
+        m.flux_relaxation_time = (gs4_real)0.01;
+        m.fourier_fraction = (gs4_real)0.3;
         sim = physics_create(&d, &m);
         CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1, 0.3, 1)), &f), GS4_OK);
-        f.temperature = 60; f.velocity = at(0.2, -1, 0.1);
-        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_sphere(at(0.5, 0.6, 0.5), (gs4_real)0.2), &f), GS4_OK);
+        f.temperature = 60;
+        f.velocity = at(0.2, -1, 0.1);
+        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_sphere(at(0.5, 0.6, 0.5), (gs4_real)0.2), &f),
+                     GS4_OK);
         before = gs4_get_stats(sim).thermal_energy;
-        for (i = 0; i < steps; i++) CHECK_RESULT(sim, gs4_step(sim, (gs4_real)0.5 * gs4_stable_dt(sim)), GS4_OK);
+        for (i = 0; i < steps; i++)
+            CHECK_RESULT(sim, gs4_step(sim, (gs4_real)0.5 * gs4_stable_dt(sim)), GS4_OK);
         after = gs4_get_stats(sim).thermal_energy;
-        if (test_filter[0]) printf("heat %.9g after, %.9g before, t %g, %g to %g K\n", after, before, gs4_get_stats(sim).time, gs4_get_stats(sim).min_temperature, gs4_get_stats(sim).max_temperature);
+        if (test_filter[0])
+            printf("heat %.9g after, %.9g before, t %g, %g to %g K\n", after, before,
+                   gs4_get_stats(sim).time, gs4_get_stats(sim).min_temperature,
+                   gs4_get_stats(sim).max_temperature);
         CHECK_CLOSE(after / before, 1, sizeof(gs4_real) == 8 ? 1e-6 : 2e-5);
         gs4_destroy(sim);
     }
@@ -308,7 +440,11 @@ static void test_heat_cycles(void)
     double before, sum = 0;
     int i, k;
     if (sizeof(gs4_real) == 8) d.solver_tolerance = (gs4_real)1e-9;
-    m.heat_capacity = 1; m.conductivity = 1; m.can_melt = 1; m.latent_heat = 2; m.melting_temperature = 0;
+    m.heat_capacity = 1;
+    m.conductivity = 1;
+    m.can_melt = 1;
+    m.latent_heat = 2;
+    m.melting_temperature = 0;
     sim = physics_create(&d, &m);
     f.temperature = -1;
     CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1, 1, 1)), &f), GS4_OK);
@@ -321,10 +457,14 @@ static void test_heat_cycles(void)
         before = gs4_get_stats(sim).thermal_energy;
         if (k) {
             T = gs4_edit_particles(sim, GS4_FIELD_TEMPERATURE);
-            for (i = 0; i < T.count; i++) T.data[(size_t)i * (size_t)T.stride] += (gs4_real)(k % 2 ? 2 : -2);
+            for (i = 0; i < T.count; i++)
+                T.data[(size_t)i * (size_t)T.stride] += (gs4_real)(k % 2 ? 2 : -2);
             CHECK_RESULT(sim, gs4_step(sim, (gs4_real)1e-6), GS4_OK);
             before = gs4_get_stats(sim).thermal_energy;
-        } else { CHECK_RESULT(sim, gs4_step(sim, (gs4_real)1e-6), GS4_OK); before = gs4_get_stats(sim).thermal_energy; }
+        } else {
+            CHECK_RESULT(sim, gs4_step(sim, (gs4_real)1e-6), GS4_OK);
+            before = gs4_get_stats(sim).thermal_energy;
+        }
         for (i = 0; i < 5; i++) CHECK_RESULT(sim, gs4_step(sim, (gs4_real)0.02), GS4_OK);
         CHECK_CLOSE(gs4_get_stats(sim).thermal_energy, before, sizeof(gs4_real) == 8 ? 1e-9 : 2e-5);
     }
@@ -344,20 +484,29 @@ static void test_heat_of_viscosity(void)
     double before;
     int i;
     for (i = 0; i < 6; i++) d.walls[i] = GS4_WALL_PERIODIC;
-    d.cells[0] = d.cells[2] = 4; d.flip_decay_time = (gs4_real)INFINITY;
-    m.heat_capacity = 1; m.viscous_heating = 1;
+    d.cells[0] = d.cells[2] = 4;
+    d.flip_decay_time = (gs4_real)INFINITY;
+    m.heat_capacity = 1;
+    m.viscous_heating = 1;
     sim = physics_create(&d, &m);
     CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1, 1, 1)), &f), GS4_OK);
-    x = gs4_particles(sim, GS4_FIELD_POSITION); v = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
-    for (i = 0; i < v.count; i++) v.data[(size_t)i * (size_t)v.stride] = (gs4_real)(0.1 * sin(k * (double)x.data[(size_t)i * (size_t)x.stride + 1]));
+    x = gs4_particles(sim, GS4_FIELD_POSITION);
+    v = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
+    for (i = 0; i < v.count; i++)
+        v.data[(size_t)i * (size_t)v.stride] =
+            (gs4_real)(0.1 * sin(k * (double)x.data[(size_t)i * (size_t)x.stride + 1]));
     before = gs4_get_stats(sim).kinetic_energy;
     CHECK(physics_run(sim, 0.5) == 0);
-    if (test_filter[0]) printf("kinetic %.4g -> %.4g, heat %.4g\n", before, gs4_get_stats(sim).kinetic_energy, gs4_get_stats(sim).thermal_energy);
-    CHECK_CLOSE(gs4_get_stats(sim).thermal_energy / (before - gs4_get_stats(sim).kinetic_energy), 1, 0.03);
+    if (test_filter[0])
+        printf("kinetic %.4g -> %.4g, heat %.4g\n", before, gs4_get_stats(sim).kinetic_energy,
+               gs4_get_stats(sim).thermal_energy);
+    CHECK_CLOSE(gs4_get_stats(sim).thermal_energy / (before - gs4_get_stats(sim).kinetic_energy), 1,
+                0.03);
     gs4_destroy(sim);
 }
 
-/* A liquid that swirls and freezes as a whole: its phase costs no energy and gives none, F begins without strain. */
+/* A liquid that swirls and freezes as a whole: its phase costs no energy and gives none, F
+ * begins without strain. */
 static void test_phase_freezing(void)
 {
     gs4_sim_desc d = scene_cube(16);
@@ -368,13 +517,20 @@ static void test_phase_freezing(void)
     gs4_view q;
     double before, after, most = 0;
     int i;
-    m.heat_capacity = 1000; m.can_melt = 1; m.melting_temperature = 0; m.solid = GS4_FIXED_COROTATED; m.shear_modulus = 2e4;
+    m.heat_capacity = 1000;
+    m.can_melt = 1;
+    m.melting_temperature = 0;
+    m.solid = GS4_FIXED_COROTATED;
+    m.shear_modulus = 2e4;
     sim = physics_create(&d, &m);
-    f.temperature = 1; f.angular_velocity = at(0, 0, 3);
-    CHECK_RESULT(sim, gs4_add_particles(sim, gs4_sphere(at(0.5, 0.5, 0.5), (gs4_real)0.3), &f), GS4_OK);
+    f.temperature = 1;
+    f.angular_velocity = at(0, 0, 3);
+    CHECK_RESULT(sim, gs4_add_particles(sim, gs4_sphere(at(0.5, 0.5, 0.5), (gs4_real)0.3), &f),
+                 GS4_OK);
     q = gs4_particles(sim, GS4_FIELD_LIQUID_FRACTION);
     CHECK(q.count > 0 && (double)q.data[0] == 1);
-    for (i = 0; i < 30; i++) CHECK_RESULT(sim, gs4_step(sim, (gs4_real)0.5 * gs4_stable_dt(sim)), GS4_OK);
+    for (i = 0; i < 30; i++)
+        CHECK_RESULT(sim, gs4_step(sim, (gs4_real)0.5 * gs4_stable_dt(sim)), GS4_OK);
     before = gs4_get_stats(sim).kinetic_energy;
     T = gs4_edit_particles(sim, GS4_FIELD_TEMPERATURE);
     for (i = 0; i < T.count; i++) T.data[(size_t)i * (size_t)T.stride] = -1;
@@ -385,13 +541,16 @@ static void test_phase_freezing(void)
     }
     q = gs4_particles(sim, GS4_FIELD_LIQUID_FRACTION);
     CHECK((double)q.data[0] == 0);
-    if (test_filter[0]) printf("kinetic energy %.6g before, at most %.6g, %.6g after freezing\n", before, most, after);
+    if (test_filter[0])
+        printf("kinetic energy %.6g before, at most %.6g, %.6g after freezing\n", before, most,
+               after);
     CHECK(most < 1.002 * before);
     CHECK(after > 0.8 * before);
     gs4_destroy(sim);
 }
 
-/* A block of solid on a floor keeps its shape, melts when the floor is hot, and then flows out; frozen again it stays as it is. */
+/* A block of solid on a floor keeps its shape, melts when the floor is hot, and then flows out;
+ * frozen again it stays as it is. */
 static void test_phase_melting(void)
 {
     int c;
@@ -404,23 +563,34 @@ static void test_phase_melting(void)
         gs4_view F;
         double height[4];
         int i, stage;
-        d.gravity = at(0, -9.81, 0); d.integrator = physics_integrators[c];
-        m.heat_capacity = 1000; m.conductivity = 1; m.can_melt = 1; m.latent_heat = 1e4; m.solid = GS4_NEO_HOOKEAN; m.shear_modulus = 2e4;
+        d.gravity = at(0, -9.81, 0);
+        d.integrator = physics_integrators[c];
+        m.heat_capacity = 1000;
+        m.conductivity = 1;
+        m.can_melt = 1;
+        m.latent_heat = 1e4;
+        m.solid = GS4_NEO_HOOKEAN;
+        m.shear_modulus = 2e4;
         sim = physics_create(&d, &m);
         f.temperature = -5;
-        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0.3, 0, 0.3), at(0.7, 0.5, 0.7)), &f), GS4_OK);
+        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0.3, 0, 0.3), at(0.7, 0.5, 0.7)), &f),
+                     GS4_OK);
         for (stage = 0; stage < 4; stage++) {
             const double until[4] = { 0.3, 0.8, 0.85, 1.1 };
             gs4_view x;
             if (stage == 1 || stage == 2) {
                 T = gs4_edit_particles(sim, GS4_FIELD_TEMPERATURE);
-                for (i = 0; i < T.count; i++) T.data[(size_t)i * (size_t)T.stride] = (gs4_real)(stage == 1 ? 5 : -5);
+                for (i = 0; i < T.count; i++)
+                    T.data[(size_t)i * (size_t)T.stride] = (gs4_real)(stage == 1 ? 5 : -5);
             }
             CHECK(physics_run(sim, until[stage]) == 0);
             x = gs4_particles(sim, GS4_FIELD_POSITION);
-            for (height[stage] = 0, i = 0; i < x.count; i++) height[stage] += (double)x.data[(size_t)i * (size_t)x.stride + 1] / x.count;
+            for (height[stage] = 0, i = 0; i < x.count; i++)
+                height[stage] += (double)x.data[(size_t)i * (size_t)x.stride + 1] / x.count;
         }
-        if (test_filter[0]) printf("mean height %.3f solid, %.3f molten, %.3f and %.3f frozen\n", height[0], height[1], height[2], height[3]);
+        if (test_filter[0])
+            printf("mean height %.3f solid, %.3f molten, %.3f and %.3f frozen\n", height[0],
+                   height[1], height[2], height[3]);
         CHECK_CLOSE(height[0], 0.25, 0.03);
         CHECK(height[1] < 0.15);
         CHECK(fabs(height[3] - height[2]) < 0.03);
@@ -430,10 +600,11 @@ static void test_phase_melting(void)
     }
 }
 
-/* --- what nobody would put in ------------------------------------------------------------------------- */
+/* --- what nobody would put in ----------------------------------------------------------------- */
 
-/* Nodes with next to no mass, at the rim of what a particle reaches, must not stop a scene: beside an insulator (whose faces there let
- * 1e-31 of the others through, in double), nor in isothermal air (where what they show has no square, in float). */
+/* Nodes with next to no mass, at the rim of what a particle reaches, must not stop a scene:
+ * beside an insulator (whose faces there let 1e-31 of the others through, in double), nor in
+ * isothermal air (where what they show has no square, in float). */
 static void test_heat_rims(void)
 {
     gs4_sim_desc d = scene_cube(8);
@@ -441,33 +612,46 @@ static void test_heat_rims(void)
     gs4_fill f = scene_fill(at(0.3, 0, 0.1));
     gs4_sim *sim;
     int i, seed, result;
-    m.heat_capacity = 1000; m.conductivity = 50;
-    insulator = m; insulator.conductivity = 0;
+    m.heat_capacity = 1000;
+    m.conductivity = 50;
+    insulator = m;
+    insulator.conductivity = 0;
     d.gravity = at(0, -10, 0);
     for (seed = 5; seed < (test_slow ? 60 : 8); seed++) {
         sim = physics_create(&d, &m);
         CHECK_RESULT(sim, gs4_add_material(sim, &insulator), GS4_OK);
-        f.jitter = 1; f.random_seed = (uint32_t)seed;
-        f.material = 0; f.temperature = 100;
-        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0.2, 0.2, 0.2), at(0.5, 0.7, 0.7)), &f), GS4_OK);
-        f.material = 1; f.temperature = 0;
-        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0.5, 0.2, 0.2), at(0.8, 0.7, 0.7)), &f), GS4_OK);
-        for (result = GS4_OK, i = 0; i < 40 && result == GS4_OK; i++) CHECK_RESULT(sim, result = gs4_step(sim, (gs4_real)0.5 * gs4_stable_dt(sim)), GS4_OK);
+        f.jitter = 1;
+        f.random_seed = (uint32_t)seed;
+        f.material = 0;
+        f.temperature = 100;
+        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0.2, 0.2, 0.2), at(0.5, 0.7, 0.7)), &f),
+                     GS4_OK);
+        f.material = 1;
+        f.temperature = 0;
+        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0.5, 0.2, 0.2), at(0.8, 0.7, 0.7)), &f),
+                     GS4_OK);
+        for (result = GS4_OK, i = 0; i < 40 && result == GS4_OK; i++)
+            CHECK_RESULT(sim, result = gs4_step(sim, (gs4_real)0.5 * gs4_stable_dt(sim)), GS4_OK);
         gs4_destroy(sim);
     }
     d.air_is_isothermal = 1;
     for (i = 0; i < 2; i++) {
-        const gs4_real x[6] = { (gs4_real)0.51, (gs4_real)0.52, (gs4_real)0.53, (gs4_real)0.25, (gs4_real)0.25, (gs4_real)0.25 };
+        const gs4_real x[6] = { (gs4_real)0.51, (gs4_real)0.52, (gs4_real)0.53,
+                                (gs4_real)0.25, (gs4_real)0.25, (gs4_real)0.25 };
         sim = physics_create(&d, &m);
-        f.material = 0; f.temperature = 100;
+        f.material = 0;
+        f.temperature = 100;
         CHECK_RESULT(sim, gs4_add_points(sim, x, 2, (gs4_real)(i ? 1e-16 : 1e-6), &f), GS4_OK);
-        for (seed = 0; seed < 20; seed++) CHECK_RESULT(sim, gs4_step(sim, (gs4_real)0.1 * gs4_stable_dt(sim)), GS4_OK);
-        CHECK(physics_is_finite(sim) && gs4_get_stats(sim).max_temperature <= 100.01 && gs4_get_stats(sim).min_temperature >= -0.01);
+        for (seed = 0; seed < 20; seed++)
+            CHECK_RESULT(sim, gs4_step(sim, (gs4_real)0.1 * gs4_stable_dt(sim)), GS4_OK);
+        CHECK(physics_is_finite(sim) && gs4_get_stats(sim).max_temperature <= 100.01
+              && gs4_get_stats(sim).min_temperature >= -0.01);
         gs4_destroy(sim);
     }
 }
 
-/* Where there is no surface isothermal air takes nothing: a box that is full to its walls, or to itself around. */
+/* Where there is no surface isothermal air takes nothing: a box that is full to its walls, or to
+ * itself around. */
 static void test_heat_full_box(void)
 {
     int around, i;
@@ -479,7 +663,10 @@ static void test_heat_full_box(void)
         double before;
         d.air_is_isothermal = 1;
         for (i = 0; i < 6 && around; i++) d.walls[i] = GS4_WALL_PERIODIC;
-        m.heat_capacity = 1000; m.conductivity = 1e5; f.temperature = 100; f.jitter = 1;
+        m.heat_capacity = 1000;
+        m.conductivity = 1e5;
+        f.temperature = 100;
+        f.jitter = 1;
         sim = physics_create(&d, &m);
         CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1, 1, 1)), &f), GS4_OK);
         before = gs4_get_stats(sim).thermal_energy;
@@ -489,8 +676,9 @@ static void test_heat_full_box(void)
     }
 }
 
-/* Steps as they come, a short one to meet a frame among them, of heat that goes 10, 10^4 and 10^7 times further in a step than the grid can see, and
- * beside what hardly conducts: nothing is warmer or colder than the start by more than a share (before: by 1e25 times). */
+/* Steps as they come, a short one to meet a frame among them, of heat that goes 10, 10^4 and
+ * 10^7 times further in a step than the grid can see, and beside what hardly conducts: nothing
+ * is warmer or colder than the start by more than a share (before: by 1e25 times). */
 static void test_heat_uneven_steps(void)
 {
     static const double lengths[6] = { 1, 1e-3, 0.3, 1, 1e-6, 1 };
@@ -504,28 +692,46 @@ static void test_heat_uneven_steps(void)
         double worst = 0;
         int i;
         if (c & 2) d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER;
-        m.heat_capacity = (gs4_real)0.03; m.conductivity = (gs4_real)(c & 4 ? 1e3 : 1e6);
-        if (c & 8) { m.flux_relaxation_time = (gs4_real)1e-2; m.conductivity = 1000; }
-        poor = m; poor.flux_relaxation_time = 0; poor.heat_capacity = (gs4_real)0.3; poor.conductivity = (gs4_real)0.002;
+        m.heat_capacity = (gs4_real)0.03;
+        m.conductivity = (gs4_real)(c & 4 ? 1e3 : 1e6);
+        if (c & 8) {
+            m.flux_relaxation_time = (gs4_real)1e-2;
+            m.conductivity = 1000;
+        }
+        poor = m;
+        poor.flux_relaxation_time = 0;
+        poor.heat_capacity = (gs4_real)0.3;
+        poor.conductivity = (gs4_real)0.002;
         sim = physics_create(&d, &m);
         CHECK_RESULT(sim, gs4_add_material(sim, &poor), GS4_OK);
         f.jitter = 1;
-        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0.2, 0.2, 0.2), at(0.5, 0.6, 0.7)), &f), GS4_OK);
+        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0.2, 0.2, 0.2), at(0.5, 0.6, 0.7)), &f),
+                     GS4_OK);
         f.material = c & 8 ? 1 : 0;
-        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0.5, 0.2, 0.2), at(0.8, 0.6, 0.7)), &f), GS4_OK);
+        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0.5, 0.2, 0.2), at(0.8, 0.6, 0.7)), &f),
+                     GS4_OK);
         T = gs4_edit_particles(sim, GS4_FIELD_TEMPERATURE);
-        for (i = 0; i < T.count; i++) T.data[(size_t)i * (size_t)T.stride] = (gs4_real)(100.0 * (double)(gs4i_mix((unsigned)i) % 1000) / 999);
+        for (i = 0; i < T.count; i++)
+            T.data[(size_t)i * (size_t)T.stride] =
+                (gs4_real)(100.0 * (double)(gs4i_mix((unsigned)i) % 1000) / 999);
         for (i = 0; i < 40; i++) {
-            CHECK_RESULT(sim, gs4_step(sim, (gs4_real)(0.5 * (c & 8 && !(c & 4) ? 1 : lengths[i % 6])) * gs4_stable_dt(sim)), GS4_OK);
-            worst = fmax(worst, fmax(gs4_get_stats(sim).max_temperature - 100, -gs4_get_stats(sim).min_temperature));
+            CHECK_RESULT(sim,
+                         gs4_step(sim, (gs4_real)(0.5 * (c & 8 && !(c & 4) ? 1 : lengths[i % 6]))
+                                           * gs4_stable_dt(sim)),
+                         GS4_OK);
+            worst = fmax(worst, fmax(gs4_get_stats(sim).max_temperature - 100,
+                                     -gs4_get_stats(sim).min_temperature));
         }
-        if (test_filter[0]) printf("case %d: beyond 0 to 100 K by %.2f K, at the end %.2f to %.2f\n", c, worst, gs4_get_stats(sim).min_temperature, gs4_get_stats(sim).max_temperature);
+        if (test_filter[0])
+            printf("case %d: beyond 0 to 100 K by %.2f K, at the end %.2f to %.2f\n", c, worst,
+                   gs4_get_stats(sim).min_temperature, gs4_get_stats(sim).max_temperature);
         CHECK(worst < 25);
         gs4_destroy(sim);
     }
 }
 
-/* Steps of an extreme scene: every one is taken, or refused with a sentence and nothing changed, and all stays finite. How many were taken; the last code. */
+/* Steps of an extreme scene: every one is taken, or refused with a sentence and nothing changed,
+ * and all stays finite. How many were taken; the last code. */
 static int heat_steps(gs4_sim *sim, int count, double longest, int *code)
 {
     int i, taken = 0;
@@ -535,16 +741,22 @@ static int heat_steps(gs4_sim *sim, int count, double longest, int *code)
         const double limit = (double)gs4_stable_dt(sim);
         const int r = gs4_step(sim, (gs4_real)(0.5 * fmin(limit, longest)));
         CHECK(physics_is_finite(sim));
-        if (r != GS4_OK) { CHECK(r < 0 && gs4_last_error(sim)[0] && (i == 0 || gs4_state_hash(sim) == before)); *code = r; }
+        if (r != GS4_OK) {
+            CHECK(r < 0 && gs4_last_error(sim)[0] && (i == 0 || gs4_state_hash(sim) == before));
+            *code = r;
+        }
         taken += r == GS4_OK;
     }
     return taken;
 }
 
-/* One at a time, what a scene can have to an extreme. All must be taken, and no temperature be beyond those given by more than a tenth of their range. */
+/* One at a time, what a scene can have to an extreme. All must be taken, and no temperature be
+ * beyond those given by more than a tenth of their range. */
 static void test_heat_extremes(void)
 {
-    enum { CASES = 24 };
+    enum {
+        CASES = 24
+    };
     int c, i, code;
     for (c = 0; c < 2 * CASES; c++) {
         const int which = c / 2;
@@ -558,43 +770,109 @@ static void test_heat_extremes(void)
         int isles = 1, added = 0;
         if (c & 1) d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER;
         memset(&hot, 0, sizeof hot);
-        m.heat_capacity = 1000; m.conductivity = 100;
+        m.heat_capacity = 1000;
+        m.conductivity = 100;
         switch (which) {
         case 0: m.heat_capacity = (gs4_real)1e-3; break;
         case 1: m.heat_capacity = (gs4_real)1e6; break;
-        case 2: m.can_melt = 1; m.latent_heat = (gs4_real)1e9; m.melting_temperature = 50; break;
-        case 3: m.conductivity = 0; m.can_melt = 1; m.melting_temperature = 50; break;
-        case 4: d.wall_is_isothermal[0] = d.wall_is_isothermal[1] = 1; d.wall_temperature[0] = -2000; d.wall_temperature[1] = 3000; low = -2000; high = 3000; break;
-        case 5: d.air_is_isothermal = 1; d.ambient_temperature = 5000; high = 5000; break;
-        case 6: for (i = 0; i < 6; i++) { d.wall_is_isothermal[i] = 1; d.wall_temperature[i] = (gs4_real)(1000 * i); } high = 5000; d.air_is_isothermal = 1; break;
+        case 2:
+            m.can_melt = 1;
+            m.latent_heat = (gs4_real)1e9;
+            m.melting_temperature = 50;
+            break;
+        case 3:
+            m.conductivity = 0;
+            m.can_melt = 1;
+            m.melting_temperature = 50;
+            break;
+        case 4:
+            d.wall_is_isothermal[0] = d.wall_is_isothermal[1] = 1;
+            d.wall_temperature[0] = -2000;
+            d.wall_temperature[1] = 3000;
+            low = -2000;
+            high = 3000;
+            break;
+        case 5:
+            d.air_is_isothermal = 1;
+            d.ambient_temperature = 5000;
+            high = 5000;
+            break;
+        case 6:
+            for (i = 0; i < 6; i++) {
+                d.wall_is_isothermal[i] = 1;
+                d.wall_temperature[i] = (gs4_real)(1000 * i);
+            }
+            high = 5000;
+            d.air_is_isothermal = 1;
+            break;
         case 7: d.walls[0] = d.walls[1] = GS4_WALL_PERIODIC; break;
         case 8: d.walls[0] = d.walls[1] = d.walls[2] = d.walls[3] = GS4_WALL_PERIODIC; break;
-        case 9: for (i = 0; i < 6; i++) d.walls[i] = GS4_WALL_PERIODIC; d.cells[0] = 5; d.cells[1] = 6; d.cells[2] = 7; break;
-        case 10: for (i = 0; i < 6; i++) d.walls[i] = GS4_WALL_OPEN; d.air_is_isothermal = 1; break;
+        case 9:
+            for (i = 0; i < 6; i++) d.walls[i] = GS4_WALL_PERIODIC;
+            d.cells[0] = 5;
+            d.cells[1] = 6;
+            d.cells[2] = 7;
+            break;
+        case 10:
+            for (i = 0; i < 6; i++) d.walls[i] = GS4_WALL_OPEN;
+            d.air_is_isothermal = 1;
+            break;
         case 11: d.cells[0] = d.cells[2] = 4; break;
-        case 12: d.cells[0] = d.cells[1] = d.cells[2] = 4; for (i = 0; i < 6; i++) d.walls[i] = GS4_WALL_PERIODIC; break;
+        case 12:
+            d.cells[0] = d.cells[1] = d.cells[2] = 4;
+            for (i = 0; i < 6; i++) d.walls[i] = GS4_WALL_PERIODIC;
+            break;
         case 13: m.flux_relaxation_time = (gs4_real)1e-15; break;
         case 14: m.flux_relaxation_time = (gs4_real)1e15; break;
-        case 15: m.flux_relaxation_time = (gs4_real)1e-2; m.fourier_fraction = 1; break;
+        case 15:
+            m.flux_relaxation_time = (gs4_real)1e-2;
+            m.fourier_fraction = 1;
+            break;
         case 16: m.flux_relaxation_time = (gs4_real)1e-2; break;
-        case 17: low = -273; high = -20; break;
+        case 17:
+            low = -273;
+            high = -20;
+            break;
         case 18: high = 1e6; break;
-        case 19: low = -1e12; high = 1e12; break;
-        case 20: isles = 3; d.air_is_isothermal = 1; break;
+        case 19:
+            low = -1e12;
+            high = 1e12;
+            break;
+        case 20:
+            isles = 3;
+            d.air_is_isothermal = 1;
+            break;
         case 21: isles = 3; break;
-        case 22: hot.shape = gs4_box(at(-1, -1, -1), at(2, 2, 2)); hot.temperature = 30; hot.is_isothermal = 1; break;    /* everything is inside of it */
-        default: isles = 0; d.air_is_isothermal = 1; break;         /* one particle alone */
+        /* everything is inside of it */
+        case 22:
+            hot.shape = gs4_box(at(-1, -1, -1), at(2, 2, 2));
+            hot.temperature = 30;
+            hot.is_isothermal = 1;
+            break;
+        default:
+            isles = 0;
+            d.air_is_isothermal = 1;
+            break; /* one particle alone */
         }
         other = m;
-        if (which > 13 && which != 14 && which != 19) { other.conductivity = (gs4_real)(1e-6 * (double)m.conductivity); other.density = 10; }
+        if (which > 13 && which != 14 && which != 19) {
+            other.conductivity = (gs4_real)(1e-6 * (double)m.conductivity);
+            other.density = 10;
+        }
         sim = physics_create(&d, &m);
         CHECK_RESULT(sim, gs4_add_material(sim, &other), GS4_OK);
         for (i = 0; i < isles; i++) {
             const double x = isles == 3 ? 0.34 * i : 0.1;
-            f.material = 0; f.temperature = (gs4_real)(i == 1 ? high : low);
-            added += gs4_add_particles(sim, gs4_box(at(x, 0.1, 0.1), at(x + (isles == 3 ? 0.15 : 0.3), 0.5, 0.5)), &f);
-            f.material = 1; f.temperature = (gs4_real)high;
-            if (isles == 1) CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0.4, 0.1, 0.1), at(0.7, 0.5, 0.5)), &f), GS4_OK);
+            f.material = 0;
+            f.temperature = (gs4_real)(i == 1 ? high : low);
+            added += gs4_add_particles(
+                sim, gs4_box(at(x, 0.1, 0.1), at(x + (isles == 3 ? 0.15 : 0.3), 0.5, 0.5)), &f);
+            f.material = 1;
+            f.temperature = (gs4_real)high;
+            if (isles == 1)
+                CHECK_RESULT(
+                    sim, gs4_add_particles(sim, gs4_box(at(0.4, 0.1, 0.1), at(0.7, 0.5, 0.5)), &f),
+                    GS4_OK);
         }
         if (isles == 0) {
             const gs4_real alone[3] = { (gs4_real)0.53, (gs4_real)0.52, (gs4_real)0.51 };
@@ -603,44 +881,62 @@ static void test_heat_extremes(void)
         }
         CHECK(added > 0);
         if (which == 22) CHECK_RESULT(sim, gs4_add_collider(sim, &hot), GS4_OK);
-        if (which == 18) {                                  /* a single hot particle */
+        if (which == 18) { /* a single hot particle */
             T = gs4_edit_particles(sim, GS4_FIELD_TEMPERATURE);
-            for (i = 0; i < T.count; i++) T.data[(size_t)i * (size_t)T.stride] = (gs4_real)(i == T.count / 2 ? 1e6 : 0);
+            for (i = 0; i < T.count; i++)
+                T.data[(size_t)i * (size_t)T.stride] = (gs4_real)(i == T.count / 2 ? 1e6 : 0);
         }
         i = heat_steps(sim, 30, 1e-2, &code);
-        if (test_filter[0]) printf("case %d, %s: %d steps, %g to %g K of %g to %g\n", which, c & 1 ? "Euler" : "GS4", i, gs4_get_stats(sim).min_temperature, gs4_get_stats(sim).max_temperature, low, high);
+        if (test_filter[0])
+            printf("case %d, %s: %d steps, %g to %g K of %g to %g\n", which,
+                   c & 1 ? "Euler" : "GS4", i, gs4_get_stats(sim).min_temperature,
+                   gs4_get_stats(sim).max_temperature, low, high);
         CHECK(i == 30);
         if (i < 30) printf("    case %d: %s\n", c, gs4_last_error(sim));
-        if (gs4_get_stats(sim).particles) CHECK(gs4_get_stats(sim).min_temperature >= low - 0.1 * (high - low) && gs4_get_stats(sim).max_temperature <= high + 0.1 * (high - low));
+        if (gs4_get_stats(sim).particles)
+            CHECK(gs4_get_stats(sim).min_temperature >= low - 0.1 * (high - low)
+                  && gs4_get_stats(sim).max_temperature <= high + 0.1 * (high - low));
         gs4_destroy(sim);
     }
 }
 
-/* A viscosity that ends at some temperature: the step that would need it is refused and says so; what is frozen solid there has none and needs none. */
+/* A viscosity that ends at some temperature: the step that would need it is refused and says so;
+ * what is frozen solid there has none and needs none. */
 static void test_heat_glass(void)
 {
     static const double T[4] = { -100, 48.4, 48.4001, 20 };
     int c, i, solid;
-    for (c = 0; c < 8; c++) for (solid = 0; solid < 2; solid++) {
-        gs4_sim_desc d = scene_cube(8);
-        gs4_material m = scene_liquid(1000, 0.1, 10);
-        gs4_fill f = scene_fill(at(0, 0, 0));
-        gs4_sim *sim;
-        int code, taken;
-        if (c & 1) d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER;
-        m.heat_capacity = 1000; m.conductivity = 1; m.viscosity_law = GS4_VISCOSITY_CROSS_WLF;
-        if (solid) { m.can_melt = 1; m.melting_temperature = 300; m.latent_heat = 1e5; m.solid = GS4_NEO_HOOKEAN; m.shear_modulus = 1e4; }
-        sim = physics_create(&d, &m);
-        f.temperature = (gs4_real)T[c / 2];
-        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0.1, 0.1, 0.1), at(0.4, 0.4, 0.4)), &f), GS4_OK);
-        if (!solid) CHECK_RESULT(sim, gs4_step(sim, (gs4_real)1e-6), GS4_ERROR_UNSTABLE);
-        taken = heat_steps(sim, 5, 1e-3, &code);
-        CHECK(taken == (solid ? 5 : 0));
-        i = gs4_advance(sim, (gs4_real)0.01);
-        CHECK(solid ? i == GS4_OK : i == GS4_ERROR_UNSTABLE);
-        if (!solid) CHECK(strstr(gs4_last_error(sim), "viscosity") != NULL);
-        gs4_destroy(sim);
-    }
+    for (c = 0; c < 8; c++)
+        for (solid = 0; solid < 2; solid++) {
+            gs4_sim_desc d = scene_cube(8);
+            gs4_material m = scene_liquid(1000, 0.1, 10);
+            gs4_fill f = scene_fill(at(0, 0, 0));
+            gs4_sim *sim;
+            int code, taken;
+            if (c & 1) d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER;
+            m.heat_capacity = 1000;
+            m.conductivity = 1;
+            m.viscosity_law = GS4_VISCOSITY_CROSS_WLF;
+            if (solid) {
+                m.can_melt = 1;
+                m.melting_temperature = 300;
+                m.latent_heat = 1e5;
+                m.solid = GS4_NEO_HOOKEAN;
+                m.shear_modulus = 1e4;
+            }
+            sim = physics_create(&d, &m);
+            f.temperature = (gs4_real)T[c / 2];
+            CHECK_RESULT(sim,
+                         gs4_add_particles(sim, gs4_box(at(0.1, 0.1, 0.1), at(0.4, 0.4, 0.4)), &f),
+                         GS4_OK);
+            if (!solid) CHECK_RESULT(sim, gs4_step(sim, (gs4_real)1e-6), GS4_ERROR_UNSTABLE);
+            taken = heat_steps(sim, 5, 1e-3, &code);
+            CHECK(taken == (solid ? 5 : 0));
+            i = gs4_advance(sim, (gs4_real)0.01);
+            CHECK(solid ? i == GS4_OK : i == GS4_ERROR_UNSTABLE);
+            if (!solid) CHECK(strstr(gs4_last_error(sim), "viscosity") != NULL);
+            gs4_destroy(sim);
+        }
 }
 
 /* The solver may stop where it is told to, and then nothing has happened. */
@@ -656,20 +952,32 @@ static void test_heat_not_converged(void)
         int i;
         if (c & 1) d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER;
         for (i = 0; i < 6 && c & 2; i++) d.walls[i] = GS4_WALL_PERIODIC;
-        if (c & 4) d.solver_tolerance = (gs4_real)1e-14;    /* in float, too: that is what the solver works to */
-        else { d.solver_max_iterations = 1; d.solver_tolerance = (gs4_real)1e-6; }
-        m.heat_capacity = 1000; m.conductivity = (gs4_real)1e8;
-        other = m; other.conductivity = 1;
+        /* in float, too: that is what the solver works to */
+        if (c & 4)
+            d.solver_tolerance = (gs4_real)1e-14;
+        else {
+            d.solver_max_iterations = 1;
+            d.solver_tolerance = (gs4_real)1e-6;
+        }
+        m.heat_capacity = 1000;
+        m.conductivity = (gs4_real)1e8;
+        other = m;
+        other.conductivity = 1;
         sim = physics_create(&d, &m);
         CHECK_RESULT(sim, gs4_add_material(sim, &other), GS4_OK);
-        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_sphere(at(0.4, 0.5, 0.5), (gs4_real)0.3), &f), GS4_OK);
-        f.temperature = 50; f.material = 1;
-        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0.72, 0.2, 0.2), at(1, 0.6, 0.6)), &f), GS4_OK);
+        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_sphere(at(0.4, 0.5, 0.5), (gs4_real)0.3), &f),
+                     GS4_OK);
+        f.temperature = 50;
+        f.material = 1;
+        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0.72, 0.2, 0.2), at(1, 0.6, 0.6)), &f),
+                     GS4_OK);
         before = gs4_state_hash(sim);
         for (i = 0; i < 3; i++) {
             const int r = gs4_step(sim, (gs4_real)0.5 * gs4_stable_dt(sim));
             CHECK(r == GS4_ERROR_NOT_CONVERGED || (c & 4 && r == GS4_OK));
-            if (r != GS4_OK) CHECK(strstr(gs4_last_error(sim), "solver_tolerance") != NULL && gs4_state_hash(sim) == before);
+            if (r != GS4_OK)
+                CHECK(strstr(gs4_last_error(sim), "solver_tolerance") != NULL
+                      && gs4_state_hash(sim) == before);
             before = gs4_state_hash(sim);
         }
         if (!(c & 4)) CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)0.01), GS4_ERROR_NOT_CONVERGED);
@@ -678,7 +986,8 @@ static void test_heat_not_converged(void)
     }
 }
 
-/* Hot pours into cold; then all of it leaves through open walls, and what comes after finds an empty scene. */
+/* Hot pours into cold; then all of it leaves through open walls, and what comes after finds an
+ * empty scene. */
 static void test_heat_poured(void)
 {
     int c, i;
@@ -690,19 +999,32 @@ static void test_heat_poured(void)
         gs4_sim *sim;
         memset(&e, 0, sizeof e);
         if (c & 1) d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER;
-        d.gravity = at(0, -20, 0); d.walls[2] = GS4_WALL_OPEN; d.air_is_isothermal = 1; d.ambient_temperature = -30;
-        m.heat_capacity = 1000; m.conductivity = 1000; m.can_melt = 1; m.latent_heat = 1e4; m.flux_relaxation_time = (gs4_real)1e-3;
+        d.gravity = at(0, -20, 0);
+        d.walls[2] = GS4_WALL_OPEN;
+        d.air_is_isothermal = 1;
+        d.ambient_temperature = -30;
+        m.heat_capacity = 1000;
+        m.conductivity = 1000;
+        m.can_melt = 1;
+        m.latent_heat = 1e4;
+        m.flux_relaxation_time = (gs4_real)1e-3;
         sim = physics_create(&d, &m);
         f.temperature = -20;
-        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0, 0.1, 0), at(1, 0.3, 1)), &f), GS4_OK);
-        e.shape = gs4_box(at(0.4, 0.6, 0.4), at(0.6, 0.7, 0.6)); e.fill.velocity = at(0, -2, 0); e.fill.temperature = 500; e.stop = (gs4_real)0.2;
+        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0, 0.1, 0), at(1, 0.3, 1)), &f),
+                     GS4_OK);
+        e.shape = gs4_box(at(0.4, 0.6, 0.4), at(0.6, 0.7, 0.6));
+        e.fill.velocity = at(0, -2, 0);
+        e.fill.temperature = 500;
+        e.stop = (gs4_real)0.2;
         CHECK_RESULT(sim, gs4_add_emitter(sim, &e), GS4_OK);
         for (i = 0; i < 40; i++) {
             CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)0.025), GS4_OK);
-            CHECK(physics_is_finite(sim) && gs4_get_stats(sim).max_temperature < 550 && gs4_get_stats(sim).min_temperature > -80);
+            CHECK(physics_is_finite(sim) && gs4_get_stats(sim).max_temperature < 550
+                  && gs4_get_stats(sim).min_temperature > -80);
         }
         CHECK(gs4_get_stats(sim).particles == 0 && gs4_get_stats(sim).thermal_energy == 0);
-        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_sphere(at(0.5, 0.5, 0.5), (gs4_real)0.2), &f), GS4_OK);
+        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_sphere(at(0.5, 0.5, 0.5), (gs4_real)0.2), &f),
+                     GS4_OK);
         CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)0.01), GS4_OK);
         gs4_destroy(sim);
     }
@@ -715,34 +1037,64 @@ static double heat_random(uint64_t *state, double low, double high)
     return low + (high - low) * (double)(*state >> 11) / 9007199254740992.0;
 }
 static int heat_choice(uint64_t *state, int count) { return (int)heat_random(state, 0, count); }
-static gs4_real heat_power(uint64_t *state, double low, double high) { return (gs4_real)pow(10, heat_random(state, low, high)); }
+static gs4_real heat_power(uint64_t *state, double low, double high)
+{
+    return (gs4_real)pow(10, heat_random(state, low, high));
+}
 
 static gs4_real heat_callback(gs4_real T, gs4_real rate, void *user)
 {
     (void)rate;
-    return (gs4_real)((double)T > *(const double *)user ? -1 : (double)T < -*(const double *)user ? (double)NAN : 1);
+    return (gs4_real)((double)T > *(const double *)user    ? -1
+                      : (double)T < -*(const double *)user ? (double)NAN
+                                                           : 1);
 }
 
 static gs4_material heat_draw_material(uint64_t *r, int heats)
 {
     static const double edge = 3000;
-    gs4_material m = scene_liquid(pow(10, heat_random(r, 0, 4)), heat_choice(r, 3) ? pow(10, heat_random(r, -3, 1)) : 0, heat_choice(r, 4) ? heat_random(r, 5, 50) : 0);
+    gs4_material m = scene_liquid(pow(10, heat_random(r, 0, 4)),
+                                  heat_choice(r, 3) ? pow(10, heat_random(r, -3, 1)) : 0,
+                                  heat_choice(r, 4) ? heat_random(r, 5, 50) : 0);
     m.heat_capacity = heat_power(r, -3, 6);
     if (heat_choice(r, 4)) m.conductivity = heat_power(r, -6, 6);
-    if (m.conductivity > 0 && !heat_choice(r, 2)) { m.flux_relaxation_time = heat_choice(r, 3) ? heat_power(r, -6, 0) : heat_power(r, -15, 15); m.fourier_fraction = (gs4_real)(0.5 * heat_choice(r, 3)); }
+    if (m.conductivity > 0 && !heat_choice(r, 2)) {
+        m.flux_relaxation_time = heat_choice(r, 3) ? heat_power(r, -6, 0) : heat_power(r, -15, 15);
+        m.fourier_fraction = (gs4_real)(0.5 * heat_choice(r, 3));
+    }
     if (heat_choice(r, 2)) {
-        m.can_melt = 1; m.melting_temperature = (gs4_real)(heat_choice(r, 2) ? 0 : heat_random(r, -50, 50));
+        m.can_melt = 1;
+        m.melting_temperature = (gs4_real)(heat_choice(r, 2) ? 0 : heat_random(r, -50, 50));
         if (heat_choice(r, 2)) m.latent_heat = heat_power(r, 0, 9);
     }
-    if (!heat_choice(r, 3)) { m.solid = heat_choice(r, 2) ? GS4_NEO_HOOKEAN : GS4_FIXED_COROTATED; m.shear_modulus = heat_power(r, 0, 4); if (heat_choice(r, 2)) m.yield_stretch = m.yield_compression = (gs4_real)0.05; }
-    if ((m.can_melt || m.solid == GS4_NO_SOLID) && !heat_choice(r, 4)) { m.liquid = GS4_OLDROYD_B; m.local_fraction = (gs4_real)0.5; m.relaxation_time = heat_power(r, -3, 1); }
+    if (!heat_choice(r, 3)) {
+        m.solid = heat_choice(r, 2) ? GS4_NEO_HOOKEAN : GS4_FIXED_COROTATED;
+        m.shear_modulus = heat_power(r, 0, 4);
+        if (heat_choice(r, 2)) m.yield_stretch = m.yield_compression = (gs4_real)0.05;
+    }
+    if ((m.can_melt || m.solid == GS4_NO_SOLID) && !heat_choice(r, 4)) {
+        m.liquid = GS4_OLDROYD_B;
+        m.local_fraction = (gs4_real)0.5;
+        m.relaxation_time = heat_power(r, -3, 1);
+    }
     m.viscous_heating = heats && !heat_choice(r, 3);
-    if (!heat_choice(r, 20)) m.viscosity_law = GS4_VISCOSITY_CROSS_WLF;
-    else if (!heat_choice(r, 20)) { m.viscosity_law = GS4_VISCOSITY_CALLBACK; m.viscosity_fn = heat_callback; m.viscosity_user = (void *)(uintptr_t)&edge; }
+    if (!heat_choice(r, 20))
+        m.viscosity_law = GS4_VISCOSITY_CROSS_WLF;
+    else if (!heat_choice(r, 20)) {
+        m.viscosity_law = GS4_VISCOSITY_CALLBACK;
+        m.viscosity_fn = heat_callback;
+        m.viscosity_user = (void *)(uintptr_t)&edge;
+    }
     return m;
 }
 
-static double heat_draw_temperature(uint64_t *r) { return heat_choice(r, 3) ? heat_random(r, -100, 100) : heat_choice(r, 3) ? heat_random(r, -5000, 5000) : heat_choice(r, 2) ? 1e6 : 0; }
+static double heat_draw_temperature(uint64_t *r)
+{
+    return heat_choice(r, 3)   ? heat_random(r, -100, 100)
+           : heat_choice(r, 3) ? heat_random(r, -5000, 5000)
+           : heat_choice(r, 2) ? 1e6
+                               : 0;
+}
 
 /* A scene of random material, walls, fills, a body and a mouth; `open`: heat may come and go. */
 static gs4_sim *heat_draw_scene(uint64_t *r, int open)
@@ -754,33 +1106,65 @@ static gs4_sim *heat_draw_scene(uint64_t *r, int open)
         const int wall = heat_choice(r, 5);
         d.cells[a] = 4 + heat_choice(r, 6);
         for (i = 2 * a; i < 2 * a + 2; i++) {
-            d.walls[i] = (gs4_wall)(wall == 4 ? GS4_WALL_PERIODIC : open ? heat_choice(r, 4) : heat_choice(r, 3));
-            if (open && d.walls[i] < GS4_WALL_OPEN && !heat_choice(r, 3)) { d.wall_is_isothermal[i] = 1; d.wall_temperature[i] = (gs4_real)heat_draw_temperature(r); }
+            d.walls[i] = (gs4_wall)(wall == 4 ? GS4_WALL_PERIODIC
+                                    : open    ? heat_choice(r, 4)
+                                              : heat_choice(r, 3));
+            if (open && d.walls[i] < GS4_WALL_OPEN && !heat_choice(r, 3)) {
+                d.wall_is_isothermal[i] = 1;
+                d.wall_temperature[i] = (gs4_real)heat_draw_temperature(r);
+            }
         }
     }
     if (heat_choice(r, 3)) d.gravity = at(0, -9.81, 0);
-    if (open && !heat_choice(r, 2)) { d.air_is_isothermal = 1; d.ambient_temperature = (gs4_real)heat_draw_temperature(r); }
-    if (heat_choice(r, 3) == 0) d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER;
-    else { d.rho_inf = (gs4_real)(0.5 * heat_choice(r, 3)); d.rho_inf_spurious = d.rho_inf * (gs4_real)(0.4 * heat_choice(r, 3)); if (!heat_choice(r, 4)) d.flip_decay_time = (gs4_real)(heat_choice(r, 2) ? (double)INFINITY : 1e-6); }
+    if (open && !heat_choice(r, 2)) {
+        d.air_is_isothermal = 1;
+        d.ambient_temperature = (gs4_real)heat_draw_temperature(r);
+    }
+    if (heat_choice(r, 3) == 0)
+        d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER;
+    else {
+        d.rho_inf = (gs4_real)(0.5 * heat_choice(r, 3));
+        d.rho_inf_spurious = d.rho_inf * (gs4_real)(0.4 * heat_choice(r, 3));
+        if (!heat_choice(r, 4))
+            d.flip_decay_time = (gs4_real)(heat_choice(r, 2) ? (double)INFINITY : 1e-6);
+    }
     if (!open) d.solver_tolerance = (gs4_real)(sizeof(gs4_real) == 8 ? 1e-9 : 1e-6);
     CHECK(gs4_create(&d, &sim) == GS4_OK);
-    for (i = 0; i < materials; i++) { const gs4_material m = heat_draw_material(r, open); if (gs4_add_material(sim, &m) < 0) CHECK(gs4_last_error(sim)[0]); }
+    for (i = 0; i < materials; i++) {
+        const gs4_material m = heat_draw_material(r, open);
+        if (gs4_add_material(sim, &m) < 0) CHECK(gs4_last_error(sim)[0]);
+    }
     if (open && !heat_choice(r, 3)) {
         gs4_collider c;
         memset(&c, 0, sizeof c);
-        c.shape = heat_choice(r, 2) ? gs4_sphere(at(heat_random(r, 0, 1), heat_random(r, 0, 1), heat_random(r, 0, 1)), (gs4_real)0.2) : gs4_plane(at(0.1, 0.1, 0.1), at(0.2, 1, 0.1));
-        c.contact = (gs4_wall)heat_choice(r, 3); c.temperature = (gs4_real)heat_draw_temperature(r); c.is_isothermal = heat_choice(r, 2);
+        c.shape =
+            heat_choice(r, 2) ? gs4_sphere(
+                at(heat_random(r, 0, 1), heat_random(r, 0, 1), heat_random(r, 0, 1)), (gs4_real)0.2)
+                              : gs4_plane(at(0.1, 0.1, 0.1), at(0.2, 1, 0.1));
+        c.contact = (gs4_wall)heat_choice(r, 3);
+        c.temperature = (gs4_real)heat_draw_temperature(r);
+        c.is_isothermal = heat_choice(r, 2);
         CHECK_RESULT(sim, gs4_add_collider(sim, &c), 0);
     }
     for (i = 0; i < 1 + heat_choice(r, 3); i++) {
-        const double x = heat_random(r, 0, 0.9), y = heat_random(r, 0, 0.9), z = heat_random(r, 0, 0.9), size = heat_random(r, 0.1, 0.5);
+        const double x = heat_random(r, 0, 0.9), y = heat_random(r, 0, 0.9),
+                     z = heat_random(r, 0, 0.9), size = heat_random(r, 0.1, 0.5);
         gs4_fill f = scene_fill(at(heat_random(r, -2, 2), heat_random(r, -2, 2), 0));
-        f.material = heat_choice(r, materials); f.jitter = (gs4_real)(0.5 * heat_choice(r, 3)); f.random_seed = (uint32_t)i;
+        f.material = heat_choice(r, materials);
+        f.jitter = (gs4_real)(0.5 * heat_choice(r, 3));
+        f.random_seed = (uint32_t)i;
         f.temperature = (gs4_real)heat_draw_temperature(r);
-        if (heat_choice(r, 6)) a = gs4_add_particles(sim, heat_choice(r, 2) ? gs4_box(at(x, y, z), at(x + size, y + size, z + size)) : gs4_sphere(at(x, y, z), (gs4_real)(0.5 * size)), &f);
+        if (heat_choice(r, 6))
+            a = gs4_add_particles(sim,
+                                  heat_choice(r, 2)
+                                      ? gs4_box(at(x, y, z), at(x + size, y + size, z + size))
+                                      : gs4_sphere(at(x, y, z), (gs4_real)(0.5 * size)),
+                                  &f);
         else {
             gs4_real one[3];
-            one[0] = (gs4_real)(0.4 * x + 0.05); one[1] = (gs4_real)(0.4 * y + 0.05); one[2] = (gs4_real)(0.4 * z + 0.05);
+            one[0] = (gs4_real)(0.4 * x + 0.05);
+            one[1] = (gs4_real)(0.4 * y + 0.05);
+            one[2] = (gs4_real)(0.4 * z + 0.05);
             a = gs4_add_points(sim, one, 1, (gs4_real)(1e-4 * (heat_choice(r, 2) ? 1 : 1e-8)), &f);
         }
         CHECK(a >= 0 || gs4_last_error(sim)[0]);
@@ -788,7 +1172,10 @@ static gs4_sim *heat_draw_scene(uint64_t *r, int open)
     if (open && !heat_choice(r, 3)) {
         gs4_emitter e;
         memset(&e, 0, sizeof e);
-        e.shape = gs4_box(at(0.1, 0.3, 0.1), at(0.3, 0.45, 0.3)); e.fill.velocity = at(0, -1, 0); e.fill.temperature = (gs4_real)heat_draw_temperature(r); e.fill.material = heat_choice(r, materials);
+        e.shape = gs4_box(at(0.1, 0.3, 0.1), at(0.3, 0.45, 0.3));
+        e.fill.velocity = at(0, -1, 0);
+        e.fill.temperature = (gs4_real)heat_draw_temperature(r);
+        e.fill.material = heat_choice(r, materials);
         a = gs4_add_emitter(sim, &e);
         CHECK(a >= 0 || gs4_last_error(sim)[0]);
     }
@@ -800,12 +1187,16 @@ static void heat_draw_edit(uint64_t *r, gs4_sim *sim)
 {
     const double wrong[5] = { (double)NAN, (double)INFINITY, -(double)INFINITY, 1e30, -1e30 };
     gs4_edit T = gs4_edit_particles(sim, GS4_FIELD_TEMPERATURE);
-    const int which = heat_choice(r, 5 - 2 * (sizeof(gs4_real) == 8)), one = T.count ? heat_choice(r, T.count) : 0;
+    const int which = heat_choice(r, 5 - 2 * (sizeof(gs4_real) == 8)),
+              one = T.count ? heat_choice(r, T.count) : 0;
     gs4_real keep;
     int i;
     if (!T.count) return;
     switch (heat_choice(r, 3)) {
-    case 0: for (i = 0; i < T.count; i++) T.data[(size_t)i * (size_t)T.stride] = (gs4_real)heat_draw_temperature(r); break;
+    case 0:
+        for (i = 0; i < T.count; i++)
+            T.data[(size_t)i * (size_t)T.stride] = (gs4_real)heat_draw_temperature(r);
+        break;
     case 1: T.data[(size_t)one * (size_t)T.stride] = (gs4_real)1e6; break;
     default:
         keep = T.data[(size_t)one * (size_t)T.stride];
@@ -817,34 +1208,41 @@ static void heat_draw_edit(uint64_t *r, gs4_sim *sim)
     }
 }
 
-/* What the particles would hold at the greatest |T| among them: what rounding and the solver are measured by. */
+/* What the particles would hold at the greatest |T| among them: what rounding and the solver are
+ * measured by. */
 static double heat_scale(const gs4_sim *sim)
 {
-    const gs4_view T = gs4_particles(sim, GS4_FIELD_TEMPERATURE), m = gs4_particles(sim, GS4_FIELD_MASS);
+    const gs4_view T = gs4_particles(sim, GS4_FIELD_TEMPERATURE),
+                   m = gs4_particles(sim, GS4_FIELD_MASS);
     double sum = 0, most = 0;
     int i;
-    for (i = 0; i < T.count; i++) most = fmax(most, fabs((double)T.data[(size_t)i * (size_t)T.stride]));
+    for (i = 0; i < T.count; i++)
+        most = fmax(most, fabs((double)T.data[(size_t)i * (size_t)T.stride]));
     for (i = 0; i < T.count; i++) {
         const gs4_material *is = &sim->laws[gs4_particle_materials(sim)[i]].is;
-        sum += (double)m.data[(size_t)i * (size_t)m.stride] * ((double)is->heat_capacity * most + (double)is->latent_heat);
+        sum += (double)m.data[(size_t)i * (size_t)m.stride]
+               * ((double)is->heat_capacity * most + (double)is->latent_heat);
     }
     return sum;
 }
 
-/* k dt / (rho c h^2) of the best conductor: what the solver leaves undone is a share of the heat that flows, which is so many times what is there. */
+/* k dt / (rho c h^2) of the best conductor: what the solver leaves undone is a share of the heat
+ * that flows, which is so many times what is there. */
 static double heat_number(const gs4_sim *sim)
 {
     double most = 0;
     int i;
     for (i = 0; i < sim->material_count; i++) {
         const gs4_material *is = &sim->laws[i].is;
-        most = fmax(most, (double)is->conductivity * sim->last_dt / ((double)is->density * (double)is->heat_capacity) * (double)sim->grid.inv_h * (double)sim->grid.inv_h);
+        most = fmax(most, (double)is->conductivity * sim->last_dt
+                              / ((double)is->density * (double)is->heat_capacity)
+                              * (double)sim->grid.inv_h * (double)sim->grid.inv_h);
     }
     return most;
 }
 
-/* Random scenes: each call gives a result or a code with a sentence, a step that is refused has changed nothing, nothing is ever NaN or infinite,
- * and in what is insulated heat stays. */
+/* Random scenes: each call gives a result or a code with a sentence, a step that is refused has
+ * changed nothing, nothing is ever NaN or infinite, and in what is insulated heat stays. */
 static void test_heat_draws(void)
 {
     const int draws = test_slow ? 20000 : 300;
@@ -858,22 +1256,37 @@ static void test_heat_draws(void)
         for (i = 0; i < 8; i++) {
             gs4_real limit, dt;
             double energy, scale;
-            if (open && !heat_choice(&r, 4)) { heat_draw_edit(&r, sim); edited = 1; }
+            if (open && !heat_choice(&r, 4)) {
+                heat_draw_edit(&r, sim);
+                edited = 1;
+            }
             limit = gs4_stable_dt(sim);
             CHECK(limit >= 0);
-            dt = (gs4_real)heat_random(&r, 0.01, 1) * (limit < (gs4_real)0.05 ? limit : (gs4_real)0.05);
+            dt = (gs4_real)heat_random(&r, 0.01, 1)
+                 * (limit < (gs4_real)0.05 ? limit : (gs4_real)0.05);
             if (!heat_choice(&r, 10)) dt = (gs4_real)1e-4 * dt;
-            if (!((double)dt > 1e-17)) { CHECK(physics_is_finite(sim)); continue; }    /* a viscosity beyond all bounds */
-            before = gs4_state_hash(sim); energy = gs4_get_stats(sim).thermal_energy; scale = heat_scale(sim);
+            /* a viscosity beyond all bounds */
+            if (!((double)dt > 1e-17)) {
+                CHECK(physics_is_finite(sim));
+                continue;
+            }
+            before = gs4_state_hash(sim);
+            energy = gs4_get_stats(sim).thermal_energy;
+            scale = heat_scale(sim);
             result = gs4_step(sim, dt);
             steps++;
             if (result != GS4_OK) {
-                refused[result == GS4_ERROR_UNSTABLE ? 0 : result == GS4_ERROR_NOT_CONVERGED ? 1 : 2]++;
-                CHECK(result < 0 && gs4_last_error(sim)[0] && (edited || gs4_state_hash(sim) == before));   /* phases follow an edit at once */
+                refused[result == GS4_ERROR_UNSTABLE        ? 0
+                        : result == GS4_ERROR_NOT_CONVERGED ? 1
+                                                            : 2]++;
+                /* phases follow an edit at once */
+                CHECK(result < 0 && gs4_last_error(sim)[0]
+                      && (edited || gs4_state_hash(sim) == before));
             } else if (!open && scale > 0) {
                 const double off = fabs(gs4_get_stats(sim).thermal_energy - energy) / scale;
                 if (off > lost) lost = off;
-                CHECK_CLOSE(off, 0, sizeof(gs4_real) == 8 ? 1e-5 : 1e-4 * (1 + 0.01 * heat_number(sim)));
+                CHECK_CLOSE(off, 0,
+                            sizeof(gs4_real) == 8 ? 1e-5 : 1e-4 * (1 + 0.01 * heat_number(sim)));
             }
             if (result == GS4_OK) edited = 0;
             CHECK(physics_is_finite(sim));
@@ -881,11 +1294,15 @@ static void test_heat_draws(void)
         if (test_failed != failed) printf("draw %d\n", draw);
         gs4_destroy(sim);
     }
-    if (test_filter[0]) printf("%d steps; refused as unstable %d, not converged %d, else %d; heat lost in a step at most %.2e\n", steps, refused[0], refused[1], refused[2], lost);
+    if (test_filter[0])
+        printf("%d steps; refused as unstable %d, not converged %d, else %d; heat lost in a step "
+               "at most %.2e\n",
+               steps, refused[0], refused[1], refused[2], lost);
     CHECK(refused[1] + refused[2] == 0);
 }
 
-/* What warms by less than the last digit of its temperature in a step warms still: T = 1500 + cos x in an insulated bar, by 2e-5 K a step and less. */
+/* What warms by less than the last digit of its temperature in a step warms still: T = 1500 +
+ * cos x in an insulated bar, by 2e-5 K a step and less. */
 static void test_heat_slowly(void)
 {
     const heat_bar bar = { 8, 1, 0, 1, 2e-5, 0.05, GS4_INTEGRATOR_GS4, 0, 0, 0, 1500 };

@@ -24,14 +24,18 @@ static int physics_is_finite(const gs4_sim *sim)
     for (field = 0; field <= GS4_FIELD_MASS; field++) {
         const gs4_view v = gs4_particles(sim, (gs4_field)field);
         for (i = 0; i < v.count; i++)
-            for (c = 0; c < v.components; c++) if (!(fabs((double)v.data[(size_t)i * (size_t)v.stride + (size_t)c]) < absurd)) return 0;
+            for (c = 0; c < v.components; c++)
+                if (!(fabs((double)v.data[(size_t)i * (size_t)v.stride + (size_t)c]) < absurd))
+                    return 0;
     }
     return 1;
 }
 
-static gs4_integrator physics_integrators[2] = { GS4_INTEGRATOR_GS4, GS4_INTEGRATOR_SYMPLECTIC_EULER };
+static gs4_integrator physics_integrators[2] = { GS4_INTEGRATOR_GS4,
+                                                 GS4_INTEGRATOR_SYMPLECTIC_EULER };
 
-/* x0 + v0 t + g t^2 / 2 to rounding for any dt where rho_inf_spurious is 0; else an error that falls as dt^2. */
+/* x0 + v0 t + g t^2 / 2 to rounding for any dt where rho_inf_spurious is 0; else an error that
+ * falls as dt^2. */
 static double flight_error(double rho, double spurious, double fraction, double *dt)
 {
     static double x0[3 * 4096], x1[3 * 4096];
@@ -42,7 +46,9 @@ static double flight_error(double rho, double spurious, double fraction, double 
     double worst = 0, t;
     gs4_sim *sim;
     int i, n, steps = (int)(40 / fraction);
-    d.rho_inf = (gs4_real)rho; d.rho_inf_spurious = (gs4_real)spurious; d.gravity = at(0, -9.81, 0);
+    d.rho_inf = (gs4_real)rho;
+    d.rho_inf_spurious = (gs4_real)spurious;
+    d.gravity = at(0, -9.81, 0);
     sim = physics_create(&d, &m);
     n = gs4_add_particles(sim, gs4_box(at(0.35, 0.5, 0.35), at(0.58, 0.73, 0.58)), &f);
     CHECK(n > 0 && n <= 4096);
@@ -52,10 +58,12 @@ static double flight_error(double rho, double spurious, double fraction, double 
     scene_by_id(sim, GS4_FIELD_POSITION, x1);
     t = gs4_get_stats(sim).time;
     for (i = 0; i < 3 * n; i++) {
-        const double e = fabs(x1[i] - (x0[i] + v0[i % 3] * t - (i % 3 == 1 ? 0.5 * 9.81 * t * t : 0)));
+        const double e =
+            fabs(x1[i] - (x0[i] + v0[i % 3] * t - (i % 3 == 1 ? 0.5 * 9.81 * t * t : 0)));
         if (e > worst) worst = e;
     }
-    CHECK_CLOSE(gs4_get_stats(sim).momentum[1] / gs4_get_stats(sim).mass, 0.5 - 9.81 * t, sizeof(gs4_real) == 8 ? 1e-12 : 2e-6);
+    CHECK_CLOSE(gs4_get_stats(sim).momentum[1] / gs4_get_stats(sim).mass, 0.5 - 9.81 * t,
+                sizeof(gs4_real) == 8 ? 1e-12 : 2e-6);
     gs4_destroy(sim);
     return worst;
 }
@@ -67,11 +75,13 @@ static void test_free_flight(void)
     CHECK(flight_error(0, 0, 1, &dt) < rounding);
     CHECK(flight_error(0.5, 0, 0.37, &dt) < rounding);
     CHECK(flight_error(1, 0, 0.7, &dt) < rounding);
-    coarse = flight_error(0.5, 0.5, 1, &dt); fine = flight_error(0.5, 0.5, 0.5, &dt);
+    coarse = flight_error(0.5, 0.5, 1, &dt);
+    fine = flight_error(0.5, 0.5, 0.5, &dt);
     if (sizeof(gs4_real) == 8) CHECK_CLOSE(log2(coarse / fine), 2, 0.1);
 }
 
-/* A spinning ball in free space: what it keeps of its angular momentum; momentum and mass to rounding. */
+/* A spinning ball in free space: what it keeps of its angular momentum; momentum and mass to
+ * rounding. */
 static double spin_kept(gs4_integrator integrator, double decay)
 {
     gs4_sim_desc d = scene_cube(24);
@@ -79,7 +89,8 @@ static double spin_kept(gs4_integrator integrator, double decay)
     gs4_fill f = scene_fill(at(0, 0, 0));
     gs4_stats before, after;
     gs4_sim *sim;
-    d.integrator = integrator; d.flip_decay_time = (gs4_real)decay;
+    d.integrator = integrator;
+    d.flip_decay_time = (gs4_real)decay;
     sim = physics_create(&d, &m);
     f.angular_velocity = at(0, 0, 1);
     CHECK(gs4_add_particles(sim, gs4_sphere(at(0.5, 0.5, 0.5), (gs4_real)0.25), &f) > 0);
@@ -87,9 +98,12 @@ static double spin_kept(gs4_integrator integrator, double decay)
     CHECK(physics_run(sim, 1) == 0);
     after = gs4_get_stats(sim);
     CHECK_CLOSE(after.mass, before.mass, 0);
-    CHECK_CLOSE(after.momentum[0], before.momentum[0], before.mass * (sizeof(gs4_real) == 8 ? 1e-13 : 3e-6));
+    CHECK_CLOSE(after.momentum[0], before.momentum[0],
+                before.mass * (sizeof(gs4_real) == 8 ? 1e-13 : 3e-6));
     gs4_destroy(sim);
-    if (test_filter[0]) printf("integrator %d, decay %g: spin kept %.4f\n", (int)integrator, decay, after.angular_momentum[2] / before.angular_momentum[2]);
+    if (test_filter[0])
+        printf("integrator %d, decay %g: spin kept %.4f\n", (int)integrator, decay,
+               after.angular_momentum[2] / before.angular_momentum[2]);
     return after.angular_momentum[2] / before.angular_momentum[2];
 }
 
@@ -102,9 +116,11 @@ static void test_spin(void)
 
 #define MOMENTUM_ROUNDING (sizeof(gs4_real) == 8 ? 2e-15 : 2.5 * (double)FLT_EPSILON)
 
-/* A drop that breathes, shears and turns, off to the right at speed `drift`, far from walls: what 100 steps of half the limit change of
- * its momentum, over sum m |v|. *spin, *t: what is left of its angular momentum, and when. */
-static double momentum_lost(gs4_integrator integrator, double decay, double drift, gs4_wall walls, double *spin, double *t)
+/* A drop that breathes, shears and turns, off to the right at speed `drift`, far from walls:
+ * what 100 steps of half the limit change of its momentum, over sum m |v|. *spin, *t: what is
+ * left of its angular momentum, and when. */
+static double momentum_lost(gs4_integrator integrator, double decay, double drift, gs4_wall walls,
+                            double *spin, double *t)
 {
     gs4_sim_desc d = scene_cube(20);
     gs4_material m = scene_liquid(1000, 1, 2);
@@ -115,9 +131,12 @@ static double momentum_lost(gs4_integrator integrator, double decay, double drif
     double all = 0, worst = 0;
     int i;
     if (walls != GS4_WALL_PERIODIC) d.cells[0] = 48;
-    d.walls[0] = d.walls[1] = walls; d.integrator = integrator; d.flip_decay_time = (gs4_real)decay;
+    d.walls[0] = d.walls[1] = walls;
+    d.integrator = integrator;
+    d.flip_decay_time = (gs4_real)decay;
     sim = physics_create(&d, &m);
-    f.jitter = (gs4_real)0.5; f.random_seed = 3;
+    f.jitter = (gs4_real)0.5;
+    f.random_seed = 3;
     CHECK(gs4_add_particles(sim, gs4_sphere(at(0.5, 0.5, 0.5), (gs4_real)0.18), &f) > 0);
     order_stir(sim);
     v = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
@@ -129,44 +148,67 @@ static double momentum_lost(gs4_integrator integrator, double decay, double drif
     before = gs4_get_stats(sim);
     for (i = 0; i < 100; i++) CHECK_RESULT(sim, gs4_step(sim, gs4_stable_dt(sim) / 2), GS4_OK);
     after = gs4_get_stats(sim);
-    for (i = 0; i < 3; i++) worst = fmax(worst, fabs(after.momentum[i] - before.momentum[i]) / (before.mass * all));
-    *spin = after.angular_momentum[2] + 0.5 * after.momentum[0] - (0.5 + drift * after.time) * after.momentum[1];
+    for (i = 0; i < 3; i++)
+        worst = fmax(worst, fabs(after.momentum[i] - before.momentum[i]) / (before.mass * all));
+    *spin = after.angular_momentum[2] + 0.5 * after.momentum[0]
+            - (0.5 + drift * after.time) * after.momentum[1];
     *spin /= before.angular_momentum[2] + 0.5 * before.momentum[0] - 0.5 * before.momentum[1];
     *t = after.time;
     gs4_destroy(sim);
     return worst;
 }
 
-/* To rounding, whatever fades and however fast: what the grid does not see of velocities has no momentum in all. */
+/* To rounding, whatever fades and however fast: what the grid does not see of velocities has no
+ * momentum in all. */
 static void test_momentum(void)
 {
-    const double drifts[2] = { 0, 1 }, decays[3] = { 0.5, 0.02, 1e-4 };     /* the last within a step */
+    /* the last within a step */
+    const double drifts[2] = { 0, 1 }, decays[3] = { 0.5, 0.02, 1e-4 };
     double spin, t, lost;
     int i, k;
     for (i = 0; i < 2; i++) {
-        lost = momentum_lost(GS4_INTEGRATOR_SYMPLECTIC_EULER, 0, drifts[i], GS4_WALL_SLIP, &spin, &t);
-        if (test_filter[0]) printf("drift %g, symplectic Euler: momentum within %.1e, spin kept %.4f in %.2f s\n", drifts[i], lost, spin, t);
-        CHECK(lost < MOMENTUM_ROUNDING); CHECK(spin > 0.9);     /* what the affine parts hold is not counted */
-        lost = momentum_lost(GS4_INTEGRATOR_GS4, (double)INFINITY, drifts[i], GS4_WALL_SLIP, &spin, &t);
-        if (test_filter[0]) printf("drift %g, no decay: momentum within %.1e, spin kept %.4f in %.2f s\n", drifts[i], lost, spin, t);
-        CHECK(lost < MOMENTUM_ROUNDING); CHECK(spin > 0.99);
+        lost =
+            momentum_lost(GS4_INTEGRATOR_SYMPLECTIC_EULER, 0, drifts[i], GS4_WALL_SLIP, &spin, &t);
+        if (test_filter[0])
+            printf("drift %g, symplectic Euler: momentum within %.1e, spin kept %.4f in %.2f s\n",
+                   drifts[i], lost, spin, t);
+        /* what the affine parts hold is not counted */
+        CHECK(lost < MOMENTUM_ROUNDING);
+        CHECK(spin > 0.9);
+        lost = momentum_lost(GS4_INTEGRATOR_GS4, (double)INFINITY, drifts[i], GS4_WALL_SLIP, &spin,
+                             &t);
+        if (test_filter[0])
+            printf("drift %g, no decay: momentum within %.1e, spin kept %.4f in %.2f s\n",
+                   drifts[i], lost, spin, t);
+        CHECK(lost < MOMENTUM_ROUNDING);
+        CHECK(spin > 0.99);
         for (k = 0; k < 3; k++) {
-            lost = momentum_lost(GS4_INTEGRATOR_GS4, decays[k], drifts[i], GS4_WALL_SLIP, &spin, &t);
-            if (test_filter[0]) printf("drift %g, decay %g s: momentum within %.1e, spin kept %.4f in %.2f s\n", drifts[i], decays[k], lost, spin, t);
-            CHECK(lost < (sizeof(gs4_real) == 8 ? 2 : 1) * MOMENTUM_ROUNDING); CHECK(k == 2 || spin > exp(-t / decays[k])); CHECK(k > 0 || spin > 0.8);
+            lost =
+                momentum_lost(GS4_INTEGRATOR_GS4, decays[k], drifts[i], GS4_WALL_SLIP, &spin, &t);
+            if (test_filter[0])
+                printf("drift %g, decay %g s: momentum within %.1e, spin kept %.4f in %.2f s\n",
+                       drifts[i], decays[k], lost, spin, t);
+            CHECK(lost < (sizeof(gs4_real) == 8 ? 2 : 1) * MOMENTUM_ROUNDING);
+            CHECK(k == 2 || spin > exp(-t / decays[k]));
+            CHECK(k > 0 || spin > 0.8);
         }
         scene_sharp = 1;
         lost = momentum_lost(GS4_INTEGRATOR_GS4, 0.5, drifts[i], GS4_WALL_SLIP, &spin, &t);
         scene_sharp = 0;
-        if (test_filter[0]) printf("drift %g, sharpened: momentum within %.1e, spin kept %.4f in %.2f s\n", drifts[i], lost, spin, t);
-        CHECK(lost < (sizeof(gs4_real) == 8 ? 2 : 1) * MOMENTUM_ROUNDING); CHECK(spin > 0.9);
+        if (test_filter[0])
+            printf("drift %g, sharpened: momentum within %.1e, spin kept %.4f in %.2f s\n",
+                   drifts[i], lost, spin, t);
+        CHECK(lost < (sizeof(gs4_real) == 8 ? 2 : 1) * MOMENTUM_ROUNDING);
+        CHECK(spin > 0.9);
     }
 }
 
-/* The seam of a periodic box is no place: a drop that goes through it keeps its momentum as any other. */
+/* The seam of a periodic box is no place: a drop that goes through it keeps its momentum as any
+ * other. */
 static void test_momentum_seam(void)
 {
-    double spin, t, lost = momentum_lost(GS4_INTEGRATOR_GS4, (double)INFINITY, 1, GS4_WALL_PERIODIC, &spin, &t);
+    double spin, t,
+        lost = momentum_lost(GS4_INTEGRATOR_GS4, (double)INFINITY, 1, GS4_WALL_PERIODIC, &spin, &t);
     if (test_filter[0]) printf("through the seam: momentum within %.1e\n", lost);
     CHECK(lost < MOMENTUM_ROUNDING);
     scene_sharp = 1;
@@ -176,10 +218,12 @@ static void test_momentum_seam(void)
     CHECK(lost < MOMENTUM_ROUNDING);
 }
 
-/* Plane channel along x between walls y = 0 and y = 1, periodic in x and z; profile error (2-norm) at time t. */
+/* Plane channel along x between walls y = 0 and y = 1, periodic in x and z; profile error
+ * (2-norm) at time t. */
 typedef double (*physics_profile)(double y, double t);
 
-static double channel_error(int n, gs4_integrator integrator, gs4_vec3 gravity, double viscosity, double t, physics_profile exact)
+static double channel_error(int n, gs4_integrator integrator, gs4_vec3 gravity, double viscosity,
+                            double t, physics_profile exact)
 {
     static double x[3 * 40000], v[3 * 40000];
     gs4_sim_desc d = scene_cube(n);
@@ -191,28 +235,33 @@ static double channel_error(int n, gs4_integrator integrator, gs4_vec3 gravity, 
     d.cells[0] = d.cells[2] = 4;
     d.walls[0] = d.walls[1] = d.walls[4] = d.walls[5] = GS4_WALL_PERIODIC;
     d.walls[2] = d.walls[3] = GS4_WALL_STICK;
-    d.gravity = gravity; d.integrator = integrator;
+    d.gravity = gravity;
+    d.integrator = integrator;
     sim = physics_create(&d, &m);
     count = gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1, 1, 1)), &f);
     CHECK(count > 0 && count <= 40000);
     CHECK(physics_run(sim, t) == 0);
-    scene_by_id(sim, GS4_FIELD_POSITION, x); scene_by_id(sim, GS4_FIELD_VELOCITY, v);
+    scene_by_id(sim, GS4_FIELD_POSITION, x);
+    scene_by_id(sim, GS4_FIELD_VELOCITY, v);
     for (i = 0; i < count; i++) {
         const double y = x[3 * i + 1], e = v[3 * i] - exact(y, t);
-        if (y < 0.1 || y > 0.9) continue;                   /* away from the walls */
-        sum += e * e; weight += 1;
+        if (y < 0.1 || y > 0.9) continue; /* away from the walls */
+        sum += e * e;
+        weight += 1;
     }
     gs4_destroy(sim);
     return sqrt(sum / weight);
 }
 
-/* Start-up of Poiseuille flow, g = 8 nu, so that the steady maximum is 1: u = 4 y (1-y) - sum 32/(pi k)^3 sin(k pi y) exp(-k^2 pi^2 nu t) */
+/* Start-up of Poiseuille flow, g = 8 nu, so that the steady maximum is 1: u = 4 y (1-y) - sum
+ * 32/(pi k)^3 sin(k pi y) exp(-k^2 pi^2 nu t) */
 static double poiseuille(double y, double t)
 {
     const double nu = 0.5, pi = acos(-1.0);
     double u = 4 * y * (1 - y);
     int k;
-    for (k = 1; k < 60; k += 2) u -= 32 / pow(k * pi, 3) * sin(k * pi * y) * exp(-k * k * pi * pi * nu * t);
+    for (k = 1; k < 60; k += 2)
+        u -= 32 / pow(k * pi, 3) * sin(k * pi * y) * exp(-k * k * pi * pi * nu * t);
     return u;
 }
 
@@ -220,15 +269,20 @@ static void test_poiseuille(void)
 {
     int i;
     for (i = 0; i < 2; i++) {
-        const double coarse = channel_error(8, physics_integrators[i], at(4, 0, 0), 0.5, 0.15, poiseuille);
-        const double fine = channel_error(16, physics_integrators[i], at(4, 0, 0), 0.5, 0.15, poiseuille);
-        if (test_filter[0]) printf("Poiseuille, integrator %d: errors %.2e %.2e, order %.2f\n", (int)physics_integrators[i], coarse, fine, log2(coarse / fine));
+        const double coarse =
+            channel_error(8, physics_integrators[i], at(4, 0, 0), 0.5, 0.15, poiseuille);
+        const double fine =
+            channel_error(16, physics_integrators[i], at(4, 0, 0), 0.5, 0.15, poiseuille);
+        if (test_filter[0])
+            printf("Poiseuille, integrator %d: errors %.2e %.2e, order %.2f\n",
+                   (int)physics_integrators[i], coarse, fine, log2(coarse / fine));
         CHECK(log2(coarse / fine) > 1.8);
         CHECK(fine < 1e-2);
     }
 }
 
-/* A column at rest, 7 cells high: pressure profile within 1 % (2 % where gradients are sharpened), and it stays at rest. */
+/* A column at rest, 7 cells high: pressure profile within 1 % (2 % where gradients are
+ * sharpened), and it stays at rest. */
 static void column_at_rest(gs4_integrator integrator, gs4_wall floor)
 {
     gs4_sim_desc d = scene_cube(12);
@@ -239,18 +293,26 @@ static void column_at_rest(gs4_integrator integrator, gs4_wall floor)
     gs4_view x, J;
     gs4_sim *sim;
     int i;
-    d.cells[0] = d.cells[2] = 4; d.gravity = at(0, -10, 0); d.integrator = integrator; d.walls[2] = floor;
+    d.cells[0] = d.cells[2] = 4;
+    d.gravity = at(0, -10, 0);
+    d.integrator = integrator;
+    d.walls[2] = floor;
     sim = physics_create(&d, &m);
     CHECK(gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(4.0 / 12, height, 4.0 / 12)), &f) > 0);
     CHECK(physics_run(sim, 1.5) == 0);
     speed = gs4_get_stats(sim).max_speed / sqrt(10 * height);
-    x = gs4_particles(sim, GS4_FIELD_POSITION); J = gs4_particles(sim, GS4_FIELD_VOLUME_RATIO);
+    x = gs4_particles(sim, GS4_FIELD_POSITION);
+    J = gs4_particles(sim, GS4_FIELD_VOLUME_RATIO);
     for (i = 0; i < x.count; i++) {
-        const double y = (double)x.data[(size_t)i * (size_t)x.stride + 1], j = (double)J.data[(size_t)i * (size_t)J.stride];
-        const double p = k / 7 * (pow(j, -7) - 1), e = fabs(p - 1000 * 10 * (height - y)) / (1000 * 10 * height);
+        const double y = (double)x.data[(size_t)i * (size_t)x.stride + 1],
+                     j = (double)J.data[(size_t)i * (size_t)J.stride];
+        const double p = k / 7 * (pow(j, -7) - 1),
+                     e = fabs(p - 1000 * 10 * (height - y)) / (1000 * 10 * height);
         if (y > 0.5 / 12 && y < height - 1.5 / 12 && e > error) error = e;
     }
-    if (test_filter[0]) printf("column, integrator %d, floor %d: speed %.1e sqrt(g h), pressure within %.2f %%\n", (int)integrator, (int)floor, speed, 100 * error);
+    if (test_filter[0])
+        printf("column, integrator %d, floor %d: speed %.1e sqrt(g h), pressure within %.2f %%\n",
+               (int)integrator, (int)floor, speed, 100 * error);
     CHECK(speed < 1e-3);
     CHECK(error < (scene_sharp ? 0.02 : 0.01));
     gs4_destroy(sim);
@@ -277,34 +339,47 @@ static void sound_speed(gs4_integrator integrator)
     gs4_fill f = scene_fill(at(0, 0, 0));
     const double pi = acos(-1.0), a = 1e-3;
     double before = 1, now = 1, t_before = 0, crossing = 0;
-    gs4_edit v; gs4_view x;
+    gs4_edit v;
+    gs4_view x;
     gs4_sim *sim;
     int i, w;
-    d.cells[1] = d.cells[2] = 4; d.integrator = integrator;
+    d.cells[1] = d.cells[2] = 4;
+    d.integrator = integrator;
     if (integrator == GS4_INTEGRATOR_GS4) d.flip_decay_time = INFINITY;
     for (w = 0; w < 6; w++) d.walls[w] = GS4_WALL_PERIODIC;
     sim = physics_create(&d, &m);
     CHECK(gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1, 0.125, 0.125)), &f) > 0);
     x = gs4_particles(sim, GS4_FIELD_POSITION);
     v = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
-    for (i = 0; i < v.count; i++) v.data[(size_t)i * (size_t)v.stride] = (gs4_real)(a * sin(2 * pi * (double)x.data[(size_t)i * (size_t)x.stride]));
-    while (now > 0 && gs4_get_stats(sim).time < 1) {        /* amplitude goes as cos(2 pi c0 t): zero at a quarter */
-        before = now; t_before = gs4_get_stats(sim).time;
+    for (i = 0; i < v.count; i++)
+        v.data[(size_t)i * (size_t)v.stride] =
+            (gs4_real)(a * sin(2 * pi * (double)x.data[(size_t)i * (size_t)x.stride]));
+    /* amplitude goes as cos(2 pi c0 t): zero at a quarter */
+    while (now > 0 && gs4_get_stats(sim).time < 1) {
+        before = now;
+        t_before = gs4_get_stats(sim).time;
         CHECK_RESULT(sim, gs4_step(sim, (gs4_real)(0.3 * (double)gs4_stable_dt(sim))), GS4_OK);
         x = gs4_particles(sim, GS4_FIELD_POSITION);
         now = 0;
         for (i = 0; i < x.count; i++) {
             const gs4_view u = gs4_particles(sim, GS4_FIELD_VELOCITY);
-            now += (double)u.data[(size_t)i * (size_t)u.stride] * sin(2 * pi * (double)x.data[(size_t)i * (size_t)x.stride]) / (0.5 * a * x.count);
+            now += (double)u.data[(size_t)i * (size_t)u.stride]
+                   * sin(2 * pi * (double)x.data[(size_t)i * (size_t)x.stride])
+                   / (0.5 * a * x.count);
         }
         crossing = t_before + (gs4_get_stats(sim).time - t_before) * before / (before - now);
     }
-    if (test_filter[0]) printf("sound, integrator %d: speed %.4f of c0\n", (int)integrator, 0.25 / crossing);
+    if (test_filter[0])
+        printf("sound, integrator %d: speed %.4f of c0\n", (int)integrator, 0.25 / crossing);
     CHECK_CLOSE(0.25 / crossing, 1, 0.02);
     gs4_destroy(sim);
 }
 
-static void test_sound_speed(void) { sound_speed(GS4_INTEGRATOR_GS4); sound_speed(GS4_INTEGRATOR_SYMPLECTIC_EULER); }
+static void test_sound_speed(void)
+{
+    sound_speed(GS4_INTEGRATOR_GS4);
+    sound_speed(GS4_INTEGRATOR_SYMPLECTIC_EULER);
+}
 
 /* A drop under no force: stays at rest and round. */
 static void test_drop_at_rest(void)
@@ -324,15 +399,17 @@ static void test_drop_at_rest(void)
         scene_by_id(sim, GS4_FIELD_POSITION, x0);
         CHECK(physics_run(sim, 1) == 0);
         scene_by_id(sim, GS4_FIELD_POSITION, x1);
-        for (i = 0; i < 3 * n; i++) if (fabs(x1[i] - x0[i]) > moved) moved = fabs(x1[i] - x0[i]);
+        for (i = 0; i < 3 * n; i++)
+            if (fabs(x1[i] - x0[i]) > moved) moved = fabs(x1[i] - x0[i]);
         CHECK(moved < 1e-6);
         CHECK(gs4_get_stats(sim).max_speed < 1e-6);
         gs4_destroy(sim);
     }
 }
 
-/* Decay of a shear wave u_x = a sin(2 pi y) in a periodic box, exact at any amplitude: exp(-nu k^2 t) (shared reference: shear_wave,
- * newtonian). Measured: the amplitude of the velocities at time t over the exact one. */
+/* Decay of a shear wave u_x = a sin(2 pi y) in a periodic box, exact at any amplitude: exp(-nu
+ * k^2 t) (shared reference: shear_wave, newtonian). Measured: the amplitude of the velocities at
+ * time t over the exact one. */
 static double shear_wave(int n, gs4_integrator integrator)
 {
     gs4_sim_desc d = scene_cube(n);
@@ -340,18 +417,26 @@ static double shear_wave(int n, gs4_integrator integrator)
     gs4_fill f = scene_fill(at(0, 0, 0));
     const double k = 2 * acos(-1.0), t = 0.15;
     double sum = 0;
-    gs4_edit v; gs4_view x, u;
+    gs4_edit v;
+    gs4_view x, u;
     gs4_sim *sim;
     int i, w;
-    d.cells[0] = d.cells[2] = 4; d.integrator = integrator;
+    d.cells[0] = d.cells[2] = 4;
+    d.integrator = integrator;
     for (w = 0; w < 6; w++) d.walls[w] = GS4_WALL_PERIODIC;
     sim = physics_create(&d, &m);
     CHECK(gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(4.0 / n, 1, 4.0 / n)), &f) > 0);
-    x = gs4_particles(sim, GS4_FIELD_POSITION); v = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
-    for (i = 0; i < v.count; i++) v.data[(size_t)i * (size_t)v.stride] = (gs4_real)(0.1 * sin(k * (double)x.data[(size_t)i * (size_t)x.stride + 1]));
+    x = gs4_particles(sim, GS4_FIELD_POSITION);
+    v = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
+    for (i = 0; i < v.count; i++)
+        v.data[(size_t)i * (size_t)v.stride] =
+            (gs4_real)(0.1 * sin(k * (double)x.data[(size_t)i * (size_t)x.stride + 1]));
     CHECK(physics_run(sim, t) == 0);
-    x = gs4_particles(sim, GS4_FIELD_POSITION); u = gs4_particles(sim, GS4_FIELD_VELOCITY);
-    for (i = 0; i < u.count; i++) sum += (double)u.data[(size_t)i * (size_t)u.stride] * sin(k * (double)x.data[(size_t)i * (size_t)x.stride + 1]) / (0.05 * u.count);
+    x = gs4_particles(sim, GS4_FIELD_POSITION);
+    u = gs4_particles(sim, GS4_FIELD_VELOCITY);
+    for (i = 0; i < u.count; i++)
+        sum += (double)u.data[(size_t)i * (size_t)u.stride]
+               * sin(k * (double)x.data[(size_t)i * (size_t)x.stride + 1]) / (0.05 * u.count);
     gs4_destroy(sim);
     return sum / exp(-0.1 * k * k * t);
 }
@@ -360,15 +445,19 @@ static void test_shear_wave(void)
 {
     int i;
     for (i = 0; i < 2; i++) {
-        const double coarse = shear_wave(16, physics_integrators[i]), fine = shear_wave(32, physics_integrators[i]);
-        if (test_filter[0]) printf("shear wave, integrator %d: amplitude %.4f %.4f of the exact one, order %.2f\n", (int)physics_integrators[i], coarse, fine,
-                                   log2(fabs(coarse - 1) / fabs(fine - 1)));
-        CHECK_CLOSE(fine, 1, i == 0 ? 0.01 : 0.02);         /* the affine tier smooths more */
+        const double coarse = shear_wave(16, physics_integrators[i]),
+                     fine = shear_wave(32, physics_integrators[i]);
+        if (test_filter[0])
+            printf("shear wave, integrator %d: amplitude %.4f %.4f of the exact one, order %.2f\n",
+                   (int)physics_integrators[i], coarse, fine,
+                   log2(fabs(coarse - 1) / fabs(fine - 1)));
+        CHECK_CLOSE(fine, 1, i == 0 ? 0.01 : 0.02); /* the affine tier smooths more */
         CHECK(log2(fabs(coarse - 1) / fabs(fine - 1)) > 1.8);
     }
 }
 
-/* Stokes' first problem by Galilean change: liquid that moves at -U over a wall at rest; u + U = U erfc(y / (2 sqrt(nu t))). */
+/* Stokes' first problem by Galilean change: liquid that moves at -U over a wall at rest; u + U =
+ * U erfc(y / (2 sqrt(nu t))). */
 static double stokes_first(double y, double t) { return -erf(y / (2 * sqrt(0.05 * t))); }
 
 static void test_stokes_first(void)
@@ -386,39 +475,49 @@ static void test_stokes_first(void)
             gs4_sim *sim;
             double sum = 0, weight = 0;
             int j;
-            d.cells[0] = d.cells[2] = 4; d.integrator = physics_integrators[i];
-            d.walls[0] = d.walls[1] = d.walls[4] = d.walls[5] = GS4_WALL_PERIODIC; d.walls[2] = GS4_WALL_STICK;
+            d.cells[0] = d.cells[2] = 4;
+            d.integrator = physics_integrators[i];
+            d.walls[0] = d.walls[1] = d.walls[4] = d.walls[5] = GS4_WALL_PERIODIC;
+            d.walls[2] = GS4_WALL_STICK;
             sim = physics_create(&d, &m);
             CHECK(gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(4.0 / n, 1, 4.0 / n)), &f) > 0);
             CHECK(physics_run(sim, 0.3) == 0);
-            x = gs4_particles(sim, GS4_FIELD_POSITION); v = gs4_particles(sim, GS4_FIELD_VELOCITY);
+            x = gs4_particles(sim, GS4_FIELD_POSITION);
+            v = gs4_particles(sim, GS4_FIELD_VELOCITY);
             for (j = 0; j < x.count; j++) {
-                const double y = (double)x.data[(size_t)j * (size_t)x.stride + 1], e = (double)v.data[(size_t)j * (size_t)v.stride] - stokes_first(y, 0.3);
-                if (y < 0.1 || y > 0.7) continue;           /* the lid at y = 1 slips: far enough */
-                sum += e * e; weight += 1;
+                const double y = (double)x.data[(size_t)j * (size_t)x.stride + 1],
+                             e = (double)v.data[(size_t)j * (size_t)v.stride]
+                                 - stokes_first(y, 0.3);
+                if (y < 0.1 || y > 0.7) continue; /* the lid at y = 1 slips: far enough */
+                sum += e * e;
+                weight += 1;
             }
             error[k] = sqrt(sum / weight);
             gs4_destroy(sim);
         }
-        if (test_filter[0]) printf("Stokes' first problem, integrator %d: errors %.2e %.2e\n", (int)physics_integrators[i], error[0], error[1]);
+        if (test_filter[0])
+            printf("Stokes' first problem, integrator %d: errors %.2e %.2e\n",
+                   (int)physics_integrators[i], error[0], error[1]);
         CHECK(error[1] < 0.01);
         CHECK(error[1] < 0.5 * error[0]);
     }
 }
 
-/* Start-up of Couette flow between a wall at rest, y = 0, and a sticky body that goes along x, y = 1, from rest:
- * u = y + sum 2 (-1)^k / (k pi) sin(k pi y) exp(-k^2 pi^2 nu t) */
+/* Start-up of Couette flow between a wall at rest, y = 0, and a sticky body that goes along x, y
+ * = 1, from rest: u = y + sum 2 (-1)^k / (k pi) sin(k pi y) exp(-k^2 pi^2 nu t) */
 static double couette(double y, double t)
 {
     const double nu = 0.5, pi = acos(-1.0);
     double u = y;
     int k;
-    for (k = 1; k < 60; k++) u += (k & 1 ? -2 : 2) / (k * pi) * sin(k * pi * y) * exp(-k * k * pi * pi * nu * t);
+    for (k = 1; k < 60; k++)
+        u += (k & 1 ? -2 : 2) / (k * pi) * sin(k * pi * y) * exp(-k * k * pi * pi * nu * t);
     return u;
 }
 
-/* Profile error (2-norm, away from the walls) at time t, with n - gap cells between the wall and the surface of the body: a plane of
- * nodes is 1/2 - gap of a cell in front of that. *off: how many cells behind it the profile, taken for steady, reaches u = 1. */
+/* Profile error (2-norm, away from the walls) at time t, with n - gap cells between the wall and
+ * the surface of the body: a plane of nodes is 1/2 - gap of a cell in front of that. *off: how
+ * many cells behind it the profile, taken for steady, reaches u = 1. */
 static double couette_error(int n, gs4_integrator integrator, double gap, double t, double *off)
 {
     const double h = 1 / (n - gap);
@@ -431,27 +530,39 @@ static double couette_error(int n, gs4_integrator integrator, double gap, double
     gs4_view x, v;
     int i;
     memset(&body, 0, sizeof body);
-    body.shape = gs4_plane(at(0, 1, 0), at(0, -1, 0)); body.velocity = at(1, 0, 0); body.contact = GS4_WALL_STICK;
-    d.cells[0] = d.cells[2] = 4; d.cells[1] = n + 3; d.cell_size = (gs4_real)h; d.integrator = integrator;
-    d.walls[0] = d.walls[1] = d.walls[4] = d.walls[5] = GS4_WALL_PERIODIC; d.walls[2] = GS4_WALL_STICK;
+    body.shape = gs4_plane(at(0, 1, 0), at(0, -1, 0));
+    body.velocity = at(1, 0, 0);
+    body.contact = GS4_WALL_STICK;
+    d.cells[0] = d.cells[2] = 4;
+    d.cells[1] = n + 3;
+    d.cell_size = (gs4_real)h;
+    d.integrator = integrator;
+    d.walls[0] = d.walls[1] = d.walls[4] = d.walls[5] = GS4_WALL_PERIODIC;
+    d.walls[2] = GS4_WALL_STICK;
     sim = physics_create(&d, &m);
     CHECK(gs4_add_collider(sim, &body) == 0);
     CHECK(gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(4 * h, 1, 4 * h)), &f) > 0);
     CHECK(physics_run(sim, t) == 0);
-    x = gs4_particles(sim, GS4_FIELD_POSITION); v = gs4_particles(sim, GS4_FIELD_VELOCITY);
+    x = gs4_particles(sim, GS4_FIELD_POSITION);
+    v = gs4_particles(sim, GS4_FIELD_VELOCITY);
     for (i = 0; i < x.count; i++) {
-        const double y = (double)x.data[(size_t)i * (size_t)x.stride + 1], u = (double)v.data[(size_t)i * (size_t)v.stride];
+        const double y = (double)x.data[(size_t)i * (size_t)x.stride + 1],
+                     u = (double)v.data[(size_t)i * (size_t)v.stride];
         const double e = u - couette(y, t);
         if (y < 0.1 || y > 0.9) continue;
-        sum += e * e; weight += 1; yu += y * u; yy += y * y;
+        sum += e * e;
+        weight += 1;
+        yu += y * u;
+        yy += y * y;
     }
     gs4_destroy(sim);
     *off = (yy / yu - 1) / h;
     return sqrt(sum / weight);
 }
 
-/* Second order in space, with the surface at a plane of nodes and midway between two; a tenth of a cell before one, where the filling leaves a gap
- * that is no multiple of h, only the error is held. */
+/* Second order in space, with the surface at a plane of nodes and midway between two; a tenth of
+ * a cell before one, where the filling leaves a gap that is no multiple of h, only the error is
+ * held. */
 static void test_couette(void)
 {
     static const double gaps[3] = { 0.01, 0.51, 0.4 }, times[2] = { 0.1, 0.4 };
@@ -460,17 +571,22 @@ static void test_couette(void)
     for (i = 0; i < 2; i++)
         for (j = 0; j < (test_slow ? 3 : 2); j++)
             for (k = 0; k < 2; k++) {
-                const double coarse = couette_error(8, physics_integrators[i], gaps[j], times[k], &off);
-                const double fine = couette_error(test_slow ? 32 : 16, physics_integrators[i], gaps[j], times[k], &off);
+                const double coarse =
+                    couette_error(8, physics_integrators[i], gaps[j], times[k], &off);
+                const double fine = couette_error(test_slow ? 32 : 16, physics_integrators[i],
+                                                  gaps[j], times[k], &off);
                 const double order = log2(coarse / fine) / (test_slow ? 2 : 1);
-                if (test_filter[0]) printf("Couette, integrator %d, gap %g, t %g: errors %.2e %.2e, order %.2f\n", (int)physics_integrators[i], gaps[j], times[k], coarse, fine, order);
+                if (test_filter[0])
+                    printf("Couette, integrator %d, gap %g, t %g: errors %.2e %.2e, order %.2f\n",
+                           (int)physics_integrators[i], gaps[j], times[k], coarse, fine, order);
                 CHECK(fine < (test_slow ? 0.005 : 0.008));
                 if (j < 2) CHECK(order > (test_slow ? 1.8 : 1.45));
             }
 }
 
-/* Wherever its surface lies between two planes of nodes, a sticky body is a wall there, within a quarter of a cell where particles fill the
- * space before it, and within 0.7 where the filling leaves out half a row. */
+/* Wherever its surface lies between two planes of nodes, a sticky body is a wall there, within a
+ * quarter of a cell where particles fill the space before it, and within 0.7 where the filling
+ * leaves out half a row. */
 static void test_couette_surface(void)
 {
     static const double gaps[7] = { 0.01, 0.24, 0.25, 0.49, 0.51, 0.7, 0.8 };
@@ -479,13 +595,16 @@ static void test_couette_surface(void)
     for (i = 0; i < 2; i++)
         for (k = 0; k < 7; k++) {
             couette_error(8, physics_integrators[i], gaps[k], 1, &off);
-            if (test_filter[0]) printf("Couette, integrator %d: nodes %.2f cells before the body: wall %+.2f cells behind its surface\n",
-                                       (int)physics_integrators[i], 0.5 - gaps[k], off);
+            if (test_filter[0])
+                printf("Couette, integrator %d: nodes %.2f cells before the body: wall %+.2f cells "
+                       "behind its surface\n",
+                       (int)physics_integrators[i], 0.5 - gaps[k], off);
             CHECK_CLOSE(off, 0, k == 2 || k == 6 ? 0.7 : 0.25);
         }
 }
 
-/* All nodes that a body which lies askew and is 1.5 cells thick can reach have its velocity, wherever they are in their blocks. */
+/* All nodes that a body which lies askew and is 1.5 cells thick can reach have its velocity,
+ * wherever they are in their blocks. */
 static void sticky_holds(gs4_sim *sim, gs4_vec3 origin, gs4_vec3 velocity)
 {
     int s, i, held = 0, free = 0;
@@ -493,69 +612,103 @@ static void sticky_holds(gs4_sim *sim, gs4_vec3 origin, gs4_vec3 velocity)
         for (i = 0; i < 64; i++) {
             const gs4_real *u = sim->grid.momentum + 4 * ((size_t)s * 64 + (size_t)i);
             const gs4_vec3 p = gs4i_node_position(&sim->grid, s, i);
-            const double away = ((double)(p.x - origin.x) + (double)(p.y - origin.y) + (double)(p.z - origin.z)) / sqrt(3.0) * 24;
+            const double away =
+                ((double)(p.x - origin.x) + (double)(p.y - origin.y) + (double)(p.z - origin.z))
+                / sqrt(3.0) * 24;
             if (!(u[3] > 0) || fabs(away + 0.75) > 1.49) continue;
-            if (u[0] == velocity.x && u[1] == velocity.y && u[2] == velocity.z) held++; else free++;
+            if (u[0] == velocity.x && u[1] == velocity.y && u[2] == velocity.z)
+                held++;
+            else
+                free++;
         }
-    CHECK(held > 50); CHECK(free == 0);
+    CHECK(held > 50);
+    CHECK(free == 0);
 }
 
-/* Liquid that goes with a sticky body which lies askew, moves along itself or turns about its normal, goes on with it; and a body
- * too thin for images holds the nodes that its particles see. */
+/* Liquid that goes with a sticky body which lies askew, moves along itself or turns about its
+ * normal, goes on with it; and a body too thin for images holds the nodes that its particles
+ * see. */
 static void test_sticky_askew(void)
 {
     const gs4_vec3 origin = at(0.47, 0.5, 0.556);
     int i, k, c, turning, thin;
-    for (i = 0; i < 2; i++) for (turning = 0; turning < 2; turning++) for (thin = 0; thin < 2; thin++) {
-        gs4_sim_desc d = scene_cube(24);
-        const gs4_material m = scene_liquid(1000, 1, 10);
-        gs4_fill f = scene_fill(at(0, 0, 0));
-        const double speed = 0.1, n = 1 / sqrt(3.0);
-        gs4_collider body;
-        gs4_view x, v;
-        gs4_sim *sim;
-        double worst = 0;
-        int near = 0;
-        d.integrator = physics_integrators[i];
-        sim = physics_create(&d, &m);
-        memset(&body, 0, sizeof body);
-        body.shape = thin ? gs4_cylinder(at(0.47 - n / 16, 0.5 - n / 16, 0.556 - n / 16), origin, 2) : gs4_plane(origin, at(1, 1, 1));
-        body.contact = GS4_WALL_STICK; body.pivot = origin;
-        if (turning) body.angular_velocity = at(speed * n, speed * n, speed * n); else body.velocity = at(speed, 0, -speed);
-        CHECK_RESULT(sim, gs4_add_collider(sim, &body), GS4_OK);
-        if (!turning) f.velocity = body.velocity;
-        CHECK(gs4_add_particles(sim, gs4_box(at(0.45, 0.45, 0.5), at(0.8, 0.8, 0.8)), &f) > 0);
-        if (turning) {
-            gs4_edit edit = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
-            x = gs4_particles(sim, GS4_FIELD_POSITION);
-            for (k = 0; k < x.count; k++) {
-                const gs4_real *p = x.data + (size_t)k * (size_t)x.stride;
-                const gs4_vec3 u = gs4i_cross(body.angular_velocity, gs4i_sub(gs4i_vec3(p[0], p[1], p[2]), origin));
-                gs4_real *to = edit.data + (size_t)k * (size_t)edit.stride;
-                to[0] = u.x; to[1] = u.y; to[2] = u.z;
+    for (i = 0; i < 2; i++)
+        for (turning = 0; turning < 2; turning++)
+            for (thin = 0; thin < 2; thin++) {
+                gs4_sim_desc d = scene_cube(24);
+                const gs4_material m = scene_liquid(1000, 1, 10);
+                gs4_fill f = scene_fill(at(0, 0, 0));
+                const double speed = 0.1, n = 1 / sqrt(3.0);
+                gs4_collider body;
+                gs4_view x, v;
+                gs4_sim *sim;
+                double worst = 0;
+                int near = 0;
+                d.integrator = physics_integrators[i];
+                sim = physics_create(&d, &m);
+                memset(&body, 0, sizeof body);
+                body.shape =
+                    thin ? gs4_cylinder(at(0.47 - n / 16, 0.5 - n / 16, 0.556 - n / 16), origin, 2)
+                         : gs4_plane(origin, at(1, 1, 1));
+                body.contact = GS4_WALL_STICK;
+                body.pivot = origin;
+                if (turning)
+                    body.angular_velocity = at(speed * n, speed * n, speed * n);
+                else
+                    body.velocity = at(speed, 0, -speed);
+                CHECK_RESULT(sim, gs4_add_collider(sim, &body), GS4_OK);
+                if (!turning) f.velocity = body.velocity;
+                CHECK(gs4_add_particles(sim, gs4_box(at(0.45, 0.45, 0.5), at(0.8, 0.8, 0.8)), &f)
+                      > 0);
+                if (turning) {
+                    gs4_edit edit = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
+                    x = gs4_particles(sim, GS4_FIELD_POSITION);
+                    for (k = 0; k < x.count; k++) {
+                        const gs4_real *p = x.data + (size_t)k * (size_t)x.stride;
+                        const gs4_vec3 u = gs4i_cross(
+                            body.angular_velocity, gs4i_sub(gs4i_vec3(p[0], p[1], p[2]), origin));
+                        gs4_real *to = edit.data + (size_t)k * (size_t)edit.stride;
+                        to[0] = u.x;
+                        to[1] = u.y;
+                        to[2] = u.z;
+                    }
+                }
+                for (k = 0; k < 10; k++)
+                    CHECK_RESULT(sim, gs4_step(sim, gs4_stable_dt(sim) / 2), GS4_OK);
+                if (thin && !turning) sticky_holds(sim, origin, body.velocity);
+                x = gs4_particles(sim, GS4_FIELD_POSITION);
+                v = gs4_particles(sim, GS4_FIELD_VELOCITY);
+                for (k = 0; k < x.count; k++) {
+                    const gs4_real *p = x.data + (size_t)k * (size_t)x.stride,
+                                   *u = v.data + (size_t)k * (size_t)v.stride;
+                    const gs4_vec3 r = gs4i_sub(gs4i_vec3(p[0], p[1], p[2]), origin),
+                                   w = turning ? gs4i_cross(body.angular_velocity, r)
+                                               : body.velocity;
+                    const double e[3] = { (double)(u[0] - w.x), (double)(u[1] - w.y),
+                                          (double)(u[2] - w.z) };
+                    if ((double)(r.x + r.y + r.z) * n * 24 > 2
+                        || fmax(fabs((double)p[0] - 0.625),
+                                fmax(fabs((double)p[1] - 0.625), fabs((double)p[2] - 0.65)))
+                               > 0.14)
+                        continue;
+                    near++;
+                    for (c = 0; c < 3; c++) worst = fmax(worst, fabs(e[c]));
+                }
+                if (test_filter[0])
+                    printf(
+                        "integrator %d, turning %d, thin %d: %d near, off by %.2e of the speed\n",
+                        i, turning, thin, near, worst / speed);
+                CHECK(near > 40);
+                CHECK(worst < (turning ? 0.03 : 1e-5) * speed);
+                gs4_destroy(sim);
             }
-        }
-        for (k = 0; k < 10; k++) CHECK_RESULT(sim, gs4_step(sim, gs4_stable_dt(sim) / 2), GS4_OK);
-        if (thin && !turning) sticky_holds(sim, origin, body.velocity);
-        x = gs4_particles(sim, GS4_FIELD_POSITION); v = gs4_particles(sim, GS4_FIELD_VELOCITY);
-        for (k = 0; k < x.count; k++) {
-            const gs4_real *p = x.data + (size_t)k * (size_t)x.stride, *u = v.data + (size_t)k * (size_t)v.stride;
-            const gs4_vec3 r = gs4i_sub(gs4i_vec3(p[0], p[1], p[2]), origin), w = turning ? gs4i_cross(body.angular_velocity, r) : body.velocity;
-            const double e[3] = { (double)(u[0] - w.x), (double)(u[1] - w.y), (double)(u[2] - w.z) };
-            if ((double)(r.x + r.y + r.z) * n * 24 > 2 || fmax(fabs((double)p[0] - 0.625), fmax(fabs((double)p[1] - 0.625), fabs((double)p[2] - 0.65))) > 0.14) continue;
-            near++;
-            for (c = 0; c < 3; c++) worst = fmax(worst, fabs(e[c]));
-        }
-        if (test_filter[0]) printf("integrator %d, turning %d, thin %d: %d near, off by %.2e of the speed\n", i, turning, thin, near, worst / speed);
-        CHECK(near > 40); CHECK(worst < (turning ? 0.03 : 1e-5) * speed);
-        gs4_destroy(sim);
-    }
 }
 
 /* A pipe whose wall is 2 to 3.5 cells thick, so that around it images and held nodes take turns. */
 static gs4_real uneven_pipe(gs4_vec3 p, void *user)
 {
-    const double x = ((double)p.x - 0.5) * 24, y = ((double)p.y - 0.5) * 24, r = sqrt(x * x + y * y);
+    const double x = ((double)p.x - 0.5) * 24, y = ((double)p.y - 0.5) * 24,
+                 r = sqrt(x * x + y * y);
     (void)user;
     return (gs4_real)(fmax(6.3 - r, r - 6.3 - (2.75 + 0.75 * cos(4 * atan2(y, x)))) / 24);
 }
@@ -573,30 +726,46 @@ static void test_sticky_pipe(void)
         gs4_view x;
         gs4_sim *sim;
         double energy, fastest;
-        d.cells[2] = 4; d.walls[4] = d.walls[5] = GS4_WALL_PERIODIC; d.integrator = physics_integrators[k];
+        d.cells[2] = 4;
+        d.walls[4] = d.walls[5] = GS4_WALL_PERIODIC;
+        d.integrator = physics_integrators[k];
         sim = physics_create(&d, &m);
         memset(&body, 0, sizeof body);
-        body.shape = gs4_sdf(uneven_pipe, NULL, at(0, 0, -1), at(1, 1, 2)); body.contact = GS4_WALL_STICK;
+        body.shape = gs4_sdf(uneven_pipe, NULL, at(0, 0, -1), at(1, 1, 2));
+        body.contact = GS4_WALL_STICK;
         CHECK(gs4_add_collider(sim, &body) == 0);
-        CHECK(gs4_add_particles(sim, gs4_cylinder(at(0.5, 0.5, -1), at(0.5, 0.5, 2), (gs4_real)(6.29 / 24)), &f) > 0);
-        x = gs4_particles(sim, GS4_FIELD_POSITION); v = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
+        CHECK(gs4_add_particles(
+                  sim, gs4_cylinder(at(0.5, 0.5, -1), at(0.5, 0.5, 2), (gs4_real)(6.29 / 24)), &f)
+              > 0);
+        x = gs4_particles(sim, GS4_FIELD_POSITION);
+        v = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
         for (i = 0; i < x.count; i++) {
             const gs4_real *p = x.data + (size_t)i * (size_t)x.stride;
-            v.data[(size_t)i * (size_t)v.stride] = 4 * ((gs4_real)0.5 - p[1]); v.data[(size_t)i * (size_t)v.stride + 1] = 4 * (p[0] - (gs4_real)0.5);
+            v.data[(size_t)i * (size_t)v.stride] = 4 * ((gs4_real)0.5 - p[1]);
+            v.data[(size_t)i * (size_t)v.stride + 1] = 4 * (p[0] - (gs4_real)0.5);
         }
-        energy = gs4_get_stats(sim).kinetic_energy; fastest = (double)gs4_get_stats(sim).max_speed;
+        energy = gs4_get_stats(sim).kinetic_energy;
+        fastest = (double)gs4_get_stats(sim).max_speed;
         for (i = 0; i < (test_slow ? 6 : 4); i++) {
             CHECK(physics_run(sim, 0.05 * (i + 1)) == 0);
-            if (test_filter[0]) printf("integrator %d, t %g: energy %.3f of the first, fastest %.3f\n", (int)d.integrator, 0.05 * (i + 1), gs4_get_stats(sim).kinetic_energy / energy, (double)gs4_get_stats(sim).max_speed / fastest);
-            CHECK(gs4_get_stats(sim).kinetic_energy < (i ? 0.5 : 0.6) * energy); CHECK((double)gs4_get_stats(sim).max_speed < fastest);
+            if (test_filter[0])
+                printf("integrator %d, t %g: energy %.3f of the first, fastest %.3f\n",
+                       (int)d.integrator, 0.05 * (i + 1),
+                       gs4_get_stats(sim).kinetic_energy / energy,
+                       (double)gs4_get_stats(sim).max_speed / fastest);
+            CHECK(gs4_get_stats(sim).kinetic_energy < (i ? 0.5 : 0.6) * energy);
+            CHECK((double)gs4_get_stats(sim).max_speed < fastest);
         }
         gs4_destroy(sim);
     }
 }
 
-/* A drop of diameter D falls on a sticky floor, Re 5, Fr 2.26 (2021, figure 9 left), 20 cells over D: its width over D at `count` times t U/D.
- * It begins with 0.9737 U: the air that the reference has takes the rest from its drop at once, by the height of its centroid at t U/D 0.9. */
-static void physics_drop_widths(const gs4_material *m, const double reference[][2], int count, double tolerance)
+/* A drop of diameter D falls on a sticky floor, Re 5, Fr 2.26 (2021, figure 9 left), 20 cells
+ * over D: its width over D at `count` times t U/D. It begins with 0.9737 U: the air that the
+ * reference has takes the rest from its drop at once, by the height of its centroid at t U/D
+ * 0.9. */
+static void physics_drop_widths(const gs4_material *m, const double reference[][2], int count,
+                                double tolerance)
 {
     const double D = 0.02;
     const int n = 20;
@@ -604,10 +773,14 @@ static void physics_drop_widths(const gs4_material *m, const double reference[][
     gs4_fill f = scene_fill(at(0, -0.9737, 0));
     gs4_sim *sim;
     int i, k;
-    d.cells[0] = d.cells[2] = 44; d.cells[1] = 55; d.cell_size = (gs4_real)(D / n);
-    d.gravity = at(0, -9.81, 0); d.walls[2] = GS4_WALL_STICK;
+    d.cells[0] = d.cells[2] = 44;
+    d.cells[1] = 55;
+    d.cell_size = (gs4_real)(D / n);
+    d.gravity = at(0, -9.81, 0);
+    d.walls[2] = GS4_WALL_STICK;
     sim = physics_create(&d, m);
-    CHECK(gs4_add_particles(sim, gs4_sphere(at(1.08 * D, 2 * D, 1.08 * D), (gs4_real)(D / 2)), &f) > 0);
+    CHECK(gs4_add_particles(sim, gs4_sphere(at(1.08 * D, 2 * D, 1.08 * D), (gs4_real)(D / 2)), &f)
+          > 0);
     for (k = 0; k < count; k++) {
         double low = 1, high = -1, width;
         gs4_view x;
@@ -618,8 +791,10 @@ static void physics_drop_widths(const gs4_material *m, const double reference[][
             if (p < low) low = p;
             if (p > high) high = p;
         }
-        width = (high - low) / D + 0.5 / n;                 /* particles are centres of h/2 */
-        if (test_filter[0]) printf("drop at t U/D %g: width %.3f D, reference %.3f D\n", reference[k][0], width, reference[k][1]);
+        width = (high - low) / D + 0.5 / n; /* particles are centres of h/2 */
+        if (test_filter[0])
+            printf("drop at t U/D %g: width %.3f D, reference %.3f D\n", reference[k][0], width,
+                   reference[k][1]);
         CHECK_CLOSE(width, reference[k][1], tolerance * reference[k][1]);
     }
     gs4_destroy(sim);
@@ -628,7 +803,9 @@ static void physics_drop_widths(const gs4_material *m, const double reference[][
 /* Against an axisymmetric volume-of-fluid computation (finest level). */
 static void test_drop_impact(void)
 {
-    static const double reference[4][2] = { { 1.58, 1.12883 }, { 2.38, 1.39293 }, { 3.18, 1.42262 }, { 3.98, 1.44785 } };
+    static const double reference[4][2] = {
+        { 1.58, 1.12883 }, { 2.38, 1.39293 }, { 3.18, 1.42262 }, { 3.98, 1.44785 }
+    };
     const gs4_material m = scene_liquid(1000, 4, 20);
     if (test_slow) physics_drop_widths(&m, reference, 4, 0.03);
 }

@@ -1,31 +1,51 @@
-/* The elliptic solver: against conjugate gradients with the diagonal, exact solutions, symmetry, hard geometry, failures.
- * Run all with run_poisson(). */
+/* The elliptic solver: against conjugate gradients with the diagonal, exact solutions, symmetry,
+ * hard geometry, failures. Run all with run_poisson(). */
 #include "poisson_cases.h"
 
-/* --- the oracle ------------------------------------------------------------------------------------------ */
+/* --- the oracle ------------------------------------------------------------------------------- */
 
-/* Conjugate gradients with the diagonal, in double, from the definition; x has the values of the air. */
+/* Conjugate gradients with the diagonal, in double, from the definition; x has the values of the
+ * air. */
 static int pois_oracle(const poisson_case *p, double *x, double tolerance)
 {
-    double *r = poisson_doubles(p->rhs, p->count), *d = poisson_doubles(NULL, p->count), *q = poisson_doubles(NULL, p->count), *m = poisson_doubles(NULL, p->count);
+    double *r = poisson_doubles(p->rhs, p->count), *d = poisson_doubles(NULL, p->count),
+           *q = poisson_doubles(NULL, p->count), *m = poisson_doubles(NULL, p->count);
     double rz = 0, norm = 0, goal = 0;
     size_t at;
     int i[3], k;
     poisson_take_means(p, r);
-    for (at = 0; at < p->count; at++) if (p->kind[at] == GS4_CELL_LIQUID) x[at] = 0;
-    POISSON_EACH(p, i, at) { r[at] -= poisson_row(p, i, x, &m[at], NULL); norm += r[at] * r[at]; }
+    for (at = 0; at < p->count; at++)
+        if (p->kind[at] == GS4_CELL_LIQUID) x[at] = 0;
+    POISSON_EACH(p, i, at)
+    {
+        r[at] -= poisson_row(p, i, x, &m[at], NULL);
+        norm += r[at] * r[at];
+    }
     goal = norm * tolerance * tolerance;
     for (k = 0; norm > goal && k < 20000; k++) {
         double last = rz, pq = 0;
         rz = 0;
         POISSON_EACH(p, i, at) rz += m[at] > 0 ? r[at] * r[at] / m[at] : 0;
-        POISSON_EACH(p, i, at) d[at] = (m[at] > 0 ? r[at] / m[at] : 0) + (k ? rz / last * d[at] : 0);
-        POISSON_EACH(p, i, at) { q[at] = poisson_row(p, i, d, NULL, NULL); pq += d[at] * q[at]; }
+        POISSON_EACH(p, i, at)
+        d[at] = (m[at] > 0 ? r[at] / m[at] : 0) + (k ? rz / last * d[at] : 0);
+        POISSON_EACH(p, i, at)
+        {
+            q[at] = poisson_row(p, i, d, NULL, NULL);
+            pq += d[at] * q[at];
+        }
         norm = 0;
-        POISSON_EACH(p, i, at) { x[at] += rz / pq * d[at]; r[at] -= rz / pq * q[at]; norm += r[at] * r[at]; }
+        POISSON_EACH(p, i, at)
+        {
+            x[at] += rz / pq * d[at];
+            r[at] -= rz / pq * q[at];
+            norm += r[at] * r[at];
+        }
     }
     poisson_take_means(p, x);
-    free(r); free(d); free(q); free(m);
+    free(r);
+    free(d);
+    free(q);
+    free(m);
     return norm <= goal;
 }
 
@@ -35,10 +55,11 @@ static double pois_distance(const poisson_case *p)
     double *x = poisson_doubles(p->x, p->count), above = 0, below = 0;
     size_t at;
     CHECK(pois_oracle(p, x, 1e-12));
-    for (at = 0; at < p->count; at++) if (p->kind[at] == GS4_CELL_LIQUID) {
-        above += ((double)p->x[at] - x[at]) * ((double)p->x[at] - x[at]);
-        below += x[at] * x[at];
-    }
+    for (at = 0; at < p->count; at++)
+        if (p->kind[at] == GS4_CELL_LIQUID) {
+            above += ((double)p->x[at] - x[at]) * ((double)p->x[at] - x[at]);
+            below += x[at] * x[at];
+        }
     free(x);
     return below > 0 ? sqrt(above / below) : sqrt(above);
 }
@@ -48,7 +69,10 @@ static int pois_solve(poisson_case *p, gs4_solve_stats *stats)
     gs4_poisson *s;
     int r = gs4_poisson_create(&p->desc, &s);
     CHECK_RESULT(NULL, r, GS4_OK);
-    if (r != GS4_OK) { memset(stats, 0, sizeof *stats); return r; }
+    if (r != GS4_OK) {
+        memset(stats, 0, sizeof *stats);
+        return r;
+    }
     r = gs4_poisson_solve(s, p->rhs, p->x, stats);
     gs4_poisson_destroy(s);
     return r;
@@ -63,20 +87,27 @@ static poisson_case pois_random(int n0, int n1, int n2, uint64_t seed, int weigh
     p.random = seed * 0x9e3779b97f4a7c15u + 1;
     for (at = 0; at < p.count; at++) {
         const double u = poisson_random(&p.random);
-        p.kind[at] = (uint8_t)(u < 0.15 ? GS4_CELL_SOLID : u < 0.2 ? GS4_CELL_AIR : GS4_CELL_LIQUID);
+        p.kind[at] = (uint8_t)(u < 0.15  ? GS4_CELL_SOLID
+                               : u < 0.2 ? GS4_CELL_AIR
+                                         : GS4_CELL_LIQUID);
         if (p.kind[at] == GS4_CELL_AIR) p.x[at] = (gs4_real)(4 * poisson_random(&p.random) - 2);
     }
     if (!weighted) return p;
     p.desc.diagonal = p.diagonal = poisson_array(p.count);
-    for (at = 0; at < p.count; at++) p.diagonal[at] = (gs4_real)(poisson_random(&p.random) < 0.5 ? 0 : poisson_random(&p.random));
+    for (at = 0; at < p.count; at++)
+        p.diagonal[at] =
+            (gs4_real)(poisson_random(&p.random) < 0.5 ? 0 : poisson_random(&p.random));
     for (a = 0; a < 3; a++) {
         p.desc.coefficient[a] = p.coefficient[a] = poisson_array(p.faces[a]);
-        for (at = 0; at < p.faces[a]; at++) p.coefficient[a][at] = (gs4_real)(poisson_random(&p.random) < 0.1 ? 0 : pow(10, 2 * poisson_random(&p.random) - 1));
+        for (at = 0; at < p.faces[a]; at++)
+            p.coefficient[a][at] = (gs4_real)(poisson_random(&p.random) < 0.1
+                                                  ? 0
+                                                  : pow(10, 2 * poisson_random(&p.random) - 1));
     }
     return p;
 }
 
-/* --- solutions --------------------------------------------------------------------------------------------- */
+/* --- solutions -------------------------------------------------------------------------------- */
 
 static void test_poisson_agrees_with_oracle(void)
 {
@@ -86,9 +117,11 @@ static void test_poisson_agrees_with_oracle(void)
         gs4_solve_stats stats;
         size_t at;
         p.desc.tolerance = (gs4_real)1e-11;
-        for (at = 0; at < p.count; at++) if (p.kind[at] == GS4_CELL_AIR) p.x[at] = (gs4_real)sin((double)at);
+        for (at = 0; at < p.count; at++)
+            if (p.kind[at] == GS4_CELL_AIR) p.x[at] = (gs4_real)sin((double)at);
         CHECK_RESULT(NULL, pois_solve(&p, &stats), GS4_OK);
-        CHECK_CLOSE(pois_distance(&p), 0, 1e-6);            /* 1e-11 by the condition, up to 1e5; rounding of x to float */
+        /* 1e-11 by the condition, up to 1e5; rounding of x to float */
+        CHECK_CLOSE(pois_distance(&p), 0, 1e-6);
         poisson_free(&p);
     }
 }
@@ -112,29 +145,43 @@ static void test_poisson_iterations(void)
     static const int sizes[] = { 24, 37, 64, 100, 136, 160, 256 };
     const int most = test_slow ? 7 : test_full ? 6 : 3;
     int q, k;
-    for (k = 0; k < most; k++) for (q = 0; q < POISSON_CASES; q++) pois_iterations(poisson_names[q], sizes[k]);
-    pois_iterations("T4", 132);                             /* a chain of corridors longer than what is solved directly */
+    for (k = 0; k < most; k++)
+        for (q = 0; q < POISSON_CASES; q++) pois_iterations(poisson_names[q], sizes[k]);
+    /* a chain of corridors longer than what is solved directly */
+    pois_iterations("T4", 132);
 }
 
-/* A box of corridors one cell wide, all of them one tree: the way between two cells may be as long as all corridors. */
+/* A box of corridors one cell wide, all of them one tree: the way between two cells may be as
+ * long as all corridors. */
 static void test_poisson_maze(void)
 {
-    static const int step[6][3] = { { 1, 0, 0 }, { -1, 0, 0 }, { 0, 1, 0 }, { 0, -1, 0 }, { 0, 0, 1 }, { 0, 0, -1 } };
-    enum { N = 31 };
+    static const int step[6][3] = { { 1, 0, 0 },  { -1, 0, 0 }, { 0, 1, 0 },
+                                    { 0, -1, 0 }, { 0, 0, 1 },  { 0, 0, -1 } };
+    enum {
+        N = 31
+    };
     poisson_case p = poisson_box(N, N, N, GS4_CELL_SOLID);
     int *path = (int *)malloc(N * N * N * sizeof *path), length = 0, a, ways[6], open;
     gs4_solve_stats stats;
     double bound;
     if (!path) exit(3);
-    path[length++] = 0; p.kind[0] = GS4_CELL_LIQUID;
-    while (length) {                                        /* on to a cell two steps away that is not reached yet, or back */
+    path[length++] = 0;
+    p.kind[0] = GS4_CELL_LIQUID;
+    /* on to a cell two steps away that is not reached yet, or back */
+    while (length) {
         const int at = path[length - 1], i[3] = { at % N, at / N % N, at / (N * N) };
         int way;
         for (open = a = 0; a < 6; a++) {
-            const int x = i[0] + 2 * step[a][0], y = i[1] + 2 * step[a][1], z = i[2] + 2 * step[a][2];
-            if (x >= 0 && y >= 0 && z >= 0 && x < N && y < N && z < N && p.kind[(z * N + y) * N + x] == GS4_CELL_SOLID) ways[open++] = a;
+            const int x = i[0] + 2 * step[a][0], y = i[1] + 2 * step[a][1],
+                      z = i[2] + 2 * step[a][2];
+            if (x >= 0 && y >= 0 && z >= 0 && x < N && y < N && z < N
+                && p.kind[(z * N + y) * N + x] == GS4_CELL_SOLID)
+                ways[open++] = a;
         }
-        if (!open) { length--; continue; }
+        if (!open) {
+            length--;
+            continue;
+        }
         a = ways[(int)(poisson_random(&p.random) * open)];
         way = (step[a][2] * N + step[a][1]) * N + step[a][0];
         p.kind[at + way] = p.kind[at + 2 * way] = GS4_CELL_LIQUID;
@@ -149,20 +196,25 @@ static void test_poisson_maze(void)
 
 static void test_poisson_shapes(void)
 {
-    static const int shapes[][3] = { { 1, 1, 1 }, { 2, 1, 1 }, { 5, 1, 1 }, { 1, 6, 1 }, { 1, 1, 40 }, { 200, 1, 1 }, { 1, 7, 9 }, { 11, 1, 6 },
-                                     { 2, 3, 1 }, { 17, 5, 2 }, { 64, 1, 3 }, { 33, 31, 34 }, { 3, 3, 67 }, { 35, 2, 2 } };
+    static const int shapes[][3] = { { 1, 1, 1 },  { 2, 1, 1 },   { 5, 1, 1 },  { 1, 6, 1 },
+                                     { 1, 1, 40 }, { 200, 1, 1 }, { 1, 7, 9 },  { 11, 1, 6 },
+                                     { 2, 3, 1 },  { 17, 5, 2 },  { 64, 1, 3 }, { 33, 31, 34 },
+                                     { 3, 3, 67 }, { 35, 2, 2 } };
     size_t q;
     int weighted, seed;
-    for (q = 0; q < sizeof shapes / sizeof *shapes; q++) for (weighted = 0; weighted < 2; weighted++) for (seed = 0; seed < (q < 12 ? 3 : 1); seed++) {
-        poisson_case p = pois_random(shapes[q][0], shapes[q][1], shapes[q][2], q * 10 + (size_t)seed, weighted);
-        gs4_solve_stats stats;
-        double bound;
-        p.desc.tolerance = (gs4_real)1e-11;
-        CHECK_RESULT(NULL, pois_solve(&p, &stats), GS4_OK);
-        CHECK_CLOSE(pois_distance(&p), 0, 1e-6);
-        CHECK(poisson_residual(&p, p.x, &bound) <= 1.001e-11 + bound);
-        poisson_free(&p);
-    }
+    for (q = 0; q < sizeof shapes / sizeof *shapes; q++)
+        for (weighted = 0; weighted < 2; weighted++)
+            for (seed = 0; seed < (q < 12 ? 3 : 1); seed++) {
+                poisson_case p = pois_random(shapes[q][0], shapes[q][1], shapes[q][2],
+                                             q * 10 + (size_t)seed, weighted);
+                gs4_solve_stats stats;
+                double bound;
+                p.desc.tolerance = (gs4_real)1e-11;
+                CHECK_RESULT(NULL, pois_solve(&p, &stats), GS4_OK);
+                CHECK_CLOSE(pois_distance(&p), 0, 1e-6);
+                CHECK(poisson_residual(&p, p.x, &bound) <= 1.001e-11 + bound);
+                poisson_free(&p);
+            }
 }
 
 /* No unknown, one, one without neighbours: the answers by hand. */
@@ -172,21 +224,27 @@ static void test_poisson_few_unknowns(void)
     gs4_real one[3] = { 2, 2, 2 };
     gs4_solve_stats stats;
     int i;
-    for (i = 0; i < 3; i++) { p.rhs[i] = 6; p.x[i] = (gs4_real)(10 + i); }
+    for (i = 0; i < 3; i++) {
+        p.rhs[i] = 6;
+        p.x[i] = (gs4_real)(10 + i);
+    }
     CHECK_RESULT(NULL, pois_solve(&p, &stats), GS4_OK);
-    CHECK(stats.iterations == 0 && stats.residual == 0 && p.x[0] == 10 && p.x[1] == 11 && p.x[2] == 12);
-    p.kind[1] = GS4_CELL_LIQUID; p.desc.cell_size = (gs4_real)0.5;
-    CHECK_RESULT(NULL, pois_solve(&p, &stats), GS4_OK);     /* (2 x - 10 - 12) / 0.25 = 6 */
+    CHECK(stats.iterations == 0 && stats.residual == 0 && p.x[0] == 10 && p.x[1] == 11
+          && p.x[2] == 12);
+    p.kind[1] = GS4_CELL_LIQUID;
+    p.desc.cell_size = (gs4_real)0.5;
+    CHECK_RESULT(NULL, pois_solve(&p, &stats), GS4_OK); /* (2 x - 10 - 12) / 0.25 = 6 */
     CHECK_CLOSE(p.x[1], 11.75, 1e-5);
     p.desc.diagonal = one;
-    CHECK_RESULT(NULL, pois_solve(&p, &stats), GS4_OK);     /* and 2 x */
+    CHECK_RESULT(NULL, pois_solve(&p, &stats), GS4_OK); /* and 2 x */
     CHECK_CLOSE(p.x[1], 94.0 / 10, 1e-5);
     p.kind[0] = p.kind[2] = GS4_CELL_SOLID;
     CHECK_RESULT(NULL, pois_solve(&p, &stats), GS4_OK);
     CHECK_CLOSE(p.x[1], 3, 1e-5);
     CHECK(p.x[0] == 10 && p.x[2] == 12);
     p.desc.diagonal = NULL;
-    CHECK_RESULT(NULL, pois_solve(&p, &stats), GS4_OK);     /* nothing holds it, and nothing can meet 6 */
+    /* nothing holds it, and nothing can meet 6 */
+    CHECK_RESULT(NULL, pois_solve(&p, &stats), GS4_OK);
     CHECK(p.x[1] == 0 && stats.pockets == 1);
     CHECK_CLOSE(stats.removed_mean, 6, 1e-6);
     poisson_free(&p);
@@ -207,11 +265,19 @@ static void test_poisson_order(void)
         p.desc.cell_size = (gs4_real)(1.0 / n);
         for (pass = 0; pass < 2; pass++) {
             size_t at = 0;
-            for (i[2] = 0; i[2] < n + 2; i[2]++) for (i[1] = 0; i[1] < n + 2; i[1]++) for (i[0] = 0; i[0] < n + 2; i[0]++, at++) {
-                const double x = (i[0] - 0.5) / n, u = sin(pi * x) * sin(pi * (i[1] - 0.5) / n) * sin(pi * (i[2] - 0.5) / n);
-                if (pass) error[q] = fmax(error[q], fabs((double)p.x[at] - (u + x)));
-                else { p.rhs[at] = (gs4_real)(3 * pi * pi * u); p.x[at] = p.kind[at] == GS4_CELL_AIR ? (gs4_real)(u + x) : 0; }
-            }
+            for (i[2] = 0; i[2] < n + 2; i[2]++)
+                for (i[1] = 0; i[1] < n + 2; i[1]++)
+                    for (i[0] = 0; i[0] < n + 2; i[0]++, at++) {
+                        const double x = (i[0] - 0.5) / n, u = sin(pi * x)
+                                                               * sin(pi * (i[1] - 0.5) / n)
+                                                               * sin(pi * (i[2] - 0.5) / n);
+                        if (pass)
+                            error[q] = fmax(error[q], fabs((double)p.x[at] - (u + x)));
+                        else {
+                            p.rhs[at] = (gs4_real)(3 * pi * pi * u);
+                            p.x[at] = p.kind[at] == GS4_CELL_AIR ? (gs4_real)(u + x) : 0;
+                        }
+                    }
             if (!pass) CHECK_RESULT(NULL, pois_solve(&p, &stats), GS4_OK);
         }
         poisson_free(&p);
@@ -231,44 +297,62 @@ static void test_poisson_guess_and_units(void)
     int a;
     CHECK_RESULT(NULL, pois_solve(&p, &stats), GS4_OK);
     memcpy(first, p.x, p.count * sizeof *first);
-    if (sizeof(gs4_real) == 4) p.desc.tolerance = (gs4_real)1e-4;       /* more than x in float can hold */
+    /* more than x in float can hold */
+    if (sizeof(gs4_real) == 4) p.desc.tolerance = (gs4_real)1e-4;
     CHECK_RESULT(NULL, gs4_poisson_create(&p.desc, &s), GS4_OK);
     CHECK_RESULT(NULL, gs4_poisson_solve(s, p.rhs, p.x, &stats), GS4_OK);
     CHECK(stats.iterations == 0);
     gs4_poisson_destroy(s);
     p.desc.tolerance = (gs4_real)1e-8;
-    for (a = 0; a < 3; a++) for (at = 0; at < p.faces[a]; at++) p.coefficient[a][at] *= (gs4_real)1e-12;
-    for (at = 0; at < p.count; at++) { p.rhs[at] *= (gs4_real)1e6; p.x[at] = 0; }
+    for (a = 0; a < 3; a++)
+        for (at = 0; at < p.faces[a]; at++) p.coefficient[a][at] *= (gs4_real)1e-12;
+    for (at = 0; at < p.count; at++) {
+        p.rhs[at] *= (gs4_real)1e6;
+        p.x[at] = 0;
+    }
     p.desc.cell_size = (gs4_real)1e-3;
-    CHECK_RESULT(NULL, pois_solve(&p, &stats), GS4_OK);     /* x by 1e6 / 1e-12 / 1e6 */
+    CHECK_RESULT(NULL, pois_solve(&p, &stats), GS4_OK); /* x by 1e6 / 1e-12 / 1e6 */
     CHECK(stats.iterations <= 11);
-    for (at = 0; at < p.count; at++) if (fabs((double)p.x[at] * 1e-12 - (double)first[at]) > 1e-5 * fabs((double)first[at]) + 1e-6) break;
+    for (at = 0; at < p.count; at++)
+        if (fabs((double)p.x[at] * 1e-12 - (double)first[at])
+            > 1e-5 * fabs((double)first[at]) + 1e-6)
+            break;
     CHECK(at == p.count);
     free(first);
     poisson_free(&p);
 }
 
-/* --- identities -------------------------------------------------------------------------------------------- */
+/* --- identities ------------------------------------------------------------------------------- */
 
 static void pois_fill(const poisson_case *p, const gs4i_solver *s, double **to, const double *from)
 {
     size_t at;
     int i[3];
-    POISSON_EACH(p, i, at) to[(i[0] + i[1] + i[2]) & 1][gs4i_row_of(&s->level[0], i[1], i[2]) + (size_t)(i[0] / 2)] = from[at];
+    POISSON_EACH(p, i, at)
+    to[(i[0] + i[1] + i[2]) & 1][gs4i_row_of(&s->level[0], i[1], i[2]) + (size_t)(i[0] / 2)] =
+        from[at];
 }
 
 /* u.M v of the cycle, or u.A v */
-static double pois_form(const poisson_case *p, gs4i_solver *s, const double *u, const double *v, int cycle)
+static double pois_form(const poisson_case *p, gs4i_solver *s, const double *u, const double *v,
+                        int cycle)
 {
     static const gs4i_stage_fn defect[] = { gs4i_stage_defect };
     const gs4i_masked *g = &s->level[0];
     double sum = 0;
     size_t at;
     int i[3], c;
-    for (c = 0; c < 2; c++) { memset(g->r[c], 0, g->count * sizeof(double)); memset(s->x[c], 0, g->count * sizeof(double)); }
+    for (c = 0; c < 2; c++) {
+        memset(g->r[c], 0, g->count * sizeof(double));
+        memset(s->x[c], 0, g->count * sizeof(double));
+    }
     pois_fill(p, s, cycle ? s->level[0].r : s->x, v);
-    if (cycle) gs4i_cycle(s); else gs4i_sweep_run(s, 0, defect, 1);
-    POISSON_EACH(p, i, at) {
+    if (cycle)
+        gs4i_cycle(s);
+    else
+        gs4i_sweep_run(s, 0, defect, 1);
+    POISSON_EACH(p, i, at)
+    {
         const size_t to = gs4i_row_of(g, i[1], i[2]) + (size_t)(i[0] / 2);
         c = (i[0] + i[1] + i[2]) & 1;
         sum += u[at] * (cycle ? (double)g->z[c][to] : -g->r[c][to]);
@@ -276,38 +360,53 @@ static double pois_form(const poisson_case *p, gs4i_solver *s, const double *u, 
     return sum;
 }
 
-/* u.Av = v.Au as the definition has it, u.Mv = v.Mu, u.Mu > 0, on random masks, coefficients and diagonals. */
+/* u.Av = v.Au as the definition has it, u.Mv = v.Mu, u.Mu > 0, on random masks, coefficients and
+ * diagonals. */
 static void test_poisson_symmetry(void)
 {
-    static const int shapes[4][3] = { { 21, 34, 27 }, { 7, 5, 80 }, { 64, 20, 20 }, { 40, 40, 40 } };
+    static const int shapes[4][3] = {
+        { 21, 34, 27 }, { 7, 5, 80 }, { 64, 20, 20 }, { 40, 40, 40 }
+    };
     int q, weighted, t, i[3];
-    for (q = 0; q < 4; q++) for (weighted = 0; weighted < 2; weighted++) {
-        poisson_case p = pois_random(shapes[q][0], shapes[q][1], shapes[q][2], 77 + (size_t)q, weighted);
-        gs4_poisson *s;
-        double *u = poisson_doubles(NULL, p.count), *v = poisson_doubles(NULL, p.count);
-        size_t at;
-        CHECK_RESULT(NULL, gs4_poisson_create(&p.desc, &s), GS4_OK);
-        for (t = 0; t < 3; t++) {
-            double uu, vv, uv, vu, exact = 0;
-            POISSON_EACH(&p, i, at) { u[at] = 2 * poisson_random(&p.random) - 1; v[at] = 2 * poisson_random(&p.random) - 1; }
-            POISSON_EACH(&p, i, at) exact += u[at] * poisson_row(&p, i, v, NULL, NULL);
-            uu = pois_form(&p, &s->solver, u, u, 0); vv = pois_form(&p, &s->solver, v, v, 0);
-            uv = pois_form(&p, &s->solver, u, v, 0); vu = pois_form(&p, &s->solver, v, u, 0);
-            CHECK_CLOSE(uv, vu, 1e-13 * sqrt(uu * vv));
-            CHECK_CLOSE(uv, exact * s->solver.mass_unit, 1e-12 * sqrt(uu * vv));
-            uu = pois_form(&p, &s->solver, u, u, 1); vv = pois_form(&p, &s->solver, v, v, 1);
-            uv = pois_form(&p, &s->solver, u, v, 1); vu = pois_form(&p, &s->solver, v, u, 1);
-            CHECK(uu > 0 && vv > 0);
-            CHECK_CLOSE(uv, vu, 1e-5 * sqrt(uu * vv));
+    for (q = 0; q < 4; q++)
+        for (weighted = 0; weighted < 2; weighted++) {
+            poisson_case p =
+                pois_random(shapes[q][0], shapes[q][1], shapes[q][2], 77 + (size_t)q, weighted);
+            gs4_poisson *s;
+            double *u = poisson_doubles(NULL, p.count), *v = poisson_doubles(NULL, p.count);
+            size_t at;
+            CHECK_RESULT(NULL, gs4_poisson_create(&p.desc, &s), GS4_OK);
+            for (t = 0; t < 3; t++) {
+                double uu, vv, uv, vu, exact = 0;
+                POISSON_EACH(&p, i, at)
+                {
+                    u[at] = 2 * poisson_random(&p.random) - 1;
+                    v[at] = 2 * poisson_random(&p.random) - 1;
+                }
+                POISSON_EACH(&p, i, at) exact += u[at] * poisson_row(&p, i, v, NULL, NULL);
+                uu = pois_form(&p, &s->solver, u, u, 0);
+                vv = pois_form(&p, &s->solver, v, v, 0);
+                uv = pois_form(&p, &s->solver, u, v, 0);
+                vu = pois_form(&p, &s->solver, v, u, 0);
+                CHECK_CLOSE(uv, vu, 1e-13 * sqrt(uu * vv));
+                CHECK_CLOSE(uv, exact * s->solver.mass_unit, 1e-12 * sqrt(uu * vv));
+                uu = pois_form(&p, &s->solver, u, u, 1);
+                vv = pois_form(&p, &s->solver, v, v, 1);
+                uv = pois_form(&p, &s->solver, u, v, 1);
+                vu = pois_form(&p, &s->solver, v, u, 1);
+                CHECK(uu > 0 && vv > 0);
+                CHECK_CLOSE(uv, vu, 1e-5 * sqrt(uu * vv));
+            }
+            gs4_poisson_destroy(s);
+            free(u);
+            free(v);
+            poisson_free(&p);
         }
-        gs4_poisson_destroy(s);
-        free(u); free(v);
-        poisson_free(&p);
-    }
 }
 
-/* Every edge of every graph has its mate of the same weight, in the bulk and beside it; of a full box of 48^3 cells graph 0 is one of
- * 12^3 nodes whose edges have half of four faces that have half of four faces each. */
+/* Every edge of every graph has its mate of the same weight, in the bulk and beside it; of a
+ * full box of 48^3 cells graph 0 is one of 12^3 nodes whose edges have half of four faces that
+ * have half of four faces each. */
 static void test_poisson_graphs(void)
 {
     static const char *const names[] = { "P1", "P2", "P4", "P5", "T3" };
@@ -319,28 +418,38 @@ static void test_poisson_graphs(void)
         CHECK_RESULT(NULL, gs4_poisson_create(&p.desc, &s), GS4_OK);
         for (l = 0; l < s->solver.graphs; l++) {
             const gs4i_graph *g = &s->solver.graph[l];
-            for (i = 0; i < g->n; i++) for (e = g->start[i]; e < g->start[i + 1]; e++) {
-                for (back = g->start[g->to[e]]; back < g->start[g->to[e] + 1] && g->to[back] != i; back++) {}
-                mates += back < g->start[g->to[e] + 1] && fabs((double)(g->w[back] - g->w[e])) <= 1e-6 * (double)g->w[e];
-                edges++;
-                if (l == 0) exact += g->w[e] == 4;
-            }
+            for (i = 0; i < g->n; i++)
+                for (e = g->start[i]; e < g->start[i + 1]; e++) {
+                    for (back = g->start[g->to[e]];
+                         back < g->start[g->to[e] + 1] && g->to[back] != i; back++) {
+                    }
+                    mates += back < g->start[g->to[e] + 1]
+                             && fabs((double)(g->w[back] - g->w[e])) <= 1e-6 * (double)g->w[e];
+                    edges++;
+                    if (l == 0) exact += g->w[e] == 4;
+                }
         }
         CHECK(edges > 0 && mates == edges);
-        if (strcmp(names[q], "P5") == 0) CHECK(s->solver.graph[0].n == 12 * 12 * 12 && exact == 6 * 12 * 12 * 11 && s->solver.graph[0].start[12 * 12 * 12] == exact);
+        if (strcmp(names[q], "P5") == 0)
+            CHECK(s->solver.graph[0].n == 12 * 12 * 12 && exact == 6 * 12 * 12 * 11
+                  && s->solver.graph[0].start[12 * 12 * 12] == exact);
         gs4_poisson_destroy(s);
         poisson_free(&p);
     }
 }
 
-/* --- determinism, reuse ------------------------------------------------------------------------------------- */
+/* --- determinism, reuse ----------------------------------------------------------------------- */
 
 static void pois_shuffled(int count, gs4_task_fn task, void *context, void *user)
 {
     int i, *calls = (int *)user;
     ++*calls;
-    if (*calls & 1) for (i = count - 1; i >= 0; i--) task(i, context);
-    else { for (i = 1; i < count; i += 2) task(i, context); for (i = 0; i < count; i += 2) task(i, context); }
+    if (*calls & 1)
+        for (i = count - 1; i >= 0; i--) task(i, context);
+    else {
+        for (i = 1; i < count; i += 2) task(i, context);
+        for (i = 0; i < count; i += 2) task(i, context);
+    }
 }
 
 static uint64_t pois_hash(poisson_case *p, int threads, int shuffled)
@@ -349,7 +458,8 @@ static uint64_t pois_hash(poisson_case *p, int threads, int shuffled)
     uint64_t h;
     int calls = 0;
     p->desc.threads = threads;
-    p->desc.parallel_for = shuffled ? pois_shuffled : NULL; p->desc.parallel_user = &calls;
+    p->desc.parallel_for = shuffled ? pois_shuffled : NULL;
+    p->desc.parallel_user = &calls;
     memset(p->x, 0, p->count * sizeof *p->x);
     CHECK_RESULT(NULL, pois_solve(p, &stats), GS4_OK);
     CHECK(!shuffled || calls > 0);
@@ -374,7 +484,8 @@ static void test_poisson_same_bits(void)
     }
 }
 
-/* One solver for one problem after the other: as if each were its first, and no memory once it has the largest. */
+/* One solver for one problem after the other: as if each were its first, and no memory once it
+ * has the largest. */
 static void test_poisson_reuse(void)
 {
     static const char *const names[5] = { "P2", "P4", "P3", "P2", "T3" };
@@ -383,27 +494,35 @@ static void test_poisson_reuse(void)
     gs4i_solver s;
     int q, round;
     uint64_t bytes = 0;
-    memset(&memory, 0, sizeof memory); memset(&tasks, 0, sizeof tasks); memset(&s, 0, sizeof s);
-    memory.hook.alloc_fn = gs4i_default_alloc; memory.hook.free_fn = gs4i_default_free;
-    s.memory = &memory; s.tasks = &tasks;
-    for (round = 0; round < 2; round++) for (q = 0; q < 5; q++) {
-        poisson_case p = poisson_make(names[q], 40);
-        gs4_solve_stats stats;
-        gs4_real *x = poisson_array(p.count);
-        CHECK_RESULT(NULL, pois_solve(&p, &stats), GS4_OK);
-        memset(&stats, 0, sizeof stats);
-        CHECK(gs4i_solver_setup(&s, &p.desc) == GS4_OK);
-        CHECK(gs4i_solver_solve(&s, p.rhs, x, 1e-8, 200, &stats) == GS4_OK);
-        CHECK(memcmp(x, p.x, p.count * sizeof *x) == 0);
-        free(x);
-        poisson_free(&p);
-        if (round) CHECK(memory.bytes == bytes); else if (q == 4) bytes = memory.bytes;
-    }
+    memset(&memory, 0, sizeof memory);
+    memset(&tasks, 0, sizeof tasks);
+    memset(&s, 0, sizeof s);
+    memory.hook.alloc_fn = gs4i_default_alloc;
+    memory.hook.free_fn = gs4i_default_free;
+    s.memory = &memory;
+    s.tasks = &tasks;
+    for (round = 0; round < 2; round++)
+        for (q = 0; q < 5; q++) {
+            poisson_case p = poisson_make(names[q], 40);
+            gs4_solve_stats stats;
+            gs4_real *x = poisson_array(p.count);
+            CHECK_RESULT(NULL, pois_solve(&p, &stats), GS4_OK);
+            memset(&stats, 0, sizeof stats);
+            CHECK(gs4i_solver_setup(&s, &p.desc) == GS4_OK);
+            CHECK(gs4i_solver_solve(&s, p.rhs, x, 1e-8, 200, &stats) == GS4_OK);
+            CHECK(memcmp(x, p.x, p.count * sizeof *x) == 0);
+            free(x);
+            poisson_free(&p);
+            if (round)
+                CHECK(memory.bytes == bytes);
+            else if (q == 4)
+                bytes = memory.bytes;
+        }
     gs4i_solver_free(&s);
     CHECK(memory.bytes == 0);
 }
 
-/* --- failures --------------------------------------------------------------------------------------------------- */
+/* --- failures --------------------------------------------------------------------------------- */
 
 static void test_poisson_limit(void)
 {
@@ -416,7 +535,9 @@ static void test_poisson_limit(void)
     CHECK(stats.residual > 1e-8 && stats.residual < 0.1);
     residual = poisson_residual(&p, p.x, &bound);
     CHECK_CLOSE(residual, stats.residual, 1e-6 * stats.residual + bound);
-    p.desc.max_iterations = 0; p.desc.tolerance = (gs4_real)1e-30;      /* more than double can give */
+    /* more than double can give */
+    p.desc.max_iterations = 0;
+    p.desc.tolerance = (gs4_real)1e-30;
     CHECK_RESULT(NULL, pois_solve(&p, &stats), GS4_ERROR_NOT_CONVERGED);
     CHECK(strstr(gs4_last_error(NULL), "stays at") && stats.residual < 1e-12);
     residual = poisson_residual(&p, p.x, &bound);
@@ -430,19 +551,23 @@ static void test_poisson_bad_guess(void)
     static const char *const names[3] = { "P2", "P5", "T5" };
     int q, k;
     size_t i;
-    for (q = 0; q < 3; q++) for (k = 0; k < 2; k++) {
-        poisson_case p = poisson_make(names[q], 24);
-        gs4_solve_stats stats;
-        double bound;
-        for (i = 0; i < p.count; i++) if (p.kind[i] == GS4_CELL_LIQUID) p.x[i] = (gs4_real)(1e6 * (k ? 1 : poisson_random(&p.random)));
-        CHECK_RESULT(NULL, pois_solve(&p, &stats), GS4_OK);
-        CHECK(poisson_residual(&p, p.x, &bound) <= 1.001e-8 + bound);
-        CHECK_CLOSE(pois_distance(&p), 0, 1e-6);
-        poisson_free(&p);
-    }
+    for (q = 0; q < 3; q++)
+        for (k = 0; k < 2; k++) {
+            poisson_case p = poisson_make(names[q], 24);
+            gs4_solve_stats stats;
+            double bound;
+            for (i = 0; i < p.count; i++)
+                if (p.kind[i] == GS4_CELL_LIQUID)
+                    p.x[i] = (gs4_real)(1e6 * (k ? 1 : poisson_random(&p.random)));
+            CHECK_RESULT(NULL, pois_solve(&p, &stats), GS4_OK);
+            CHECK(poisson_residual(&p, p.x, &bound) <= 1.001e-8 + bound);
+            CHECK_CLOSE(pois_distance(&p), 0, 1e-6);
+            poisson_free(&p);
+        }
 }
 
-/* Few cells whose faces differ by up to 1e6: the residual rises and falls for long before it goes down. */
+/* Few cells whose faces differ by up to 1e6: the residual rises and falls for long before it
+ * goes down. */
 static void test_poisson_contrast(void)
 {
     int seed, solved = 0, a;
@@ -452,18 +577,24 @@ static void test_poisson_contrast(void)
         gs4_solve_stats stats;
         double bound;
         p.random = (uint64_t)seed * 88172645463325252u;
-        p.kind[0] = GS4_CELL_AIR; p.desc.tolerance = (gs4_real)1e-4;
+        p.kind[0] = GS4_CELL_AIR;
+        p.desc.tolerance = (gs4_real)1e-4;
         for (a = 0; a < 3; a++) {
             p.desc.coefficient[a] = p.coefficient[a] = poisson_array(p.faces[a]);
-            for (i = 0; i < p.faces[a]; i++) p.coefficient[a][i] = (gs4_real)pow(10, -6 * poisson_random(&p.random));
+            for (i = 0; i < p.faces[a]; i++)
+                p.coefficient[a][i] = (gs4_real)pow(10, -6 * poisson_random(&p.random));
         }
-        if (pois_solve(&p, &stats) == GS4_OK) { solved++; CHECK(poisson_residual(&p, p.x, &bound) <= 1.001e-4 + bound); }
+        if (pois_solve(&p, &stats) == GS4_OK) {
+            solved++;
+            CHECK(poisson_residual(&p, p.x, &bound) <= 1.001e-4 + bound);
+        }
         poisson_free(&p);
     }
     CHECK(solved == 200);
 }
 
-/* A cycle that gives NaN: once more with the diagonal; a diagonal that does too: the guess stays. */
+/* A cycle that gives NaN: once more with the diagonal; a diagonal that does too: the guess
+ * stays. */
 static void test_poisson_breakdown(void)
 {
     poisson_case p = poisson_make("P2", 24);
@@ -472,14 +603,17 @@ static void test_poisson_breakdown(void)
     double bound = 0, residual;
     size_t at;
     CHECK_RESULT(NULL, gs4_poisson_create(&p.desc, &s), GS4_OK);
-    for (at = 0; at < s->solver.level[1].count; at++) if (s->solver.level[1].inverse[0][at] > 0) s->solver.level[1].inverse[0][at] = (float)NAN;
+    for (at = 0; at < s->solver.level[1].count; at++)
+        if (s->solver.level[1].inverse[0][at] > 0) s->solver.level[1].inverse[0][at] = (float)NAN;
     CHECK_RESULT(NULL, gs4_poisson_solve(s, p.rhs, p.x, &stats), GS4_OK);
     CHECK(stats.iterations > 20 && poisson_residual(&p, p.x, &bound) <= 1.001e-8 + bound);
-    for (at = 0; at < s->solver.level[0].count; at++) s->solver.level[0].inverse[0][at] = -s->solver.level[0].inverse[0][at];
+    for (at = 0; at < s->solver.level[0].count; at++)
+        s->solver.level[0].inverse[0][at] = -s->solver.level[0].inverse[0][at];
     for (at = 0; at < p.count; at++) p.x[at] = 1;
     CHECK_RESULT(NULL, gs4_poisson_solve(s, p.rhs, p.x, &stats), GS4_ERROR_NOT_CONVERGED);
     CHECK(strstr(gs4_last_error(NULL), "broke down"));
-    for (at = 0; at < p.count && fabs((double)p.x[at]) < 1e6; at++) {}
+    for (at = 0; at < p.count && fabs((double)p.x[at]) < 1e6; at++) {
+    }
     CHECK(at == p.count);
     residual = poisson_residual(&p, p.x, &bound);
     CHECK_CLOSE(residual, stats.residual, 1e-6 * stats.residual + bound);
@@ -490,7 +624,7 @@ static void test_poisson_breakdown(void)
 static void pois_refused(const gs4_poisson_desc *d, const char *word)
 {
     int nothing;
-    gs4_poisson *s = (gs4_poisson *)(void *)&nothing;       /* must become NULL */
+    gs4_poisson *s = (gs4_poisson *)(void *)&nothing; /* must become NULL */
     CHECK_RESULT(NULL, gs4_poisson_create(d, &s), GS4_ERROR_ARGUMENT);
     CHECK(s == NULL && strstr(gs4_last_error(NULL), word));
     gs4_poisson_destroy(s);
@@ -505,23 +639,48 @@ static void test_poisson_arguments(void)
     gs4_poisson *s;
     int a;
     for (a = 0; a < 3; a++) {
-        d = good; d.cells[a] = 0; pois_refused(&d, "cells[");
-        d = good; d.cell_size = bad[a]; pois_refused(&d, "cell_size");
-        d = good; d.tolerance = bad[a]; pois_refused(&d, "tolerance");
+        d = good;
+        d.cells[a] = 0;
+        pois_refused(&d, "cells[");
+        d = good;
+        d.cell_size = bad[a];
+        pois_refused(&d, "cell_size");
+        d = good;
+        d.tolerance = bad[a];
+        pois_refused(&d, "tolerance");
     }
-    d = good; d.cell_size = 0; pois_refused(&d, "cell_size");
-    d = good; d.kind = NULL; pois_refused(&d, "kind");
-    d = good; d.max_iterations = -1; pois_refused(&d, "max_iterations");
-    d = good; d.threads = -1; pois_refused(&d, "threads");
-    d = good; d.threads = 1025; pois_refused(&d, "threads");
-    d = good; d.allocator.alloc_fn = gs4i_default_alloc; pois_refused(&d, "allocator");
+    d = good;
+    d.cell_size = 0;
+    pois_refused(&d, "cell_size");
+    d = good;
+    d.kind = NULL;
+    pois_refused(&d, "kind");
+    d = good;
+    d.max_iterations = -1;
+    pois_refused(&d, "max_iterations");
+    d = good;
+    d.threads = -1;
+    pois_refused(&d, "threads");
+    d = good;
+    d.threads = 1025;
+    pois_refused(&d, "threads");
+    d = good;
+    d.allocator.alloc_fn = gs4i_default_alloc;
+    pois_refused(&d, "allocator");
 #ifndef GS4_PTHREADS
-    d = good; d.threads = 2; pois_refused(&d, "threads");
+    d = good;
+    d.threads = 2;
+    pois_refused(&d, "threads");
 #endif
-    d = good; d.cells[0] = d.cells[1] = d.cells[2] = 1 << 20; pois_refused(&d, "cells");
-    CHECK(gs4_poisson_create(NULL, &s) == GS4_ERROR_ARGUMENT && gs4_poisson_create(&good, NULL) == GS4_ERROR_ARGUMENT);
+    d = good;
+    d.cells[0] = d.cells[1] = d.cells[2] = 1 << 20;
+    pois_refused(&d, "cells");
+    CHECK(gs4_poisson_create(NULL, &s) == GS4_ERROR_ARGUMENT
+          && gs4_poisson_create(&good, NULL) == GS4_ERROR_ARGUMENT);
     CHECK(gs4_poisson_solve(NULL, p.rhs, p.x, NULL) == GS4_ERROR_ARGUMENT);
-    p.kind[77] = 3; pois_refused(&good, "kind[]"); p.kind[77] = GS4_CELL_LIQUID;
+    p.kind[77] = 3;
+    pois_refused(&good, "kind[]");
+    p.kind[77] = GS4_CELL_LIQUID;
     poisson_free(&p);
 }
 
@@ -534,11 +693,19 @@ static void test_poisson_bad_numbers(void)
     gs4_solve_stats stats;
     int a, b;
     memset(p.kind, GS4_CELL_LIQUID, p.count);
-    p.kind[0] = GS4_CELL_AIR; p.kind[p.count - 1] = GS4_CELL_SOLID;
+    p.kind[0] = GS4_CELL_AIR;
+    p.kind[p.count - 1] = GS4_CELL_SOLID;
     for (b = 0; b < 3; b++) {
         gs4_real keep = p.diagonal[300];
-        p.diagonal[300] = bad[b]; pois_refused(&p.desc, "diagonal[]"); p.diagonal[300] = keep;
-        for (a = 0; a < 3; a++) { keep = p.coefficient[a][334]; p.coefficient[a][334] = bad[b]; pois_refused(&p.desc, "coefficient[]"); p.coefficient[a][334] = keep; }
+        p.diagonal[300] = bad[b];
+        pois_refused(&p.desc, "diagonal[]");
+        p.diagonal[300] = keep;
+        for (a = 0; a < 3; a++) {
+            keep = p.coefficient[a][334];
+            p.coefficient[a][334] = bad[b];
+            pois_refused(&p.desc, "coefficient[]");
+            p.coefficient[a][334] = keep;
+        }
     }
     p.diagonal[0] = p.diagonal[p.count - 1] = (gs4_real)NAN;
     for (a = 0; a < 3; a++) p.coefficient[a][0] = p.coefficient[a][p.faces[a] - 1] = (gs4_real)NAN;
@@ -547,10 +714,19 @@ static void test_poisson_bad_numbers(void)
     CHECK_RESULT(NULL, gs4_poisson_solve(s, p.rhs, p.x, &stats), GS4_OK);
     for (b = 0; b < 3; b += 2) {
         const gs4_real x = p.x[300], rhs = p.rhs[300], air = p.x[0];
-        p.rhs[300] = bad[b]; CHECK_RESULT(NULL, gs4_poisson_solve(s, p.rhs, p.x, &stats), GS4_ERROR_ARGUMENT); CHECK(strstr(gs4_last_error(NULL), "rhs[]")); p.rhs[300] = rhs;
+        p.rhs[300] = bad[b];
+        CHECK_RESULT(NULL, gs4_poisson_solve(s, p.rhs, p.x, &stats), GS4_ERROR_ARGUMENT);
+        CHECK(strstr(gs4_last_error(NULL), "rhs[]"));
+        p.rhs[300] = rhs;
         CHECK(p.x[300] == x);
-        p.x[300] = bad[b]; CHECK_RESULT(NULL, gs4_poisson_solve(s, p.rhs, p.x, &stats), GS4_ERROR_ARGUMENT); CHECK(strstr(gs4_last_error(NULL), "x[]")); p.x[300] = x;
-        p.x[0] = bad[b]; CHECK_RESULT(NULL, gs4_poisson_solve(s, p.rhs, p.x, &stats), GS4_ERROR_ARGUMENT); CHECK(strstr(gs4_last_error(NULL), "x[]")); p.x[0] = air;
+        p.x[300] = bad[b];
+        CHECK_RESULT(NULL, gs4_poisson_solve(s, p.rhs, p.x, &stats), GS4_ERROR_ARGUMENT);
+        CHECK(strstr(gs4_last_error(NULL), "x[]"));
+        p.x[300] = x;
+        p.x[0] = bad[b];
+        CHECK_RESULT(NULL, gs4_poisson_solve(s, p.rhs, p.x, &stats), GS4_ERROR_ARGUMENT);
+        CHECK(strstr(gs4_last_error(NULL), "x[]"));
+        p.x[0] = air;
     }
     CHECK_RESULT(NULL, gs4_poisson_solve(s, p.rhs, p.x, NULL), GS4_OK);
     gs4_poisson_destroy(s);
@@ -559,7 +735,9 @@ static void test_poisson_bad_numbers(void)
     poisson_free(&p);
 }
 
-typedef struct pois_heap { int left, balance; } pois_heap;
+typedef struct pois_heap {
+    int left, balance;
+} pois_heap;
 
 static void *pois_alloc(size_t bytes, size_t alignment, void *user)
 {
@@ -571,7 +749,11 @@ static void *pois_alloc(size_t bytes, size_t alignment, void *user)
     return p;
 }
 
-static void pois_free(void *memory, size_t bytes, void *user) { ((pois_heap *)user)->balance--; gs4i_default_free(memory, bytes, NULL); }
+static void pois_free(void *memory, size_t bytes, void *user)
+{
+    ((pois_heap *)user)->balance--;
+    gs4i_default_free(memory, bytes, NULL);
+}
 
 /* The k-th allocation is refused, for all k; a solve allocates nothing. */
 static void test_poisson_memory(void)
@@ -581,12 +763,16 @@ static void test_poisson_memory(void)
     gs4_poisson *s;
     gs4_solve_stats stats;
     int k, r = GS4_ERROR_MEMORY;
-    p.desc.allocator.alloc_fn = pois_alloc; p.desc.allocator.free_fn = pois_free; p.desc.allocator.user = &heap;
+    p.desc.allocator.alloc_fn = pois_alloc;
+    p.desc.allocator.free_fn = pois_free;
+    p.desc.allocator.user = &heap;
     heap.balance = 0;
     for (k = 0; k < 100 && r != GS4_OK; k++) {
         heap.left = k;
         r = gs4_poisson_create(&p.desc, &s);
-        CHECK(r == GS4_OK || (r == GS4_ERROR_MEMORY && s == NULL && heap.balance == 0 && strstr(gs4_last_error(NULL), "memory")));
+        CHECK(r == GS4_OK
+              || (r == GS4_ERROR_MEMORY && s == NULL && heap.balance == 0
+                  && strstr(gs4_last_error(NULL), "memory")));
     }
     CHECK(k > 8 && r == GS4_OK && heap.left == 0);
     CHECK_RESULT(NULL, gs4_poisson_solve(s, p.rhs, p.x, &stats), GS4_OK);

@@ -1,5 +1,6 @@
-/* Steps just below the limit stay bounded and steps above it are refused, for every member of the family; and extremes of everything
- * at once: a step is taken or refused with a sentence, numbers stay finite, energy does not come from nowhere. */
+/* Steps just below the limit stay bounded and steps above it are refused, for every member of
+ * the family; and extremes of everything at once: a step is taken or refused with a sentence,
+ * numbers stay finite, energy does not come from nowhere. */
 
 static double stability_random(uint32_t *state)
 {
@@ -12,24 +13,30 @@ static void stability_stir(gs4_sim *sim, double speed, uint32_t seed)
     gs4_edit v = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
     int i, c;
     for (i = 0; i < v.count; i++)
-        for (c = 0; c < 3; c++) v.data[(size_t)i * (size_t)v.stride + (size_t)c] += (gs4_real)(speed * stability_random(&seed));
+        for (c = 0; c < 3; c++)
+            v.data[(size_t)i * (size_t)v.stride + (size_t)c] +=
+                (gs4_real)(speed * stability_random(&seed));
 }
 
 /* Kinetic and, of the Tait equation, compressive: V0 (rho0 c0^2 / 7) (J^-6/6 + J - 7/6), J. */
 static double stability_energy(gs4_sim *sim, double sound_speed)
 {
-    const gs4_view J = gs4_particles(sim, GS4_FIELD_VOLUME_RATIO), m = gs4_particles(sim, GS4_FIELD_MASS);
+    const gs4_view J = gs4_particles(sim, GS4_FIELD_VOLUME_RATIO),
+                   m = gs4_particles(sim, GS4_FIELD_MASS);
     double sum = gs4_get_stats(sim).kinetic_energy;
     int i;
     for (i = 0; i < J.count; i++) {
         const double j = (double)J.data[(size_t)i * (size_t)J.stride];
-        sum += (double)m.data[(size_t)i * (size_t)m.stride] * sound_speed * sound_speed / 7 * (pow(j, -6) / 6 + j - 7.0 / 6);
+        sum += (double)m.data[(size_t)i * (size_t)m.stride] * sound_speed * sound_speed / 7
+               * (pow(j, -6) / 6 + j - 7.0 / 6);
     }
     return sum;
 }
 
-/* A jittered drop, 7 cells across, stirred by c0/1000: the most that 0.95 of the limit makes of its energy in `steps` steps. */
-static double stability_growth(gs4_integrator integrator, double rho, double spurious, double viscosity, int steps)
+/* A jittered drop, 7 cells across, stirred by c0/1000: the most that 0.95 of the limit makes of
+ * its energy in `steps` steps. */
+static double stability_growth(gs4_integrator integrator, double rho, double spurious,
+                               double viscosity, int steps)
 {
     gs4_sim_desc d = scene_cube(16);
     gs4_material m = scene_liquid(1000, viscosity, 10);
@@ -38,10 +45,13 @@ static double stability_growth(gs4_integrator integrator, double rho, double spu
     double start, most = 0;
     uint64_t hash;
     int i, result;
-    d.integrator = integrator; d.rho_inf = (gs4_real)rho; d.rho_inf_spurious = (gs4_real)spurious;
+    d.integrator = integrator;
+    d.rho_inf = (gs4_real)rho;
+    d.rho_inf_spurious = (gs4_real)spurious;
     if (integrator == GS4_INTEGRATOR_GS4) d.flip_decay_time = INFINITY;
     sim = physics_create(&d, &m);
-    f.jitter = 1; f.random_seed = 5;
+    f.jitter = 1;
+    f.random_seed = 5;
     CHECK(gs4_add_particles(sim, gs4_sphere(at(0.5, 0.5, 0.5), (gs4_real)(3.5 / 16)), &f) > 0);
     stability_stir(sim, 0.01, 1);
     start = stability_energy(sim, 10);
@@ -54,8 +64,10 @@ static double stability_growth(gs4_integrator integrator, double rho, double spu
         CHECK(result == GS4_ERROR_ARGUMENT || result == GS4_ERROR_UNSTABLE);
         CHECK(gs4_state_hash(sim) == hash);
     }
-    if (test_filter[0]) printf("integrator %d, rho %g %g, viscosity %g: energy at most %.4f, at the end %.4f of what it was\n", (int)integrator, rho, spurious,
-                               viscosity, most, stability_energy(sim, 10) / start);
+    if (test_filter[0])
+        printf("integrator %d, rho %g %g, viscosity %g: energy at most %.4f, at the end %.4f of "
+               "what it was\n",
+               (int)integrator, rho, spurious, viscosity, most, stability_energy(sim, 10) / start);
     gs4_destroy(sim);
     return most;
 }
@@ -66,16 +78,22 @@ static void test_stability(void)
     const int steps = test_slow ? 3000 : 300;
     int i, k;
     for (k = 0; k < (test_slow ? 3 : 1); k++) {
-        const double viscosity = k == 0 ? 0 : k == 1 ? 30 : 3000;       /* sound, both, viscosity limit the step */
-        for (i = 0; i < 5; i++) CHECK(stability_growth(GS4_INTEGRATOR_GS4, family[i][0], family[i][1], viscosity, steps) < 1.1);
+        /* sound, both, viscosity limit the step */
+        const double viscosity = k == 0 ? 0 : k == 1 ? 30 : 3000;
+        for (i = 0; i < 5; i++)
+            CHECK(stability_growth(GS4_INTEGRATOR_GS4, family[i][0], family[i][1], viscosity, steps)
+                  < 1.1);
         CHECK(stability_growth(GS4_INTEGRATOR_SYMPLECTIC_EULER, 0, 0, viscosity, steps) < 1.1);
         scene_sharp = 1;
-        for (i = test_slow ? 0 : 4; i < 5; i++) CHECK(stability_growth(GS4_INTEGRATOR_GS4, family[i][0], family[i][1], viscosity, steps) < 1.1);
+        for (i = test_slow ? 0 : 4; i < 5; i++)
+            CHECK(stability_growth(GS4_INTEGRATOR_GS4, family[i][0], family[i][1], viscosity, steps)
+                  < 1.1);
         scene_sharp = 0;
     }
 }
 
-/* What is sharpened is what is full, by the densest of the materials: else nodes that hold little would be, too, and swing ever more. */
+/* What is sharpened is what is full, by the densest of the materials: else nodes that hold
+ * little would be, too, and swing ever more. */
 static void test_stability_of_two_densities(void)
 {
     gs4_sim_desc d = scene_cube(20);
@@ -84,10 +102,13 @@ static void test_stability_of_two_densities(void)
     gs4_sim *sim;
     double start, most = 0;
     int i;
-    d.sharp_gradients = 1; d.flip_decay_time = INFINITY; d.rho_inf = 1;
+    d.sharp_gradients = 1;
+    d.flip_decay_time = INFINITY;
+    d.rho_inf = 1;
     sim = physics_create(&d, &heavy);
     CHECK(gs4_add_material(sim, &light) == 1);
-    f.jitter = 1; f.random_seed = 5;
+    f.jitter = 1;
+    f.random_seed = 5;
     CHECK(gs4_add_particles(sim, gs4_sphere(at(0.38, 0.5, 0.5), (gs4_real)0.15), &f) > 0);
     stability_stir(sim, 0.01, 1);
     start = gs4_get_stats(sim).kinetic_energy;
@@ -95,15 +116,17 @@ static void test_stability_of_two_densities(void)
         CHECK_RESULT(sim, gs4_step(sim, (gs4_real)(0.95 * (double)gs4_stable_dt(sim))), GS4_OK);
         most = fmax(most, gs4_get_stats(sim).kinetic_energy / start);
     }
-    if (test_filter[0]) printf("two densities, sharpened: energy at most %.3f of what it was\n", most);
+    if (test_filter[0])
+        printf("two densities, sharpened: energy at most %.3f of what it was\n", most);
     CHECK(most < 1.05);
     gs4_destroy(sim);
 }
 
-/* --- extremes ------------------------------------------------------------------------------------------- */
+/* --- extremes --------------------------------------------------------------------------------- */
 
 typedef struct stability_scene {
-    double viscosity, sound_speed, gravity, cell_size, flight;          /* of cells a second, towards the floor */
+    /* of cells a second, towards the floor */
+    double viscosity, sound_speed, gravity, cell_size, flight;
     gs4_integrator integrator;
     gs4_wall floor;
 } stability_scene;
@@ -115,29 +138,39 @@ static stability_scene stability_choose(int number)
     static const double gravities[4] = { 0, 9.81, 1e3, 1e5 }, sizes[4] = { 1e-6, 1e-3, 1, 1e3 };
     static const gs4_wall floors[3] = { GS4_WALL_STICK, GS4_WALL_SLIP, GS4_WALL_SEPARATE };
     stability_scene s;
-    s.viscosity = viscosities[number % 5]; number /= 5;
-    s.sound_speed = sounds[number % 4]; number /= 4;
-    s.gravity = gravities[number % 4]; number /= 4;
-    s.cell_size = sizes[number % 4]; number /= 4;
-    s.flight = number % 2 ? 1000 : 0; number /= 2;
-    s.integrator = physics_integrators[number % 2]; number /= 2;
+    s.viscosity = viscosities[number % 5];
+    number /= 5;
+    s.sound_speed = sounds[number % 4];
+    number /= 4;
+    s.gravity = gravities[number % 4];
+    number /= 4;
+    s.cell_size = sizes[number % 4];
+    number /= 4;
+    s.flight = number % 2 ? 1000 : 0;
+    number /= 2;
+    s.integrator = physics_integrators[number % 2];
+    number /= 2;
     s.floor = floors[number];
     return s;
 }
 
-/* What is wrong after call i, which gave `result`, or NULL. The last is gs4_advance, which must find its way unless the floor is hit
- * faster than sound. */
-static const char *stability_fault(gs4_sim *sim, const stability_scene *s, int i, int result, double energy)
+/* What is wrong after call i, which gave `result`, or NULL. The last is gs4_advance, which must
+ * find its way unless the floor is hit faster than sound. */
+static const char *stability_fault(gs4_sim *sim, const stability_scene *s, int i, int result,
+                                   double energy)
 {
     const double h = s->cell_size, speed2 = s->flight * h * s->flight * h + 4 * s->gravity * h;
-    if (result > 0 || (result < 0 && !gs4_last_error(sim)[0])) return "neither taken nor refused with a sentence";
+    if (result > 0 || (result < 0 && !gs4_last_error(sim)[0]))
+        return "neither taken nor refused with a sentence";
     if (i == 20 && result < 0 && speed2 < s->sound_speed * s->sound_speed) return "gives up";
     if (!physics_is_finite(sim)) return "not finite";
-    if (s->gravity == 0 && !(stability_energy(sim, s->sound_speed) < 1.1 * energy)) return "energy from nowhere";
+    if (s->gravity == 0 && !(stability_energy(sim, s->sound_speed) < 1.1 * energy))
+        return "energy from nowhere";
     return NULL;
 }
 
-/* 4 cells across, one cell above the floor: 20 steps and one gs4_advance of as long as 20 of its own would be. Returns its fault. */
+/* 4 cells across, one cell above the floor: 20 steps and one gs4_advance of as long as 20 of its
+ * own would be. Returns its fault. */
 static const char *stability_try(const stability_scene *s, int number, int *refused)
 {
     const double h = s->cell_size;
@@ -148,20 +181,28 @@ static const char *stability_try(const stability_scene *s, int number, int *refu
     const char *fault = NULL;
     double energy;
     int i, result;
-    d.cell_size = (gs4_real)h; d.gravity.y = (gs4_real)-s->gravity; d.integrator = s->integrator; d.walls[2] = s->floor;
+    d.cell_size = (gs4_real)h;
+    d.gravity.y = (gs4_real)-s->gravity;
+    d.integrator = s->integrator;
+    d.walls[2] = s->floor;
     sim = physics_create(&d, &m);
-    f.jitter = (gs4_real)0.7; f.random_seed = (uint32_t)number;
+    f.jitter = (gs4_real)0.7;
+    f.random_seed = (uint32_t)number;
     CHECK(gs4_add_particles(sim, gs4_sphere(at(5 * h, 3 * h, 5 * h), (gs4_real)(2 * h)), &f) > 0);
     stability_stir(sim, 1e-2 * (s->sound_speed + s->flight * h), 1);
     energy = stability_energy(sim, s->sound_speed);
     for (i = 0; i < 21 && !fault; i++) {
         const double limit = (double)gs4_stable_dt(sim);
-        result = i < 20 ? gs4_step(sim, (gs4_real)(0.95 * limit)) : gs4_advance(sim, (gs4_real)(10 * limit));
+        result = i < 20 ? gs4_step(sim, (gs4_real)(0.95 * limit))
+                        : gs4_advance(sim, (gs4_real)(10 * limit));
         if (result < 0) ++*refused;
         fault = stability_fault(sim, s, i, result, energy);
     }
-    if (fault) printf("    call %d of 21 gave %d (%s), %llu steps, energy %.3g of what it was\n", i, result, result < 0 ? gs4_last_error(sim) : "",
-                      (unsigned long long)gs4_get_stats(sim).steps, stability_energy(sim, s->sound_speed) / energy);
+    if (fault)
+        printf("    call %d of 21 gave %d (%s), %llu steps, energy %.3g of what it was\n", i,
+               result, result < 0 ? gs4_last_error(sim) : "",
+               (unsigned long long)gs4_get_stats(sim).steps,
+               stability_energy(sim, s->sound_speed) / energy);
     gs4_destroy(sim);
     return fault;
 }
@@ -176,49 +217,67 @@ static void test_tiny_step(void)
     gs4_sim *sim;
     int i;
     double speed;
-    d.flip_decay_time = (gs4_real)2e-15; f.jitter = (gs4_real)0.5;
+    d.flip_decay_time = (gs4_real)2e-15;
+    f.jitter = (gs4_real)0.5;
     sim = physics_create(&d, &m);
     CHECK(gs4_add_particles(sim, gs4_sphere(at(0.5, 0.5, 0.5), (gs4_real)0.2), &f) > 0);
     v = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
-    for (i = 0; i < v.count; i++) v.data[(size_t)i * (size_t)v.stride] = (gs4_real)(i & 1 ? 0.1 : -0.1);
+    for (i = 0; i < v.count; i++)
+        v.data[(size_t)i * (size_t)v.stride] = (gs4_real)(i & 1 ? 0.1 : -0.1);
     speed = (double)gs4_get_stats(sim).max_speed;
     for (i = 0; i < 20; i++) CHECK_RESULT(sim, gs4_step(sim, (gs4_real)1e-15), GS4_OK);
     CHECK((double)gs4_get_stats(sim).max_speed < 0.7 * speed);
     gs4_destroy(sim);
 }
 
-/* Motion that fades within a step leaves no rate behind that a longer step would blow up: a drop that hits the floor gains nothing, and a
- * block at rest stays calm when steps of a thousandth come between. */
+/* Motion that fades within a step leaves no rate behind that a longer step would blow up: a drop
+ * that hits the floor gains nothing, and a block at rest stays calm when steps of a thousandth
+ * come between. */
 static void test_short_decay(void)
 {
-    static const double decays[3] = { 1e-5, 1e-7, 1e-30 }, rhos[3][2] = { { 0, 0 }, { 0.6, 0.1 }, { 1, 0.5 } };
+    static const double decays[3] = { 1e-5, 1e-7, 1e-30 },
+                        rhos[3][2] = { { 0, 0 }, { 0.6, 0.1 }, { 1, 0.5 } };
     int k, i, wall, rho;
-    for (rho = 0; rho < 3; rho++) for (k = 0; k < 3; k++) {
-        gs4_sim_desc d = scene_cube(16);
-        gs4_material m = scene_liquid(1000, 0.1, 20);
-        gs4_fill f = scene_fill(at(1, -5, 0));
-        gs4_sim *sim;
-        double energy;
-        d.cell_size = (gs4_real)0.01; d.gravity = at(0, -9.81, 0); d.flip_decay_time = (gs4_real)decays[k];
-        d.rho_inf = (gs4_real)rhos[rho][0]; d.rho_inf_spurious = (gs4_real)rhos[rho][1];
-        m.solid = GS4_NEO_HOOKEAN; m.shear_modulus = 10000;
-        for (wall = 0; wall < 2; wall++) {
-            d.walls[2] = wall ? GS4_WALL_SLIP : GS4_WALL_STICK;
+    for (rho = 0; rho < 3; rho++)
+        for (k = 0; k < 3; k++) {
+            gs4_sim_desc d = scene_cube(16);
+            gs4_material m = scene_liquid(1000, 0.1, 20);
+            gs4_fill f = scene_fill(at(1, -5, 0));
+            gs4_sim *sim;
+            double energy;
+            d.cell_size = (gs4_real)0.01;
+            d.gravity = at(0, -9.81, 0);
+            d.flip_decay_time = (gs4_real)decays[k];
+            d.rho_inf = (gs4_real)rhos[rho][0];
+            d.rho_inf_spurious = (gs4_real)rhos[rho][1];
+            m.solid = GS4_NEO_HOOKEAN;
+            m.shear_modulus = 10000;
+            for (wall = 0; wall < 2; wall++) {
+                d.walls[2] = wall ? GS4_WALL_SLIP : GS4_WALL_STICK;
+                sim = physics_create(&d, &m);
+                CHECK(gs4_add_particles(sim, gs4_sphere(at(0.08, 0.02, 0.08), 0.01), &f) > 0);
+                energy = gs4_get_stats(sim).kinetic_energy;
+                for (i = 0; i < 5; i++) {
+                    CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)0.004), GS4_OK);
+                    CHECK(gs4_get_stats(sim).kinetic_energy < 0.3 * energy);
+                }
+                gs4_destroy(sim);
+            }
+            m = scene_liquid(1000, 1, 10);
+            f = scene_fill(at(0, 0, 0));
+            f.jitter = (gs4_real)0.5;
             sim = physics_create(&d, &m);
-            CHECK(gs4_add_particles(sim, gs4_sphere(at(0.08, 0.02, 0.08), 0.01), &f) > 0);
-            energy = gs4_get_stats(sim).kinetic_energy;
-            for (i = 0; i < 5; i++) { CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)0.004), GS4_OK); CHECK(gs4_get_stats(sim).kinetic_energy < 0.3 * energy); }
+            CHECK(gs4_add_particles(sim, gs4_box(at(0.04, 0, 0.04), at(0.12, 0.08, 0.12)), &f) > 0);
+            for (i = 0; i < 8; i++) {
+                CHECK_RESULT(
+                    sim,
+                    gs4_advance(sim, i & 1 ? (gs4_real)1e-3 * gs4_stable_dt(sim) : (gs4_real)0.01),
+                    GS4_OK);
+                CHECK(gs4_get_stats(sim).max_speed < 0.3
+                      && gs4_get_stats(sim).min_volume_ratio > 0.9);
+            }
             gs4_destroy(sim);
         }
-        m = scene_liquid(1000, 1, 10); f = scene_fill(at(0, 0, 0)); f.jitter = (gs4_real)0.5;
-        sim = physics_create(&d, &m);
-        CHECK(gs4_add_particles(sim, gs4_box(at(0.04, 0, 0.04), at(0.12, 0.08, 0.12)), &f) > 0);
-        for (i = 0; i < 8; i++) {
-            CHECK_RESULT(sim, gs4_advance(sim, i & 1 ? (gs4_real)1e-3 * gs4_stable_dt(sim) : (gs4_real)0.01), GS4_OK);
-            CHECK(gs4_get_stats(sim).max_speed < 0.3 && gs4_get_stats(sim).min_volume_ratio > 0.9);
-        }
-        gs4_destroy(sim);
-    }
 }
 
 /* What thickens in shear says little of its limit at rest: gs4_advance finds it. */
@@ -228,15 +287,19 @@ static void test_thickening(void)
     gs4_material m = scene_liquid(1000, 0, 0);
     const gs4_fill f = scene_fill(at(0, -0.1, 0));
     gs4_sim *sim;
-    d.cell_size = (gs4_real)0.001; d.gravity = at(0, -9.81, 0); d.ambient_temperature = 140;
+    d.cell_size = (gs4_real)0.001;
+    d.gravity = at(0, -9.81, 0);
+    d.ambient_temperature = 140;
     m.viscosity_law = GS4_VISCOSITY_CROSS_WLF;
     sim = physics_create(&d, &m);
-    CHECK(gs4_add_particles(sim, gs4_box(at(0.002, 0.001, 0.002), at(0.006, 0.005, 0.006)), &f) > 0);
+    CHECK(gs4_add_particles(sim, gs4_box(at(0.002, 0.001, 0.002), at(0.006, 0.005, 0.006)), &f)
+          > 0);
     CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)1e-4), GS4_OK);
     gs4_destroy(sim);
 }
 
-/* A nozzle that travels into the domain finds room for what it gives, whether max_particles is set or not. */
+/* A nozzle that travels into the domain finds room for what it gives, whether max_particles is
+ * set or not. */
 static void test_nozzle_from_outside(void)
 {
     int count[2], k, i;
@@ -246,9 +309,12 @@ static void test_nozzle_from_outside(void)
         gs4_emitter e;
         gs4_sim *sim;
         memset(&e, 0, sizeof e);
-        d.cell_size = (gs4_real)0.01; d.max_particles = k ? 200000 : 0;
+        d.cell_size = (gs4_real)0.01;
+        d.max_particles = k ? 200000 : 0;
         sim = physics_create(&d, &m);
-        e.shape = gs4_box(at(-0.08, 0.06, 0.06), at(0.001, 0.10, 0.10)); e.travel = at(1, 0, 0); e.fill.velocity = at(2, 0, 0);
+        e.shape = gs4_box(at(-0.08, 0.06, 0.06), at(0.001, 0.10, 0.10));
+        e.travel = at(1, 0, 0);
+        e.fill.velocity = at(2, 0, 0);
         CHECK(gs4_add_emitter(sim, &e) >= 0);
         for (i = 0; i < 30; i++) CHECK_RESULT(sim, gs4_step(sim, gs4_stable_dt(sim)), GS4_OK);
         count[k] = gs4_get_stats(sim).particles;
@@ -260,18 +326,23 @@ static void test_nozzle_from_outside(void)
 /* 64 of the combinations, spread over them by the golden section; with --slow all. */
 static void test_extremes(void)
 {
-    const int all = 5 * 4 * 4 * 4 * 2 * 2 * 3, count = test_slow ? 2 * all : 64;       /* once more with sharpened gradients */
+    /* once more with sharpened gradients */
+    const int all = 5 * 4 * 4 * 4 * 2 * 2 * 3, count = test_slow ? 2 * all : 64;
     int i, refused = 0;
     for (i = 0; i < count; i++) {
-        const int number = test_slow ? i % all : (int)((long)i * 2371 % all), sharp = test_slow ? i >= all : i % 4 == 3;
+        const int number = test_slow ? i % all : (int)((long)i * 2371 % all),
+                  sharp = test_slow ? i >= all : i % 4 == 3;
         const stability_scene s = stability_choose(number);
         const char *fault;
         if (test_slow && sharp && s.integrator != GS4_INTEGRATOR_GS4) continue;
         scene_sharp = sharp && s.integrator == GS4_INTEGRATOR_GS4;
         fault = stability_try(&s, number, &refused);
         CHECK(fault == NULL);
-        if (fault) printf("    %d: %s: viscosity %g, sound %g, gravity %g, cells of %g, flight %g, integrator %d, floor %d, sharpened %d\n", number, fault,
-                          s.viscosity, s.sound_speed, s.gravity, s.cell_size, s.flight, (int)s.integrator, (int)s.floor, scene_sharp);
+        if (fault)
+            printf("    %d: %s: viscosity %g, sound %g, gravity %g, cells of %g, flight %g, "
+                   "integrator %d, floor %d, sharpened %d\n",
+                   number, fault, s.viscosity, s.sound_speed, s.gravity, s.cell_size, s.flight,
+                   (int)s.integrator, (int)s.floor, scene_sharp);
     }
     scene_sharp = 0;
     if (test_filter[0]) printf("%d scenes, %d of %d calls refused\n", count, refused, 21 * count);

@@ -1,49 +1,66 @@
-/* The stress of viscoelastic liquids, at one material point: against solutions that are not ours, turned about, and at random. */
+/* The stress of viscoelastic liquids, at one material point: against solutions that are not
+ * ours, turned about, and at random. */
 
 #include "xpp_reference.h"
-enum { STRESS_ROWS = sizeof reference_rows / sizeof *reference_rows, STRESS_DOUBLE = sizeof(gs4_real) == 8 };
+enum {
+    STRESS_ROWS = sizeof reference_rows / sizeof *reference_rows,
+    STRESS_DOUBLE = sizeof(gs4_real) == 8
+};
 static const double stress_members[4][2] = { { 0, 0 }, { 0.5, 0.5 }, { 1, 0 }, { 1, 1 } };
 #define STRESS_ORDER 1.85
-static const int stress_index[3][3] = { { 0, 3, 4 }, { 3, 1, 5 }, { 4, 5, 2 } };       /* of xx yy zz xy xz yz */
+/* of xx yy zz xy xz yz */
+static const int stress_index[3][3] = { { 0, 3, 4 }, { 3, 1, 5 }, { 4, 5, 2 } };
 
-/* --- material, flow, run -------------------------------------------------------------------------------- */
+/* --- material, flow, run ---------------------------------------------------------------------- */
 
 /* Of a set of the reference; -1: Oldroyd-B, UCM with local = 0. */
 static gs4_material stress_material(int set, double modulus, double lambda, double local)
 {
     gs4_material m = scene_liquid(1000, modulus * lambda / (1 - local), 10);
     m.liquid = set < 0 ? GS4_OLDROYD_B : GS4_POM_POM;
-    m.local_fraction = (gs4_real)local; m.relaxation_time = (gs4_real)lambda;
+    m.local_fraction = (gs4_real)local;
+    m.relaxation_time = (gs4_real)lambda;
     if (set < 0) return m;
     m.stretch_time = (gs4_real)(lambda / reference_sets[set][0]);
-    m.arms = (gs4_real)reference_sets[set][1]; m.anisotropy = (gs4_real)reference_sets[set][2];
+    m.arms = (gs4_real)reference_sets[set][1];
+    m.anisotropy = (gs4_real)reference_sets[set][2];
     return m;
 }
 
 static void stress_flow(int flow, double rate, gs4_real L[9])
 {
     memset(L, 0, 9 * sizeof *L);
-    if (flow == REF_SHEAR) { L[1] = (gs4_real)rate; return; }
+    if (flow == REF_SHEAR) {
+        L[1] = (gs4_real)rate;
+        return;
+    }
     L[0] = (gs4_real)rate;
     L[4] = (gs4_real)(flow == REF_PLANAR ? -rate : -0.5 * rate);
     L[8] = (gs4_real)(flow == REF_PLANAR ? 0 : -0.5 * rate);
 }
 
-static int stress_run(const gs4_material *m, gs4_point *p, const gs4_real L[9], double time, int steps, const double member[2])
+static int stress_run(const gs4_material *m, gs4_point *p, const gs4_real L[9], double time,
+                      int steps, const double member[2])
 {
     int i, r = GS4_OK;
-    for (i = 0; i < steps && r == GS4_OK; i++) r = gs4_point_step(m, p, L, (gs4_real)(time / steps), (gs4_real)member[0], (gs4_real)member[1]);
+    for (i = 0; i < steps && r == GS4_OK; i++)
+        r = gs4_point_step(m, p, L, (gs4_real)(time / steps), (gs4_real)member[0],
+                           (gs4_real)member[1]);
     if (r < 0) printf("    step %d of %d: %s\n", i, steps, gs4_last_error(NULL));
     return r;
 }
 
-/* Largest difference of a component of s (xx yy zz xy xz yz), over the largest component of the reference (xx xy yy zz). */
+/* Largest difference of a component of s (xx yy zz xy xz yz), over the largest component of the
+ * reference (xx xy yy zz). */
 static double stress_error(const double s[6], const double S[4])
 {
     const double full[6] = { S[0], S[2], S[3], S[1], 0, 0 };
     double error = 0, size = 0;
     int i;
-    for (i = 0; i < 6; i++) { error = fmax(error, fabs(s[i] - full[i])); size = fmax(size, fabs(full[i])); }
+    for (i = 0; i < 6; i++) {
+        error = fmax(error, fabs(s[i] - full[i]));
+        size = fmax(size, fabs(full[i]));
+    }
     return error / size;
 }
 
@@ -55,7 +72,7 @@ static double stress_point_error(const gs4_point *p, double modulus, const doubl
     return stress_error(s, S);
 }
 
-/* --- the reference --------------------------------------------------------------------------------------- */
+/* --- the reference ---------------------------------------------------------------------------- */
 
 /* Rows of one run: the same flow at growing times. */
 static int stress_rows(int first)
@@ -64,7 +81,9 @@ static int stress_rows(int first)
     int n = 1;
     for (; first + n < STRESS_ROWS; n++) {
         const reference_row *b = &a[n];
-        if (b->kind != a->kind || b->set != a->set || b->flow != a->flow || b->Wi != a->Wi || b->t <= a[n - 1].t) break;
+        if (b->kind != a->kind || b->set != a->set || b->flow != a->flow || b->Wi != a->Wi
+            || b->t <= a[n - 1].t)
+            break;
     }
     return n;
 }
@@ -74,18 +93,37 @@ static void stress_start(const reference_row *row, double S[6], double L[9])
 {
     gs4_real flow[9];
     int i;
-    memset(S, 0, 6 * sizeof *S); memset(flow, 0, sizeof flow);
+    memset(S, 0, 6 * sizeof *S);
+    memset(flow, 0, sizeof flow);
     if (row->kind == REF_STARTUP || row->kind == REF_STEADY) stress_flow(row->flow, 1, flow);
     for (i = 0; i < 9; i++) L[i] = row->Wi * (double)flow[i];
-    if (row->kind == REF_STEP) { S[0] = row->Wi * row->Wi; S[3] = row->Wi; }
-    if (row->kind == REF_CESSATION) { S[0] = row->S[0]; S[1] = row->S[2]; S[2] = row->S[3]; S[3] = row->S[1]; }
-    if (row->kind == REF_ROTATION) { S[0] = 2; S[3] = 1; L[1] = -row->Wi; L[3] = row->Wi; }
+    if (row->kind == REF_STEP) {
+        S[0] = row->Wi * row->Wi;
+        S[3] = row->Wi;
+    }
+    if (row->kind == REF_CESSATION) {
+        S[0] = row->S[0];
+        S[1] = row->S[2];
+        S[2] = row->S[3];
+        S[3] = row->S[1];
+    }
+    if (row->kind == REF_ROTATION) {
+        S[0] = 2;
+        S[3] = 1;
+        L[1] = -row->Wi;
+        L[3] = row->Wi;
+    }
 }
 
-static double stress_rate_of(const reference_row *row) { return row->kind == REF_STARTUP || row->kind == REF_ROTATION ? fmax(1, row->Wi) : 1; }
+static double stress_rate_of(const reference_row *row)
+{
+    return row->kind == REF_STARTUP || row->kind == REF_ROTATION ? fmax(1, row->Wi) : 1;
+}
 
-/* Steps of a run, `fineness` per relaxation time or unit of strain, and the error of each of its rows. */
-static int stress_follow(const reference_row *rows, int n, int fineness, double modulus, double lambda, const double member[2], double *error)
+/* Steps of a run, `fineness` per relaxation time or unit of strain, and the error of each of its
+ * rows. */
+static int stress_follow(const reference_row *rows, int n, int fineness, double modulus,
+                         double lambda, const double member[2], double *error)
 {
     const gs4_material m = stress_material(rows->set, modulus, lambda, rows->set < 0 ? 0.1 : 0);
     double S[6], L[9];
@@ -107,8 +145,9 @@ static int stress_follow(const reference_row *rows, int n, int fineness, double 
     return all;
 }
 
-/* In units of G0 and lambda_b that change from run to run. At 200 steps per relaxation time or unit of strain. What was strained at once, or had
- * been strained fast, relaxes up to 1e10 times faster than lambda_b at first: there the split takes over, and more error is allowed. */
+/* In units of G0 and lambda_b that change from run to run. At 200 steps per relaxation time or
+ * unit of strain. What was strained at once, or had been strained fast, relaxes up to 1e10 times
+ * faster than lambda_b at first: there the split takes over, and more error is allowed. */
 static void test_stress_reference(void)
 {
     static const double units[3][2] = { { 1, 1 }, { 4950, 0.0098 }, { 3e-3, 40 } };
@@ -126,21 +165,27 @@ static void test_stress_reference(void)
             int steps;
             if (!test_slow && cost > 5 && member != first % 4) continue;
             steps = stress_follow(rows, n, 200, unit[0], unit[1], stress_members[member], error);
-            if (STRESS_DOUBLE) stress_follow(rows, n, 400, unit[0], unit[1], stress_members[member], finer);
+            if (STRESS_DOUBLE)
+                stress_follow(rows, n, 400, unit[0], unit[1], stress_members[member], finer);
             for (k = 0; k < n; k++) {
-                const double tolerance = (sudden ? 1e-2 : 1e-3) + (STRESS_DOUBLE ? 0 : 1e-7 * sqrt(steps) + 3e-9 * steps);    /* roundings, and a twentieth of the most they can drift */
+                /* roundings, and a twentieth of the most they can drift */
+                const double tolerance = (sudden ? 1e-2 : 1e-3)
+                                         + (STRESS_DOUBLE ? 0 : 1e-7 * sqrt(steps) + 3e-9 * steps);
                 CHECK(error[k] < tolerance);
                 worst[sudden] = fmax(worst[sudden], error[k]);
                 if (test_filter[0] && error[k] > 0.5 * tolerance)
                     printf("row %d, member %d: error %.2e\n", first + k, member, error[k]);
                 if (!STRESS_DOUBLE || sudden || finer[k] < 1e-9) continue;
-                CHECK(log2(error[k] / finer[k]) >= STRESS_ORDER); orders++;
+                CHECK(log2(error[k] / finer[k]) >= STRESS_ORDER);
+                orders++;
                 if (test_filter[0] && !(log2(error[k] / finer[k]) >= STRESS_ORDER))
-                    printf("row %d, member %d: errors %.2e %.2e, order %.2f\n", first + k, member, error[k], finer[k], log2(error[k] / finer[k]));
+                    printf("row %d, member %d: errors %.2e %.2e, order %.2f\n", first + k, member,
+                           error[k], finer[k], log2(error[k] / finer[k]));
             }
         }
     }
-    if (test_filter[0]) printf("worst error %.1e, after a jump %.1e; %d orders\n", worst[0], worst[1], orders);
+    if (test_filter[0])
+        printf("worst error %.1e, after a jump %.1e; %d orders\n", worst[0], worst[1], orders);
 }
 
 /* Powers of two in the units change no digit: neither integrator has a number with a unit in it. */
@@ -148,13 +193,16 @@ static void test_stress_units(void)
 {
     int set, i, c;
     for (set = -1; set < 10; set++) {
-        const gs4_material one = stress_material(set, 1, 1, 0), other = stress_material(set, 4096, 0.03125, 0);
+        const gs4_material one = stress_material(set, 1, 1, 0),
+                           other = stress_material(set, 4096, 0.03125, 0);
         gs4_point p, q;
         gs4_real L[9], M[9];
-        memset(&p, 0, sizeof p); memset(&q, 0, sizeof q);
+        memset(&p, 0, sizeof p);
+        memset(&q, 0, sizeof q);
         for (i = 0; i < 40; i++) {
-            const double dt = i % 8 == 7 ? 0.5 : 0.01;         /* the split, too */
-            stress_flow(i % 3, 2, L); stress_flow(i % 3, 64, M);
+            const double dt = i % 8 == 7 ? 0.5 : 0.01; /* the split, too */
+            stress_flow(i % 3, 2, L);
+            stress_flow(i % 3, 64, M);
             CHECK(gs4_point_step(&one, &p, L, (gs4_real)dt, 1, (gs4_real)0.5) == GS4_OK);
             CHECK(gs4_point_step(&other, &q, M, (gs4_real)dt / 32, 1, (gs4_real)0.5) == GS4_OK);
             for (c = 0; c < 6; c++) CHECK(q.stress[c] == 4096 * p.stress[c]);
@@ -162,7 +210,7 @@ static void test_stress_units(void)
     }
 }
 
-/* --- the split by itself ---------------------------------------------------------------------------------- */
+/* --- the split by itself ---------------------------------------------------------------------- */
 
 static gs4i_split stress_split(int set, const double L[9])
 {
@@ -170,7 +218,11 @@ static gs4i_split stress_split(int set, const double L[9])
     int i;
     memset(&p, 0, sizeof p);
     p.inv_lambda = 1;
-    if (set >= 0) { p.stretch = 2 * reference_sets[set][0]; p.nu = 2 / reference_sets[set][1]; p.alpha = reference_sets[set][2]; }
+    if (set >= 0) {
+        p.stretch = 2 * reference_sets[set][0];
+        p.nu = 2 / reference_sets[set][1];
+        p.alpha = reference_sets[set][2];
+    }
     for (i = 0; i < 9; i++) p.L[i / 3][i % 3] = L[i];
     return p;
 }
@@ -182,8 +234,12 @@ static void stress_split_fixed(gs4i_split *p, double c[6], double time, int step
     int i;
     gs4i_exponential(p->L, h, E);
     for (i = 0; i < steps; i++) {
-        if (p->stretch > 0) { gs4i_relax(p, c, 0.5 * h); gs4i_convect(E, c); gs4i_relax(p, c, 0.5 * h); }
-        else gs4i_linear_advance(p, c, h);
+        if (p->stretch > 0) {
+            gs4i_relax(p, c, 0.5 * h);
+            gs4i_convect(E, c);
+            gs4i_relax(p, c, 0.5 * h);
+        } else
+            gs4i_linear_advance(p, c, h);
     }
 }
 
@@ -206,8 +262,11 @@ static void stress_split_follow(const reference_row *rows, int n, int fineness, 
     for (i = 0; i < 3; i++) c[i] += 1;
     for (k = 0; k < n; k++) {
         const double time = rows[k].t - (k ? rows[k - 1].t : 0);
-        if (fineness) stress_split_fixed(&p, c, time, (int)ceil(time * stress_rate_of(rows) * 25 + 1e-9) * (fineness / 25));
-        else CHECK(gs4i_split_advance(&p, c, time) == GS4_OK);
+        if (fineness)
+            stress_split_fixed(
+                &p, c, time, (int)ceil(time * stress_rate_of(rows) * 25 + 1e-9) * (fineness / 25));
+        else
+            CHECK(gs4i_split_advance(&p, c, time) == GS4_OK);
         error[k] = stress_split_error(c, rows[k].S);
     }
 }
@@ -225,29 +284,39 @@ static void test_stress_split(void)
         if (test_slow || cost < 100) {
             stress_split_follow(rows, n, 0, error);
             for (k = 0; k < n; k++) {
-                CHECK(error[k] < (rows->kind == REF_STEP || rows->kind == REF_CESSATION ? 2e-3 : 1e-3));
+                CHECK(error[k]
+                      < (rows->kind == REF_STEP || rows->kind == REF_CESSATION ? 2e-3 : 1e-3));
                 worst[0] = fmax(worst[0], error[k]);
-                if (test_filter[0] && error[k] > 5e-4) printf("row %d: error %.2e\n", first + k, error[k]);
+                if (test_filter[0] && error[k] > 5e-4)
+                    printf("row %d: error %.2e\n", first + k, error[k]);
             }
         }
-        if (rows->kind == REF_STEP || rows->kind == REF_CESSATION || (!test_slow && cost > 15)) continue;
-        stress_split_follow(rows, n, 200, fine); stress_split_follow(rows, n, 400, finer);
+        if (rows->kind == REF_STEP || rows->kind == REF_CESSATION || (!test_slow && cost > 15))
+            continue;
+        stress_split_follow(rows, n, 200, fine);
+        stress_split_follow(rows, n, 400, finer);
         for (k = 0; k < n; k++) {
             worst[1] = fmax(worst[1], fine[k]);
-            CHECK(fine[k] < (rows->set < 0 ? 1e-9 : 1e-3));     /* UCM and Oldroyd-B: exact */
+            CHECK(fine[k] < (rows->set < 0 ? 1e-9 : 1e-3)); /* UCM and Oldroyd-B: exact */
             if (finer[k] < 1e-9) continue;
-            if (first + k == 83) {                          /* 1.899 here, 1.95 with twice the steps, on its way to 2 */
+            /* 1.899 here, 1.95 with twice the steps, on its way to 2 */
+            if (first + k == 83) {
                 double finest[8];
                 stress_split_follow(rows, n, 800, finest);
-                CHECK(log2(fine[k] / finer[k]) >= 1.89); CHECK(log2(finer[k] / finest[k]) >= 1.94); orders++;
+                CHECK(log2(fine[k] / finer[k]) >= 1.89);
+                CHECK(log2(finer[k] / finest[k]) >= 1.94);
+                orders++;
                 continue;
             }
-            CHECK(log2(fine[k] / finer[k]) >= 1.9); orders++;
+            CHECK(log2(fine[k] / finer[k]) >= 1.9);
+            orders++;
             if (test_filter[0] && (fine[k] > 1e-3 || !(log2(fine[k] / finer[k]) >= 1.9)))
-                printf("row %d: errors %.2e %.2e, order %.2f\n", first + k, fine[k], finer[k], log2(fine[k] / finer[k]));
+                printf("row %d: errors %.2e %.2e, order %.2f\n", first + k, fine[k], finer[k],
+                       log2(fine[k] / finer[k]));
         }
     }
-    if (test_filter[0]) printf("worst error %.1e, with fixed steps %.1e; %d orders\n", worst[0], worst[1], orders);
+    if (test_filter[0])
+        printf("worst error %.1e, with fixed steps %.1e; %d orders\n", worst[0], worst[1], orders);
 }
 
 /* In one call over up to 1e4 relaxation times: the steady state. */
@@ -272,11 +341,15 @@ static void test_stress_steady(void)
             error = stress_split_error(c, row->S);
             CHECK(result == GS4_OK && error < 1e-3);
             worst = fmax(worst, error);
-            if (test_filter[0] && (result < 0 || error > 5e-4 || clock() - start > CLOCKS_PER_SEC / 50)) printf("row %d, Wi %g, time %g: result %d, error %.2e, %.3f s\n", i, row->Wi, times[k], result, error, (double)(clock() - start) / CLOCKS_PER_SEC);
+            if (test_filter[0]
+                && (result < 0 || error > 5e-4 || clock() - start > CLOCKS_PER_SEC / 50))
+                printf("row %d, Wi %g, time %g: result %d, error %.2e, %.3f s\n", i, row->Wi,
+                       times[k], result, error, (double)(clock() - start) / CLOCKS_PER_SEC);
         }
     }
-    for (k = 0; k < 6; k++) {                              /* Oldroyd-B: S_xx = 2 Wi^2, S_xy = Wi */
-        const double Wi = k < 3 ? 1e-3 : 1, L[9] = { 0, Wi, 0, 0, 0, 0, 0, 0, 0 }, S[4] = { 2 * Wi * Wi, Wi, 0, 0 };
+    for (k = 0; k < 6; k++) { /* Oldroyd-B: S_xx = 2 Wi^2, S_xy = Wi */
+        const double Wi = k < 3 ? 1e-3 : 1, L[9] = { 0, Wi, 0, 0, 0, 0, 0, 0, 0 },
+                     S[4] = { 2 * Wi * Wi, Wi, 0, 0 };
         double c[6] = { 1, 1, 1, 0, 0, 0 };
         gs4i_split p = stress_split(-1, L);
         CHECK(gs4i_split_advance(&p, c, times[k % 3]) == GS4_OK);
@@ -285,32 +358,38 @@ static void test_stress_steady(void)
     if (test_filter[0]) printf("worst error %.1e\n", worst);
 }
 
-/* --- turned about ----------------------------------------------------------------------------------------- */
+/* --- turned about ----------------------------------------------------------------------------- */
 
 static uint64_t stress_seed = 1;
-static double stress_random(void)                          /* -1 to 1 */
+static double stress_random(void) /* -1 to 1 */
 {
     stress_seed = stress_seed * 6364136223846793005u + 1442695040888963407u;
     return (double)(int64_t)stress_seed / 9223372036854775808.0;
 }
 
-static void stress_turn(double Q[3][3], double A[3][3], double out[3][3])        /* Q A Q^T */
+static void stress_turn(double Q[3][3], double A[3][3], double out[3][3]) /* Q A Q^T */
 {
     double T[3][3];
     int i, j;
     gs4i_multiply3(Q, A, T);
-    for (i = 0; i < 3; i++) for (j = 0; j < 3; j++) out[i][j] = T[i][0] * Q[j][0] + T[i][1] * Q[j][1] + T[i][2] * Q[j][2];
+    for (i = 0; i < 3; i++)
+        for (j = 0; j < 3; j++)
+            out[i][j] = T[i][0] * Q[j][0] + T[i][1] * Q[j][1] + T[i][2] * Q[j][2];
 }
 
 static void stress_rotation(double Q[3][3])
 {
     double W[3][3] = { { 0 } };
     int k;
-    for (k = 0; k < 3; k++) { W[(k + 1) % 3][(k + 2) % 3] = 3 * stress_random(); W[(k + 2) % 3][(k + 1) % 3] = -W[(k + 1) % 3][(k + 2) % 3]; }
+    for (k = 0; k < 3; k++) {
+        W[(k + 1) % 3][(k + 2) % 3] = 3 * stress_random();
+        W[(k + 2) % 3][(k + 1) % 3] = -W[(k + 1) % 3][(k + 2) % 3];
+    }
     gs4i_exponential(W, 1, Q);
 }
 
-/* Q s(L) Q^T and s(Q L Q^T), after steps of dt that are all by rule 1 or all by the split; largest difference over the largest stress. */
+/* Q s(L) Q^T and s(Q L Q^T), after steps of dt that are all by rule 1 or all by the split;
+ * largest difference over the largest stress. */
 static double stress_turned(int set, double dt, int steps)
 {
     const gs4_material m = stress_material(set, 1, 1, 0);
@@ -319,17 +398,23 @@ static double stress_turned(int set, double dt, int steps)
     gs4_point p, q;
     int i, j;
     for (i = 0; i < 9; i++) A[i / 3][i % 3] = 2 * stress_random();
-    stress_rotation(Q); stress_turn(Q, A, B);
-    for (i = 0; i < 9; i++) { L[i] = (gs4_real)A[i / 3][i % 3]; M[i] = (gs4_real)B[i / 3][i % 3]; }
-    memset(&p, 0, sizeof p); memset(&q, 0, sizeof q);
+    stress_rotation(Q);
+    stress_turn(Q, A, B);
+    for (i = 0; i < 9; i++) {
+        L[i] = (gs4_real)A[i / 3][i % 3];
+        M[i] = (gs4_real)B[i / 3][i % 3];
+    }
+    memset(&p, 0, sizeof p);
+    memset(&q, 0, sizeof q);
     CHECK(stress_run(&m, &p, L, dt * steps, steps, stress_members[1]) == GS4_OK);
     CHECK(stress_run(&m, &q, M, dt * steps, steps, stress_members[1]) == GS4_OK);
     for (i = 0; i < 9; i++) A[i / 3][i % 3] = (double)p.stress[stress_index[i / 3][i % 3]];
     stress_turn(Q, A, B);
-    for (i = 0; i < 3; i++) for (j = 0; j < 3; j++) {
-        difference = fmax(difference, fabs(B[i][j] - (double)q.stress[stress_index[i][j]]));
-        size = fmax(size, fabs(B[i][j]));
-    }
+    for (i = 0; i < 3; i++)
+        for (j = 0; j < 3; j++) {
+            difference = fmax(difference, fabs(B[i][j] - (double)q.stress[stress_index[i][j]]));
+            size = fmax(size, fabs(B[i][j]));
+        }
     return difference / size;
 }
 
@@ -342,18 +427,24 @@ static void test_stress_turned(void)
         worst[1] = fmax(worst[1], stress_turned(k % 11 - 1, 0.5, 2));
     }
     if (test_filter[0]) printf("rule 1 %.1e, the split %.1e\n", worst[0], worst[1]);
-    CHECK(worst[0] < (STRESS_DOUBLE ? 1e-10 : 1e-4)); CHECK(worst[1] < (STRESS_DOUBLE ? 1e-10 : 1e-4));
+    CHECK(worst[0] < (STRESS_DOUBLE ? 1e-10 : 1e-4));
+    CHECK(worst[1] < (STRESS_DOUBLE ? 1e-10 : 1e-4));
 }
 
-/* Where all turns as a rigid body, and relaxation is slow (1e7 turns): s = R s R^T, R = exp(W t), second order. */
+/* Where all turns as a rigid body, and relaxation is slow (1e7 turns): s = R s R^T, R = exp(W
+ * t), second order. */
 static void test_stress_rigid_rotation(void)
 {
     static const double start[6] = { 2, -0.1, 0.4, 0.7, -0.3, 0.2 };
-    double W[3][3] = { { 0, -1, 0.5 }, { 1, 0, -0.7 }, { -0.5, 0.7, 0 } }, R[3][3], S[3][3], T[3][3];
+    double W[3][3] = { { 0, -1, 0.5 }, { 1, 0, -0.7 }, { -0.5, 0.7, 0 } }, R[3][3], S[3][3],
+           T[3][3];
     gs4_real L[9];
     int i, k, set, member;
     gs4i_exponential(W, 2, R);
-    for (i = 0; i < 9; i++) { L[i] = (gs4_real)W[i / 3][i % 3]; S[i / 3][i % 3] = start[stress_index[i / 3][i % 3]]; }
+    for (i = 0; i < 9; i++) {
+        L[i] = (gs4_real)W[i / 3][i % 3];
+        S[i / 3][i % 3] = start[stress_index[i / 3][i % 3]];
+    }
     stress_turn(R, S, T);
     for (set = -1; set < 8; set += 8) {
         const gs4_material m = stress_material(set, 1, 1e7, 0);
@@ -364,16 +455,20 @@ static void test_stress_rigid_rotation(void)
                 memset(&p, 0, sizeof p);
                 for (i = 0; i < 6; i++) p.stress[i] = (gs4_real)start[i];
                 CHECK(stress_run(&m, &p, L, 2, 200 << k, stress_members[member]) == GS4_OK);
-                for (i = 0; i < 9; i++) error[k] = fmax(error[k], fabs((double)p.stress[stress_index[i / 3][i % 3]] - T[i / 3][i % 3]) / 2);
+                for (i = 0; i < 9; i++)
+                    error[k] = fmax(
+                        error[k],
+                        fabs((double)p.stress[stress_index[i / 3][i % 3]] - T[i / 3][i % 3]) / 2);
             }
             CHECK(error[0] < 1e-3);
             if (STRESS_DOUBLE) CHECK(log2(error[0] / error[1]) > 1.9);
-            if (test_filter[0]) printf("set %d, member %d: errors %.1e %.1e\n", set, member, error[0], error[1]);
+            if (test_filter[0])
+                printf("set %d, member %d: errors %.1e %.1e\n", set, member, error[0], error[1]);
         }
     }
 }
 
-/* --- pitfalls --------------------------------------------------------------------------------------------- */
+/* --- pitfalls --------------------------------------------------------------------------------- */
 
 static void test_stress_pitfalls(void)
 {
@@ -385,20 +480,29 @@ static void test_stress_pitfalls(void)
         const double mu = 50 * 0.1 / 0.8;
         gs4_point p;
         memset(&p, 0, sizeof p);
-        for (k = -8; k <= 8; k += 2) {                      /* no stress at rest is no stress for good */
+        /* no stress at rest is no stress for good */
+        for (k = -8; k <= 8; k += 2) {
             CHECK(gs4_point_step(&m, &p, still, (gs4_real)(0.1 * pow(10, k)), 0, 0) == GS4_OK);
             for (i = 0; i < 6; i++) CHECK(p.stress[i] == 0 && p.stress_rate[i] == 0);
         }
-        for (k = 0; k < 3; k++) {                           /* slow flow: viscosity mu, however long the steps are */
+        /* slow flow: viscosity mu, however long the steps are */
+        for (k = 0; k < 3; k++) {
             const double dt = k == 0 ? 1e-3 : k == 1 ? 0.08 : 100;
             memset(&p, 0, sizeof p);
             stress_flow(REF_SHEAR, 1e-3, L);
-            CHECK(stress_run(&m, &p, L, fmax(2, 20 * dt), k == 0 ? 2000 : k == 1 ? 25 : 20, stress_members[0]) == GS4_OK);
+            CHECK(stress_run(&m, &p, L, fmax(2, 20 * dt),
+                             k == 0   ? 2000
+                             : k == 1 ? 25
+                                      : 20,
+                             stress_members[0])
+                  == GS4_OK);
             CHECK(gs4_point_stress(&m, &p, L, cauchy) == GS4_OK);
             CHECK_CLOSE(cauchy[3] / (mu * 1e-3), 1, 1e-3);
-            for (i = 1; i < 6; i++) if (i != 3) CHECK(fabs((double)cauchy[i]) < 1e-3 * mu * 1e-3);
+            for (i = 1; i < 6; i++)
+                if (i != 3) CHECK(fabs((double)cauchy[i]) < 1e-3 * mu * 1e-3);
         }
-        memset(&p, 0, sizeof p);                            /* u = (rate y, 0, 0): pulls along x, never across */
+        /* u = (rate y, 0, 0): pulls along x, never across */
+        memset(&p, 0, sizeof p);
         stress_flow(REF_SHEAR, 20, L);
         for (i = 0; i < 300; i++) {
             const double before = (double)p.stress[0];
@@ -424,17 +528,23 @@ static void test_stress_short_memory(void)
             double D[6];
             gs4_point p;
             for (i = 0; i < 9; i++) L[i] = (gs4_real)(3 * stress_random());
-            L[8] = -L[0] - L[4];                            /* f depends on the trace in the first order */
-            for (i = 0; i < 9; i++) D[stress_index[i / 3][i % 3]] = 0.5 * ((double)L[i] + (double)L[3 * (i % 3) + i / 3]);
+            /* f depends on the trace in the first order */
+            L[8] = -L[0] - L[4];
+            for (i = 0; i < 9; i++)
+                D[stress_index[i / 3][i % 3]] =
+                    0.5 * ((double)L[i] + (double)L[3 * (i % 3) + i / 3]);
             memset(&p, 0, sizeof p);
             CHECK(stress_run(&m, &p, L, 0.1, 20, stress_members[0]) == GS4_OK);
             for (i = 0; i < 6; i++) CHECK_CLOSE(p.stress[i], 2 * mu * D[i], 1e-3 * 2 * mu * 3);
         }
 }
 
-/* --- at random -------------------------------------------------------------------------------------------- */
+/* --- at random -------------------------------------------------------------------------------- */
 
-static double stress_log(double low, double high) { return low * pow(high / low, 0.5 + 0.5 * stress_random()); }
+static double stress_log(double low, double high)
+{
+    return low * pow(high / low, 0.5 + 0.5 * stress_random());
+}
 
 /* Smallest and largest eigenvalue of c = s/G0 + I. */
 static void stress_eigenvalues(const gs4_point *p, double modulus, double *low, double *high)
@@ -443,18 +553,22 @@ static void stress_eigenvalues(const gs4_point *p, double modulus, double *low, 
     int i;
     for (i = 0; i < 6; i++) c[i] = (double)p->stress[i] / modulus + (i < 3);
     gs4i_eigen(c, values, Q);
-    *low = fmin(values[0], fmin(values[1], values[2])); *high = fmax(values[0], fmax(values[1], values[2]));
+    *low = fmin(values[0], fmin(values[1], values[2]));
+    *high = fmax(values[0], fmax(values[1], values[2]));
 }
 
 /* Pom-Pom or, one in eight, Oldroyd-B; alpha to 1, or `wild`: to 100. */
 static gs4_material stress_draw_material(int wild)
 {
-    const double lambda = stress_log(1e-6, 1e6), modulus = stress_log(1e-3, 1e9), local = stress_random() > 0 ? 0.5 + 0.45 * stress_random() : 0;
+    const double lambda = stress_log(1e-6, 1e6), modulus = stress_log(1e-3, 1e9),
+                 local = stress_random() > 0 ? 0.5 + 0.45 * stress_random() : 0;
     gs4_material m = stress_material(stress_random() > 0.75 ? -1 : 0, modulus, lambda, local);
     if (m.liquid == GS4_OLDROYD_B) return m;
     m.stretch_time = (gs4_real)(lambda / stress_log(0.01, 100));
     m.arms = (gs4_real)stress_log(1, 100);
-    m.anisotropy = (gs4_real)(wild ? stress_log(1, 100) : stress_random() > 0 ? 0.5 + 0.5 * stress_random() : stress_random() > 0);
+    m.anisotropy = (gs4_real)(wild                  ? stress_log(1, 100)
+                              : stress_random() > 0 ? 0.5 + 0.5 * stress_random()
+                                                    : stress_random() > 0);
     return m;
 }
 
@@ -464,58 +578,83 @@ static void stress_draw_flow(double rate, gs4_real L[9])
     double A[3][3] = { { 0 } }, Q[3][3], B[3][3], trace;
     const int kind = (int)(2 + 2 * stress_random());
     int i, j;
-    for (i = 0; i < 3; i++) for (j = 0; j < 3; j++) if (kind == 3) A[i][j] = stress_random();
+    for (i = 0; i < 3; i++)
+        for (j = 0; j < 3; j++)
+            if (kind == 3) A[i][j] = stress_random();
     if (kind == 0) A[0][1] = 1;
-    if (kind == 1) { A[0][0] = stress_random(); A[1][1] = stress_random(); }
-    if (kind == 2) { A[0][1] = 1; A[1][0] = -1; }
+    if (kind == 1) {
+        A[0][0] = stress_random();
+        A[1][1] = stress_random();
+    }
+    if (kind == 2) {
+        A[0][1] = 1;
+        A[1][0] = -1;
+    }
     trace = A[0][0] + A[1][1] + A[2][2];
-    if (stress_random() < 0.5) A[2][2] -= trace;           /* three of four keep the volume */
-    stress_rotation(Q); stress_turn(Q, A, B);
+    if (stress_random() < 0.5) A[2][2] -= trace; /* three of four keep the volume */
+    stress_rotation(Q);
+    stress_turn(Q, A, B);
     for (i = 0; i < 9; i++) L[i] = (gs4_real)(rate * B[i / 3][i % 3]);
 }
 
-typedef struct stress_walk { long steps, refused, odd; double strain; } stress_walk;
+typedef struct stress_walk {
+    long steps, refused, odd;
+    double strain;
+} stress_walk;
 
-/* A walk of 8 steps. `odd` counts steps that were refused where the model has a solution within reach: alpha up to 1 and Pom-Pom, or
- * Oldroyd-B over a strain below 100. */
+/* A walk of 8 steps. `odd` counts steps that were refused where the model has a solution within
+ * reach: alpha up to 1 and Pom-Pom, or Oldroyd-B over a strain below 100. */
 static void stress_walk_once(double strain_max, int wild, stress_walk *walk)
 {
     const gs4_material m = stress_draw_material(wild);
-    const double lambda = (double)m.relaxation_time, modulus = (double)(m.viscosity * (1 - m.local_fraction)) / lambda;
+    const double lambda = (double)m.relaxation_time,
+                 modulus = (double)(m.viscosity * (1 - m.local_fraction)) / lambda;
     const double member = stress_random() > 0 ? 0.5 + 0.5 * stress_random() : 0;
     gs4_point p, before;
     int i, k;
     memset(&p, 0, sizeof p);
     for (k = 0; k < 8; k++) {
         gs4_real L[9];
-        double dt = lambda * stress_log(1e-4, 1e4), rate = stress_random() > -0.9 ? stress_log(1e-3, 1e3) : 0, low, high;
+        double dt = lambda * stress_log(1e-4, 1e4),
+               rate = stress_random() > -0.9 ? stress_log(1e-3, 1e3) : 0, low, high;
         int result, finite = 1;
         if (rate * dt > strain_max) rate = strain_max / dt;
         stress_draw_flow(rate, L);
         before = p;
-        if (stress_random() > 0.8) for (i = 0; i < 6; i++) p.stress_rate[i] = before.stress_rate[i] = 0;
-        result = gs4_point_step(&m, &p, L, (gs4_real)dt, (gs4_real)member, (gs4_real)(k % 2 ? member : 0));
+        if (stress_random() > 0.8)
+            for (i = 0; i < 6; i++) p.stress_rate[i] = before.stress_rate[i] = 0;
+        result = gs4_point_step(&m, &p, L, (gs4_real)dt, (gs4_real)member,
+                                (gs4_real)(k % 2 ? member : 0));
         walk->steps++;
         if (result != GS4_OK) {
-            CHECK(result == GS4_ERROR_UNSTABLE && gs4_last_error(NULL)[0] && memcmp(&p, &before, sizeof p) == 0);
+            CHECK(result == GS4_ERROR_UNSTABLE && gs4_last_error(NULL)[0]
+                  && memcmp(&p, &before, sizeof p) == 0);
             walk->refused++;
             if (!wild && (m.liquid == GS4_POM_POM || rate * dt < 50)) {
                 walk->odd++;
                 if (test_filter[0] && walk->odd < 12) {
                     stress_eigenvalues(&p, modulus, &low, &high);
-                    printf("refused: %s r %.3g Q %.3g alpha %.3g, Wi %.3g, dt/lambda %.3g, strain %.3g, eigenvalues %.3g to %.3g\n", m.liquid == GS4_POM_POM ? "pom-pom" : "oldroyd",
-                           m.stretch_time > 0 ? lambda / (double)m.stretch_time : 0, (double)m.arms, (double)m.anisotropy, rate * lambda, dt / lambda, rate * dt, low, high);
+                    printf("refused: %s r %.3g Q %.3g alpha %.3g, Wi %.3g, dt/lambda %.3g, strain "
+                           "%.3g, eigenvalues %.3g to %.3g\n",
+                           m.liquid == GS4_POM_POM ? "pom-pom" : "oldroyd",
+                           m.stretch_time > 0 ? lambda / (double)m.stretch_time : 0, (double)m.arms,
+                           (double)m.anisotropy, rate * lambda, dt / lambda, rate * dt, low, high);
                 }
             }
             continue;
         }
-        for (i = 0; i < 6; i++) finite &= fabs((double)p.stress[i]) < 1e300 && fabs((double)p.stress_rate[i]) < 1e300;
+        for (i = 0; i < 6; i++)
+            finite &= fabs((double)p.stress[i]) < 1e300 && fabs((double)p.stress_rate[i]) < 1e300;
         CHECK(finite);
         stress_eigenvalues(&p, modulus, &low, &high);
-        /* s loses what is below its last digit: 4 units of it, of the largest eigenvalue, and of 1, which is taken off c */
+        /* s loses what is below its last digit: 4 units of it, of the largest eigenvalue, and of
+         * 1, which is taken off c */
         if (!wild) CHECK(low > -4 * (STRESS_DOUBLE ? 2.3e-16 : 1.2e-7) * (1 + high));
-        if (!wild && test_filter[0] && !(low > -4 * (STRESS_DOUBLE ? 2.3e-16 : 1.2e-7) * (1 + high)))
-            printf("eigenvalues %.3g to %.3g: r %.3g Q %.3g alpha %.3g, Wi %.3g, dt/lambda %.3g, member %g\n", low, high, m.stretch_time > 0 ? lambda / (double)m.stretch_time : 0,
+        if (!wild && test_filter[0]
+            && !(low > -4 * (STRESS_DOUBLE ? 2.3e-16 : 1.2e-7) * (1 + high)))
+            printf("eigenvalues %.3g to %.3g: r %.3g Q %.3g alpha %.3g, Wi %.3g, dt/lambda %.3g, "
+                   "member %g\n",
+                   low, high, m.stretch_time > 0 ? lambda / (double)m.stretch_time : 0,
                    (double)m.arms, (double)m.anisotropy, rate * lambda, dt / lambda, member);
     }
 }
@@ -525,15 +664,19 @@ static void stress_walks(long steps, double strain_max, int wild)
     stress_walk walk = { 0, 0, 0, 0 };
     const clock_t start = clock();
     while (walk.steps < steps) stress_walk_once(strain_max, wild, &walk);
-    if (test_filter[0]) printf("strain up to %g a step%s: %ld steps, %ld refused, %ld of them have a solution; %.1f us a step\n", strain_max, wild ? ", alpha above 1" : "",
-                               walk.steps, walk.refused, walk.odd, 1e6 * (double)(clock() - start) / CLOCKS_PER_SEC / (double)walk.steps);
+    if (test_filter[0])
+        printf("strain up to %g a step%s: %ld steps, %ld refused, %ld of them have a solution; "
+               "%.1f us a step\n",
+               strain_max, wild ? ", alpha above 1" : "", walk.steps, walk.refused, walk.odd,
+               1e6 * (double)(clock() - start) / CLOCKS_PER_SEC / (double)walk.steps);
 }
 
 static void test_stress_random(void)
 {
-    const long steps = test_slow ? 307692 : test_full ? 3077 : 280;       /* a million in all at night, ten thousand with --full */
+    /* a million in all at night, ten thousand with --full */
+    const long steps = test_slow ? 307692 : test_full ? 3077 : 280;
     stress_seed = 20;
-    stress_walks(2 * steps, 1, 0);                          /* what a simulation allows */
+    stress_walks(2 * steps, 1, 0); /* what a simulation allows */
     stress_walks(steps / 4, 1, 1);
     stress_walks(steps, test_slow ? 1e13 : 10, 0);
 }
@@ -548,42 +691,51 @@ static void test_stress_thin(void)
     CHECK(c[0] > 0 && c[1] > 0 && c[2] > 0);
 }
 
-/* Alpha above 1 has no solution in fast flow (alpha 100: none above Wi 0.005 in shear): eigenvalues stay in the bounds that the header names. */
+/* Alpha above 1 has no solution in fast flow (alpha 100: none above Wi 0.005 in shear):
+ * eigenvalues stay in the bounds that the header names. */
 static void test_stress_bounded(void)
 {
-    static const double cubes[3] = { 0.98, 0.098, 0.0098 };  /* lambda_b of the cubes in table 4 of 2021: alpha 100, Q 8 */
+    /* lambda_b of the cubes in table 4 of 2021: alpha 100, Q 8 */
+    static const double cubes[3] = { 0.98, 0.098, 0.0098 };
     int k, flow, i, steps = 0, refused = 0;
-    for (k = 0; k < 3; k++) for (flow = 0; flow < 3; flow++) {
-        gs4_material m = stress_material(0, 4.9 * 0.99 / cubes[k], cubes[k], 0.01);
-        const double modulus = (double)(m.viscosity * (1 - m.local_fraction)) / cubes[k];
-        gs4_real L[9];
-        gs4_point p;
-        m.stretch_time = (gs4_real)(0.9 * cubes[k]); m.anisotropy = 100; m.arms = 8;
-        memset(&p, 0, sizeof p);
-        for (i = 0; i < 40; i++, steps++) {
-            double low, high;
-            int result;
-            stress_flow(flow, i < 20 ? 0.1 / cubes[k] * (1 + i) : 0, L);
-            result = gs4_point_step(&m, &p, L, (gs4_real)(cubes[k] * (i % 2 ? 0.1 : 0.02)), (gs4_real)0.5, 0);
-            CHECK(result == GS4_OK || result == GS4_ERROR_UNSTABLE);
-            refused += result != GS4_OK;
-            stress_eigenvalues(&p, modulus, &low, &high);
-            CHECK(low > 1e-3 - 1e-6 * (1 + high) && high < 1.001e6);
+    for (k = 0; k < 3; k++)
+        for (flow = 0; flow < 3; flow++) {
+            gs4_material m = stress_material(0, 4.9 * 0.99 / cubes[k], cubes[k], 0.01);
+            const double modulus = (double)(m.viscosity * (1 - m.local_fraction)) / cubes[k];
+            gs4_real L[9];
+            gs4_point p;
+            m.stretch_time = (gs4_real)(0.9 * cubes[k]);
+            m.anisotropy = 100;
+            m.arms = 8;
+            memset(&p, 0, sizeof p);
+            for (i = 0; i < 40; i++, steps++) {
+                double low, high;
+                int result;
+                stress_flow(flow, i < 20 ? 0.1 / cubes[k] * (1 + i) : 0, L);
+                result = gs4_point_step(&m, &p, L, (gs4_real)(cubes[k] * (i % 2 ? 0.1 : 0.02)),
+                                        (gs4_real)0.5, 0);
+                CHECK(result == GS4_OK || result == GS4_ERROR_UNSTABLE);
+                refused += result != GS4_OK;
+                stress_eigenvalues(&p, modulus, &low, &high);
+                CHECK(low > 1e-3 - 1e-6 * (1 + high) && high < 1.001e6);
+            }
         }
-    }
     CHECK(refused == 0);
     if (test_filter[0]) printf("%d of %d steps refused\n", refused, steps);
 }
 
-/* --- bad arguments ---------------------------------------------------------------------------------------- */
+/* --- bad arguments ---------------------------------------------------------------------------- */
 
-static void stress_refused(const gs4_material *m, const gs4_point *p, const gs4_real *L, double dt, double rho, double spurious, const char *names)
+static void stress_refused(const gs4_material *m, const gs4_point *p, const gs4_real *L, double dt,
+                           double rho, double spurious, const char *names)
 {
     gs4_point copy;
     const char *said;
     memcpy(&copy, p, sizeof copy);
-    gs4_point_step(NULL, NULL, NULL, 1, 0, 0);              /* another sentence, so that this one is new */
-    CHECK(gs4_point_step(m, &copy, L, (gs4_real)dt, (gs4_real)rho, (gs4_real)spurious) == GS4_ERROR_ARGUMENT);
+    /* another sentence, so that this one is new */
+    gs4_point_step(NULL, NULL, NULL, 1, 0, 0);
+    CHECK(gs4_point_step(m, &copy, L, (gs4_real)dt, (gs4_real)rho, (gs4_real)spurious)
+          == GS4_ERROR_ARGUMENT);
     said = gs4_last_error(NULL);
     CHECK(strstr(said, names) != NULL);
     if (!strstr(said, names)) printf("    said: %s; not of: %s\n", said, names);
@@ -595,7 +747,8 @@ static void test_stress_bad_arguments(void)
     const gs4_material good = stress_material(4, 50, 0.1, 0.1);
     const double bad = (double)NAN;
     gs4_material m = good;
-    gs4_real L[9] = { 0, 1, 0, 0, 0, 0, 0, 0, 0 }, broken[9] = { 0, 0, 0, 0, 0, 0, 0, 0, 0 }, out[6] = { 7, 7, 7, 7, 7, 7 };
+    gs4_real L[9] = { 0, 1, 0, 0, 0, 0, 0, 0, 0 }, broken[9] = { 0, 0, 0, 0, 0, 0, 0, 0, 0 },
+             out[6] = { 7, 7, 7, 7, 7, 7 };
     gs4_point p, q;
     int i;
     memset(&p, 0, sizeof p);
@@ -607,28 +760,60 @@ static void test_stress_bad_arguments(void)
     stress_refused(&good, &p, broken, 0.01, 0, 0, "velocity_gradient");
     broken[5] = (gs4_real)INFINITY;
     stress_refused(&good, &p, broken, 0.01, 0, 0, "velocity_gradient");
-    stress_refused(&good, &p, L, 0, 0, 0, "dt"); stress_refused(&good, &p, L, -1, 0, 0, "dt"); stress_refused(&good, &p, L, bad, 0, 0, "dt");
-    stress_refused(&good, &p, L, 0.01, -0.1, 0, "rho_inf"); stress_refused(&good, &p, L, 0.01, 1.1, 0, "rho_inf"); stress_refused(&good, &p, L, 0.01, bad, 0, "rho_inf");
-    stress_refused(&good, &p, L, 0.01, 0.5, 0.6, "rho_inf_spurious"); stress_refused(&good, &p, L, 0.01, 0.5, bad, "rho_inf_spurious");
+    stress_refused(&good, &p, L, 0, 0, 0, "dt");
+    stress_refused(&good, &p, L, -1, 0, 0, "dt");
+    stress_refused(&good, &p, L, bad, 0, 0, "dt");
+    stress_refused(&good, &p, L, 0.01, -0.1, 0, "rho_inf");
+    stress_refused(&good, &p, L, 0.01, 1.1, 0, "rho_inf");
+    stress_refused(&good, &p, L, 0.01, bad, 0, "rho_inf");
+    stress_refused(&good, &p, L, 0.01, 0.5, 0.6, "rho_inf_spurious");
+    stress_refused(&good, &p, L, 0.01, 0.5, bad, "rho_inf_spurious");
     for (i = 0; i < 12; i++) {
         q = p;
         (i < 6 ? q.stress : q.stress_rate - 6)[i] = (gs4_real)bad;
         stress_refused(&good, &q, L, 0.01, 0, 0, i < 6 ? "stress" : "stress_rate");
     }
-    q = p; q.temperature = (gs4_real)bad; stress_refused(&good, &q, L, 0.01, 0, 0, "temperature");
-#define STRESS_BAD(field, value) do { m = good; m.field = (gs4_real)(value); stress_refused(&m, &p, L, 0.01, 0, 0, #field); \
-        CHECK(gs4_point_stress(&m, &p, L, out) == GS4_ERROR_ARGUMENT && strstr(gs4_last_error(NULL), #field) && out[0] == 7 && out[5] == 7); } while (0)
-    STRESS_BAD(anisotropy, -0.1); STRESS_BAD(anisotropy, 2e6); STRESS_BAD(anisotropy, bad); STRESS_BAD(arms, 0.9); STRESS_BAD(arms, bad); STRESS_BAD(relaxation_time, 0);
-    STRESS_BAD(relaxation_time, -1); STRESS_BAD(relaxation_time, bad); STRESS_BAD(stretch_time, 0); STRESS_BAD(stretch_time, bad);
-    STRESS_BAD(local_fraction, -0.1); STRESS_BAD(local_fraction, 1.1); STRESS_BAD(local_fraction, bad); STRESS_BAD(viscosity, -1); STRESS_BAD(viscosity, bad);
+    q = p;
+    q.temperature = (gs4_real)bad;
+    stress_refused(&good, &q, L, 0.01, 0, 0, "temperature");
+#define STRESS_BAD(field, value)                                                      \
+    do {                                                                              \
+        m = good;                                                                     \
+        m.field = (gs4_real)(value);                                                  \
+        stress_refused(&m, &p, L, 0.01, 0, 0, #field);                                \
+        CHECK(gs4_point_stress(&m, &p, L, out) == GS4_ERROR_ARGUMENT                  \
+              && strstr(gs4_last_error(NULL), #field) && out[0] == 7 && out[5] == 7); \
+    } while (0)
+    STRESS_BAD(anisotropy, -0.1);
+    STRESS_BAD(anisotropy, 2e6);
+    STRESS_BAD(anisotropy, bad);
+    STRESS_BAD(arms, 0.9);
+    STRESS_BAD(arms, bad);
+    STRESS_BAD(relaxation_time, 0);
+    STRESS_BAD(relaxation_time, -1);
+    STRESS_BAD(relaxation_time, bad);
+    STRESS_BAD(stretch_time, 0);
+    STRESS_BAD(stretch_time, bad);
+    STRESS_BAD(local_fraction, -0.1);
+    STRESS_BAD(local_fraction, 1.1);
+    STRESS_BAD(local_fraction, bad);
+    STRESS_BAD(viscosity, -1);
+    STRESS_BAD(viscosity, bad);
 #undef STRESS_BAD
-    m = good; m.liquid = (gs4_liquid)7; stress_refused(&m, &p, L, 0.01, 0, 0, "liquid");
-    m = stress_material(-1, 500, 0.1, 0); q = p;            /* Oldroyd-B, pulled at Wi 10 for 100 relaxation times: exp(1900) */
+    m = good;
+    m.liquid = (gs4_liquid)7;
+    stress_refused(&m, &p, L, 0.01, 0, 0, "liquid");
+    /* Oldroyd-B, pulled at Wi 10 for 100 relaxation times: exp(1900) */
+    m = stress_material(-1, 500, 0.1, 0);
+    q = p;
     stress_flow(REF_UNIAXIAL, 100, broken);
-    CHECK(gs4_point_step(&m, &q, broken, 10, 0, 0) == GS4_ERROR_UNSTABLE && strstr(gs4_last_error(NULL), "overflow") && memcmp(&p, &q, sizeof p) == 0);
+    CHECK(gs4_point_step(&m, &q, broken, 10, 0, 0) == GS4_ERROR_UNSTABLE
+          && strstr(gs4_last_error(NULL), "overflow") && memcmp(&p, &q, sizeof p) == 0);
     broken[5] = (gs4_real)bad;
-    CHECK(gs4_point_stress(NULL, &p, L, out) == GS4_ERROR_ARGUMENT && gs4_point_stress(&good, NULL, L, out) == GS4_ERROR_ARGUMENT);
-    CHECK(gs4_point_stress(&good, &p, NULL, out) == GS4_ERROR_ARGUMENT && gs4_point_stress(&good, &p, L, NULL) == GS4_ERROR_ARGUMENT);
+    CHECK(gs4_point_stress(NULL, &p, L, out) == GS4_ERROR_ARGUMENT
+          && gs4_point_stress(&good, NULL, L, out) == GS4_ERROR_ARGUMENT);
+    CHECK(gs4_point_stress(&good, &p, NULL, out) == GS4_ERROR_ARGUMENT
+          && gs4_point_stress(&good, &p, L, NULL) == GS4_ERROR_ARGUMENT);
     CHECK(gs4_point_stress(&good, &p, broken, out) == GS4_ERROR_ARGUMENT && out[0] == 7);
 }
 

@@ -6,6 +6,7 @@
 #define XPP_REFERENCE_H
 
 /* r = lambda_b/lambda_0s, Q, alpha. SuC, SuD: table 4 of the 2021 paper; V: modes of a polyethylene; G: a grid. */
+/* clang-format off */
 static const double reference_sets[10][3] = {
     { 1.11111111111111, 16, 1 },    /* SuC */
     { 1.11109095526612, 16, 0.01 },    /* SuD */
@@ -18,11 +19,26 @@ static const double reference_sets[10][3] = {
     { 2, 10, 0.3 },    /* G_a0.3_q10_r2 */
     { 10, 10, 0.3 }     /* G_a0.3_q10_r10 */
 };
+/* clang-format on */
 
 /* REF_CESSATION begins with the row at t = 0; REF_ROTATION: Oldroyd-B, L_yx = -L_xy = Wi after steady shear at Wi 1. */
-enum { REF_STARTUP, REF_STEP, REF_CESSATION, REF_STEADY, REF_ROTATION };
-enum { REF_SHEAR /* u = (rate y, 0, 0) */, REF_PLANAR, REF_UNIAXIAL };
-typedef struct reference_row { int kind, set /* -1: Oldroyd-B */, flow; double Wi, t, S[4] /* xx xy yy zz */; } reference_row;
+enum {
+    REF_STARTUP,
+    REF_STEP,
+    REF_CESSATION,
+    REF_STEADY,
+    REF_ROTATION
+};
+enum {
+    REF_SHEAR /* u = (rate y, 0, 0) */,
+    REF_PLANAR,
+    REF_UNIAXIAL
+};
+typedef struct reference_row {
+    int kind, set /* -1: Oldroyd-B */, flow;
+    double Wi, t, S[4] /* xx xy yy zz */;
+} reference_row;
+/* clang-format off */
 static const reference_row reference_rows[] = {
     { REF_STARTUP, 0, REF_SHEAR, 0.01, 0.35777284059, { 9.71938286742e-06, 0.00300767970429, -4.00997464515e-07, 6.73242036338e-07 } },
     { REF_STARTUP, 0, REF_SHEAR, 0.01, 6.475741812, { 0.000158589687685, 0.0099836483641, -3.90786963874e-05, 5.89125577745e-05 } },
@@ -304,4 +320,5 @@ static const reference_row reference_rows[] = {
     { REF_STEP, -1, REF_SHEAR, 1, 0.5, { 0.606530659713, 0.606530659713, 0, 0 } },
     { REF_STEP, -1, REF_SHEAR, 10, 1, { 36.7879441171, 3.67879441171, 0, 0 } }
 };
+/* clang-format on */
 #endif

@@ -4498,8 +4498,9 @@ typedef struct gs4i_grid {
     /* per slot: its number; which occupied block it is, or -1 */
     uint32_t *block;
     int32_t *occupant;
-    gs4_real *momentum, *force, *memory; /* GS4I_NODE_REALS per slot; memory NULL when not needed */
-    int occupied, occupied_capacity;     /* blocks with particles, ascending */
+    gs4_real *momentum, *force,
+        *remembered;                 /* GS4I_NODE_REALS per slot; memory NULL when not needed */
+    int occupied, occupied_capacity; /* blocks with particles, ascending */
     uint32_t *occupied_block;
     /* per occupied block: its first particle; one more at the end */
     int32_t *first;
@@ -4515,9 +4516,9 @@ typedef struct gs4i_grid {
     uint8_t *contact; /* of the nodes in `jump`, see [[boundary]] */
     /* 4 a slot: mean velocity of its nodes, how far they are from it, see [[step]] */
     gs4_real *spread;
-    int with_sharp; /* sharpened gradients: */
-    /* a field sharpened; how full its nodes are, one number each: see gs4i_sharpen_block */
-    gs4_real *sharp, *full;
+    int with_deconvolution; /* sharpened gradients: */
+    /* a field sharpened; how full its nodes are, one number each: see gs4i_deconvolve_block */
+    gs4_real *deconvolved, *fill_fraction;
     gs4i_scratch lists[2], histogram; /* of sorting */
 } gs4i_grid;
 
@@ -4566,9 +4567,9 @@ static void gs4i_grid_free(gs4i_memory *m, gs4i_grid *g)
     gs4i_free(m, g->spread, c, 4 * sizeof *g->spread);
     gs4i_free(m, g->momentum, c, GS4I_NODE_REALS * sizeof(gs4_real));
     gs4i_free(m, g->force, c, GS4I_NODE_REALS * sizeof(gs4_real));
-    gs4i_free(m, g->memory, c, GS4I_NODE_REALS * sizeof(gs4_real));
-    gs4i_free(m, g->sharp, c, GS4I_NODE_REALS * sizeof(gs4_real));
-    gs4i_free(m, g->full, c, GS4I_BLOCK_NODES * sizeof(gs4_real));
+    gs4i_free(m, g->remembered, c, GS4I_NODE_REALS * sizeof(gs4_real));
+    gs4i_free(m, g->deconvolved, c, GS4I_NODE_REALS * sizeof(gs4_real));
+    gs4i_free(m, g->fill_fraction, c, GS4I_BLOCK_NODES * sizeof(gs4_real));
     gs4i_free(m, g->occupied_block, o, sizeof *g->occupied_block);
     gs4i_free(m, g->first, o + 1, sizeof *g->first);
     gs4i_free(m, g->neighbour, o, 27 * sizeof *g->neighbour);
@@ -4581,7 +4582,7 @@ static void gs4i_grid_free(gs4i_memory *m, gs4i_grid *g)
 }
 
 /* Room for `count` blocks with nodes; the old ones stay. All or nothing. */
-static int gs4i_grid_reserve(gs4i_memory *m, gs4i_grid *g, int count, int with_memory)
+static int gs4i_grid_reserve(gs4i_memory *m, gs4i_grid *g, int count, int with_remembered)
 {
     gs4i_grid n = *g;
     size_t c, old = (size_t)g->capacity, keep = (size_t)g->active,
@@ -4595,33 +4596,34 @@ static int gs4i_grid_reserve(gs4i_memory *m, gs4i_grid *g, int count, int with_m
     n.spread = (gs4_real *)gs4i_alloc(m, c, 4 * sizeof *n.spread);
     n.momentum = (gs4_real *)gs4i_alloc(m, c, node);
     n.force = (gs4_real *)gs4i_alloc(m, c, node);
-    n.memory = with_memory ? (gs4_real *)gs4i_alloc(m, c, node) : NULL;
-    n.sharp = g->with_sharp ? (gs4_real *)gs4i_alloc(m, c, node) : NULL;
-    n.full = g->with_sharp ? (gs4_real *)gs4i_alloc(m, c, one) : NULL;
+    n.remembered = with_remembered ? (gs4_real *)gs4i_alloc(m, c, node) : NULL;
+    n.deconvolved = g->with_deconvolution ? (gs4_real *)gs4i_alloc(m, c, node) : NULL;
+    n.fill_fraction = g->with_deconvolution ? (gs4_real *)gs4i_alloc(m, c, one) : NULL;
     if (!n.block || !n.occupant || !n.jump_of || !n.spread || !n.momentum || !n.force
-        || (with_memory && !n.memory) || (g->with_sharp && (!n.sharp || !n.full))) {
+        || (with_remembered && !n.remembered)
+        || (g->with_deconvolution && (!n.deconvolved || !n.fill_fraction))) {
         gs4i_free(m, n.block, c, sizeof *n.block);
         gs4i_free(m, n.occupant, c, sizeof *n.occupant);
         gs4i_free(m, n.jump_of, c, sizeof *n.jump_of);
         gs4i_free(m, n.spread, c, 4 * sizeof *n.spread);
         gs4i_free(m, n.momentum, c, node);
         gs4i_free(m, n.force, c, node);
-        gs4i_free(m, n.memory, c, node);
-        gs4i_free(m, n.sharp, c, node);
-        gs4i_free(m, n.full, c, one);
+        gs4i_free(m, n.remembered, c, node);
+        gs4i_free(m, n.deconvolved, c, node);
+        gs4i_free(m, n.fill_fraction, c, one);
         return GS4_ERROR_MEMORY;
     }
     if (g->block) memcpy(n.block, g->block, keep * sizeof *n.block);
-    if (g->memory) memcpy(n.memory, g->memory, keep * node);
+    if (g->remembered) memcpy(n.remembered, g->remembered, keep * node);
     gs4i_free(m, g->block, old, sizeof *g->block);
     gs4i_free(m, g->occupant, old, sizeof *g->occupant);
     gs4i_free(m, g->jump_of, old, sizeof *g->jump_of);
     gs4i_free(m, g->spread, old, 4 * sizeof *g->spread);
     gs4i_free(m, g->momentum, old, node);
     gs4i_free(m, g->force, old, node);
-    gs4i_free(m, g->memory, old, node);
-    gs4i_free(m, g->sharp, old, node);
-    gs4i_free(m, g->full, old, one);
+    gs4i_free(m, g->remembered, old, node);
+    gs4i_free(m, g->deconvolved, old, node);
+    gs4i_free(m, g->fill_fraction, old, one);
     *g = n;
     return GS4_OK;
 }
@@ -4691,7 +4693,7 @@ static int gs4i_axis_reach(const gs4i_grid *g, int axis, int b, int out[6])
 /* Does any node of this slot remember something? */
 static int gs4i_slot_remembers(const gs4i_grid *g, int slot)
 {
-    const gs4_real *ag = g->memory + (size_t)slot * GS4I_NODE_REALS;
+    const gs4_real *ag = g->remembered + (size_t)slot * GS4I_NODE_REALS;
     int i, any = 0;
     for (i = 3; i < GS4I_NODE_REALS; i += 4) any |= ag[i] > 0;
     return any;
@@ -4726,7 +4728,7 @@ static int gs4i_grid_collect(gs4i_memory *m, gs4i_grid *g, const uint32_t *occup
                     list[n++] = b;
                 }
     }
-    for (o = 0; g->memory && o < g->active && result == GS4_OK; o++) {
+    for (o = 0; g->remembered && o < g->active && result == GS4_OK; o++) {
         if ((g->table[g->block[o]] & GS4I_SEEN) || !gs4i_slot_remembers(g, o)) continue;
         list = (uint32_t *)gs4i_scratch_reserve(m, &g->lists[1], (size_t)(n + 1) * sizeof *list,
                                                 (size_t)n * sizeof *list);
@@ -4793,30 +4795,30 @@ static int gs4i_grid_is_complete(const gs4i_grid *g)
 /* Give nodes to the occupied blocks and all within their reach; what nodes remember moves with
  * them. `occupied` ascending. Nothing changes when memory is refused. */
 static int gs4i_grid_occupy(gs4i_memory *m, gs4i_grid *g, const uint32_t *occupied, int count,
-                            int with_memory)
+                            int with_remembered)
 {
     const size_t node = GS4I_NODE_REALS;
     uint32_t *list;
     int n = gs4i_grid_collect(m, g, occupied, count), s;
     if (n < 0) return n;
-    if (gs4i_grid_reserve(m, g, n, with_memory) != GS4_OK
+    if (gs4i_grid_reserve(m, g, n, with_remembered) != GS4_OK
         || gs4i_grid_reserve_occupied(m, g, count) != GS4_OK)
         return GS4_ERROR_MEMORY;
     list = (uint32_t *)g->lists[1].data;
     gs4i_sort(list, n);
     /* `force` is free between steps: fill it, then swap */
-    for (s = 0; with_memory && s < n; s++) {
+    for (s = 0; with_remembered && s < n; s++) {
         int32_t old = g->table[list[s]];
         if (old)
-            memcpy(g->force + node * (size_t)s, g->memory + node * (size_t)(old - 1),
+            memcpy(g->force + node * (size_t)s, g->remembered + node * (size_t)(old - 1),
                    node * sizeof(gs4_real));
         else
             memset(g->force + node * (size_t)s, 0, node * sizeof(gs4_real));
     }
-    if (with_memory) {
+    if (with_remembered) {
         gs4_real *t = g->force;
-        g->force = g->memory;
-        g->memory = t;
+        g->force = g->remembered;
+        g->remembered = t;
     }
     for (s = 0; s < g->active; s++) g->table[g->block[s]] = 0;
     for (s = 0; s < n; s++) {
@@ -4910,7 +4912,7 @@ static void gs4i_tile_add(const gs4i_grid *g, int o, uint64_t rows,
  * 80 % (by mass, of the densest material), 0 where one is to less than 40 %, smooth between. */
 
 /* What a node that holds so much of what it can hold allows. */
-GS4I_INLINE gs4_real gs4i_fullness(gs4_real filled)
+GS4I_INLINE gs4_real gs4i_deconvolution_weight(gs4_real filled)
 {
     const gs4_real t = gs4i_max(0, gs4i_min(1, (filled - GS4I_C(0.4)) * GS4I_C(2.5)));
     return GS4I_C(0.25) * t * t * (3 - 2 * t);
@@ -4919,7 +4921,7 @@ GS4I_INLINE gs4_real gs4i_fullness(gs4_real filled)
 /* Eight nodes in a row along an axis: two of the block before (its slot, or -1), four of slot s,
  * two of the block behind. */
 GS4I_INLINE void gs4i_line_of_nodes(const gs4i_grid *g, int s, const int side[2], int node,
-                                    int apart, const gs4_real *from, gs4_real full[8],
+                                    int apart, const gs4_real *from, gs4_real fill_fraction[8],
                                     gs4i_quad v[8])
 {
     int i;
@@ -4929,22 +4931,22 @@ GS4I_INLINE void gs4i_line_of_nodes(const gs4i_grid *g, int s, const int side[2]
             (size_t)GS4I_BLOCK_NODES * (size_t)slot + (size_t)(node + ((i + 2) & 3) * apart);
         const gs4i_quad none = { GS4I_LANES(0, 0, 0, 0) };
         v[i] = none;
-        full[i] = 0;
+        fill_fraction[i] = 0;
         if (slot >= 0) {
-            full[i] = g->full[at];
+            fill_fraction[i] = g->fill_fraction[at];
             GS4I_LOAD(v[i], from + 4 * at);
         }
     }
 }
 
 /* sharp = S from, or its transpose, on the nodes of a slot; fourth numbers are copied. */
-static void gs4i_sharpen_block(const gs4i_grid *g, int s, const gs4_real *from, int transposed)
+static void gs4i_deconvolve_block(const gs4i_grid *g, int s, const gs4_real *from, int transposed)
 {
-    gs4_real *to = g->sharp + (size_t)GS4I_NODE_REALS * (size_t)s, most = 0;
+    gs4_real *to = g->deconvolved + (size_t)GS4I_NODE_REALS * (size_t)s, most = 0;
     int at[3], a, line, i;
     memcpy(to, from + (size_t)GS4I_NODE_REALS * (size_t)s, GS4I_NODE_REALS * sizeof *to);
     for (i = 0; i < GS4I_BLOCK_NODES; i++)
-        most = gs4i_max(most, g->full[(size_t)GS4I_BLOCK_NODES * (size_t)s + (size_t)i]);
+        most = gs4i_max(most, g->fill_fraction[(size_t)GS4I_BLOCK_NODES * (size_t)s + (size_t)i]);
     if (!(most > 0)) return;
     gs4i_block_coordinates(g, g->block[s], at);
     for (a = 0; a < 3; a++) {
@@ -4958,11 +4960,12 @@ static void gs4i_sharpen_block(const gs4i_grid *g, int s, const gs4_real *from, 
                           : -1;
         for (line = 0; line < 16; line++) {
             const int node = (line / apart * 4 * apart) + line % apart;
-            gs4_real full[8], share[8];
+            gs4_real fill_fraction[8], share[8];
             gs4i_quad v[8], d, own;
-            gs4i_line_of_nodes(g, s, side, node, apart, from, full, v);
+            gs4i_line_of_nodes(g, s, side, node, apart, from, fill_fraction, v);
             for (i = 1; i < 7; i++)
-                share[i] = gs4i_min(full[i], gs4i_min(full[i - 1], full[i + 1]));
+                share[i] = gs4i_min(fill_fraction[i],
+                                    gs4i_min(fill_fraction[i - 1], fill_fraction[i + 1]));
             for (i = 1; i < 7 && transposed; i++) GS4I_SPLAT_MUL(v[i], share[i], v[i]);
             for (i = 2; i < 6; i++) {
                 gs4_real *x = to + 4 * (node + (i - 2) * apart);
@@ -4988,14 +4991,14 @@ static void gs4i_sharpen_block(const gs4i_grid *g, int s, const gs4_real *from, 
 /* Where the step just before left the rates: a rate of this rule belongs to the time (gamma -
  * 1/2) dt before that of its quantity, so that in free flight dx/dt = v - shift a exactly, and
  * the small rest fits a half. */
-typedef struct gs4i_reach {
+typedef struct gs4i_prediction {
     gs4_real ahead /* alpha_f dt */, shift /* (gamma - 1/2) dt of the last step */;
-} gs4i_reach;
+} gs4i_prediction;
 
 /* Rule 1 of the manual for one step of size dt. */
-typedef struct gs4i_rule {
+typedef struct gs4i_integrator {
     gs4_real dt, alpha_m, alpha_f, gamma;
-    gs4i_reach reach; /* ahead = alpha_f dt: from t_n to the stage */
+    gs4i_prediction prediction; /* ahead = alpha_f dt: from t_n to the stage */
     /* alpha_f gamma dt / alpha_m: weight of the new rate at the stage */
     gs4_real s;
     /* y** = y + before r: alpha_f dt - s, 0 for symplectic Euler */
@@ -5003,20 +5006,20 @@ typedef struct gs4i_rule {
     gs4_real decay, damped; /* k = 1 / flip_decay_time, 1/s; 1 / (1 + s k) */
     /* k, where (4) would not be stable with it less: k (1 + x)/(1 + x + x^2), 1/s, x = k over
      * what would be */
-    gs4_real fade;
+    gs4_real stable_decay;
     /* where that is shorter than dt k is 0, and this much of what the grid cannot see goes at
      * once: a rate of it would be blown up by a longer step, and with rho_inf 1 it would not
      * fade */
-    gs4_real fading;
+    gs4_real decayed_at_once;
     gs4_real mixing;     /* 1/s: at most, of temperatures, see [[heat]] */
     gs4_real inv_area;   /* 1 / h^2 */
     gs4_real fast_decay; /* what is added to k where the grid sees little: c0 / h */
     /* 1 / mass of a node in the midst of the lightest material */
-    gs4_real inv_full;
-    gs4_real inv_fullest; /* of the densest */
+    gs4_real inv_node_mass;
+    gs4_real inv_densest_node_mass; /* of the densest */
     gs4_real inv_alpha_m, next_shift;
-    int afresh; /* no rates yet: first step, or after an edit */
-} gs4i_rule;
+    int restart; /* no rates yet: first step, or after an edit */
+} gs4i_integrator;
 
 #ifdef GS4_DOUBLE
 /* half of gs4_real's width: enough for a small difference, see S2 in [[transfer]] */
@@ -5073,11 +5076,11 @@ typedef struct gs4i_particles {
     gs4_real *flux, *flux_rate;
     int with_flux;
     /* 4: v - shift a - dx/dt, 0, see S2; NULL for symplectic Euler */
-    gs4i_half *lag;
+    gs4i_half *position_residual;
     /* 4: V - v~, from S4 to S7 of a step: what the grid does not see of the velocity fades; NULL
      * where it does not */
-    gs4_real *hidden;
-    int with_fading;
+    gs4_real *subgrid;
+    int with_subgrid;
     uint32_t *id;
     uint8_t *material;
     uint32_t *order; /* scratch: block, then destination of each particle */
@@ -5109,7 +5112,7 @@ static void gs4i_particle_arrays(gs4i_particles *p, gs4i_array out[GS4I_ARRAYS])
     out[4].size = 4 * sizeof(gs4_real);
     out[5].data = (void **)&p->rate;
     out[5].size = 4 * sizeof(gs4_real);
-    out[6].data = (void **)&p->lag;
+    out[6].data = (void **)&p->position_residual;
     out[6].size = 4 * sizeof(gs4i_half);
     out[7].data = (void **)&p->id;
     out[7].size = sizeof(uint32_t);
@@ -5129,14 +5132,14 @@ static void gs4i_particle_arrays(gs4i_particles *p, gs4i_array out[GS4I_ARRAYS])
     out[14].size = (size_t)p->deformation_reals * sizeof(gs4_real);
     out[15].data = (void **)&p->order;
     out[15].size = sizeof(uint32_t);
-    out[16].data = (void **)&p->hidden;
+    out[16].data = (void **)&p->subgrid;
     out[16].size = 4 * sizeof(gs4_real);
     for (i = 0; i < GS4I_ARRAYS; i++) out[i].wanted = p->with_rates ? i > 2 : i != 5 && i != 6;
     out[9].wanted = p->elastic_reals > 0;
     out[14].wanted = p->deformation_reals > 0;
     out[10].wanted = out[13].wanted = p->with_heat;
     out[11].wanted = out[12].wanted = p->with_flux;
-    out[16].wanted = p->with_fading;
+    out[16].wanted = p->with_subgrid;
 }
 
 static void gs4i_particles_free(gs4i_memory *m, gs4i_particles *p)
@@ -5241,7 +5244,7 @@ static void gs4i_permute_task(int index, void *context)
 typedef struct gs4i_sorting {
     gs4i_particles *p;
     gs4i_grid *g;
-    gs4i_reach reach; /* sorted by where they are expected at the stage */
+    gs4i_prediction prediction; /* sorted by where they are expected at the stage */
     int chunks;
     uint32_t *histogram; /* [chunk][occupied block] */
 } gs4i_sorting;
@@ -5274,7 +5277,7 @@ GS4I_INLINE void gs4i_prefetch_particles(const gs4i_particles *p, size_t i)
         else
             GS4I_PREFETCH(p->affine[0] + 4 * i + b);
         if (p->with_rates)
-            GS4I_PREFETCH(p->lag + 4 * i + b);
+            GS4I_PREFETCH(p->position_residual + 4 * i + b);
         else {
             GS4I_PREFETCH(p->affine[1] + 4 * i + b);
             GS4I_PREFETCH(p->affine[2] + 4 * i + b);
@@ -5288,11 +5291,11 @@ GS4I_INLINE void gs4i_prefetch_particles(const gs4i_particles *p, size_t i)
 }
 
 /* Particles i to i + n. */
-GS4I_INLINE void gs4i_load_batch(const gs4i_particles *p, size_t i, int n, gs4i_reach reach,
-                                 gs4i_batch *q)
+GS4I_INLINE void gs4i_load_batch(const gs4i_particles *p, size_t i, int n,
+                                 gs4i_prediction prediction, gs4i_batch *q)
 {
     gs4_real halves[4 * GS4I_BATCH];
-    gs4i_lanes lag[4];
+    gs4i_lanes position_residual[4];
     int b, c;
     gs4i_prefetch_particles(p, i + 4 * GS4I_BATCH);
     gs4i_to_lanes(p->position + 4 * i, n, q->x);
@@ -5305,20 +5308,24 @@ GS4I_INLINE void gs4i_load_batch(const gs4i_particles *p, size_t i, int n, gs4i_
     }
     gs4i_to_lanes(p->rate + 4 * i, n, q->a);
     if (n == GS4I_BATCH)
-        for (b = 0; b < 4 * GS4I_BATCH; b++) halves[b] = gs4i_from_half(p->lag[4 * i + (size_t)b]);
+        for (b = 0; b < 4 * GS4I_BATCH; b++)
+            halves[b] = gs4i_from_half(p->position_residual[4 * i + (size_t)b]);
     else
-        for (b = 0; b < 4 * n; b++) halves[b] = gs4i_from_half(p->lag[4 * i + (size_t)b]);
-    gs4i_to_lanes(halves, n, lag);
+        for (b = 0; b < 4 * n; b++)
+            halves[b] = gs4i_from_half(p->position_residual[4 * i + (size_t)b]);
+    gs4i_to_lanes(halves, n, position_residual);
     for (c = 0; c < 3; c++)
-        GS4I_BATCH_LOOP(b) q->move[c][b] = (q->v[c][b] - reach.shift * q->a[c][b]) - lag[c][b];
+        GS4I_BATCH_LOOP(b)
+            q->move[c][b] = (q->v[c][b] - prediction.shift * q->a[c][b]) - position_residual[c][b];
 }
 
 /* S2: x~ = x + alpha_f dt dx/dt. */
-GS4I_INLINE void gs4i_predict_positions(const gs4i_batch *q, gs4i_reach reach, gs4i_lanes x[3])
+GS4I_INLINE void gs4i_predict_positions(const gs4i_batch *q, gs4i_prediction prediction,
+                                        gs4i_lanes x[3])
 {
     int b, c;
     for (c = 0; c < 3; c++)
-        GS4I_BATCH_LOOP(b) x[c][b] = q->x[c][b] + reach.ahead * q->move[c][b];
+        GS4I_BATCH_LOOP(b) x[c][b] = q->x[c][b] + prediction.ahead * q->move[c][b];
 }
 
 static void gs4i_sort_keys_task(int index, void *context)
@@ -5331,8 +5338,8 @@ static void gs4i_sort_keys_task(int index, void *context)
         const int n = end - i < GS4I_BATCH ? end - i : GS4I_BATCH;
         gs4i_batch q;
         gs4i_lanes x[3];
-        gs4i_load_batch(s->p, (size_t)i, n, s->reach, &q);
-        gs4i_predict_positions(&q, s->reach, x);
+        gs4i_load_batch(s->p, (size_t)i, n, s->prediction, &q);
+        gs4i_predict_positions(&q, s->prediction, x);
         for (b = 0; b < n; b++) {
             int cell[3];
             for (a = 0; a < 3; a++) {
@@ -5390,14 +5397,14 @@ static int gs4i_list_occupied(gs4i_memory *m, gs4i_sorting *s)
 /* S1. Sort the particles by the block of their predicted position and give nodes to all blocks
  * in reach. Nothing has changed when memory is refused. */
 static int gs4i_particles_sort(gs4i_memory *m, const gs4i_tasks *tasks, gs4i_particles *p,
-                               gs4i_grid *g, gs4i_reach reach)
+                               gs4i_grid *g, gs4i_prediction prediction)
 {
     gs4i_sorting s;
     uint32_t sum = 0;
     int count, o, c;
     s.p = p;
     s.g = g;
-    s.reach = reach;
+    s.prediction = prediction;
     s.chunks = p->count / 4096 < 1 ? 1 : p->count / 4096 > 64 ? 64 : p->count / 4096;
     gs4i_parallel_for(tasks, s.chunks, gs4i_sort_keys_task, &s);
     count = gs4i_list_occupied(m, &s);
@@ -5431,7 +5438,7 @@ static int gs4i_particles_sort(gs4i_memory *m, const gs4i_tasks *tasks, gs4i_par
 #define GS4I_MOST_STRETCH GS4I_C(512)
 
 /* What the particles need of a material, ready for use. */
-typedef struct gs4i_law {
+typedef struct gs4i_material_constants {
     gs4_real inv_density, tait;               /* 1 / rho0; rho0 c0^2 / 7 */
     gs4_real viscosity, sound_speed, density; /* viscosity: the local part, F_v mu */
     gs4_real local, temperature; /* F_v; K, where the scene has no heat: that of the air */
@@ -5447,7 +5454,7 @@ typedef struct gs4i_law {
     gs4_viscosity_fn viscosity_fn;
     void *viscosity_user;
     gs4_material is; /* as described */
-} gs4i_law;
+} gs4i_material_constants;
 
 /* Tait: p = (rho0 c0^2 / 7) (J^-7 - 1) in Pa; grows without bound as J -> 0, never below -rho0
  * c0^2 / 7. */
@@ -5458,32 +5465,35 @@ GS4I_INLINE void gs4i_pressure(const gs4i_wide *tait, const gs4i_wide *J, gs4i_w
 }
 
 /* What the particles of a batch need of their materials. */
-typedef struct gs4i_batch_laws {
+typedef struct gs4i_batch_constants {
     gs4i_lanes inv_density, tait, viscosity, sound_speed;
     /* that of the air where the scene has no heat; else see gs4i_stage_temperature */
     gs4i_lanes temperature;
-    const gs4i_law *of[GS4I_BATCH];
+    const gs4i_material_constants *of[GS4I_BATCH];
     int callbacks; /* some of those seen so far have one */
-} gs4i_batch_laws;
+} gs4i_batch_constants;
 
 /* Consecutive batches mostly have the same materials: only what differs is looked up. What is
  * solid in a scene with heat goes by `frozen`. */
-GS4I_INLINE void gs4i_take_laws(const gs4i_law *laws, const gs4i_law *frozen,
-                                const gs4i_particles *p, size_t i, int n, gs4i_batch_laws *l)
+GS4I_INLINE void gs4i_load_constants(const gs4i_material_constants *constants,
+                                     const gs4i_material_constants *solid_phase,
+                                     const gs4i_particles *p, size_t i, int n,
+                                     gs4i_batch_constants *l)
 {
     int b;
     for (b = 0; b < GS4I_BATCH; b++) {
         const size_t at = i + (size_t)(b < n ? b : 0);
-        const gs4i_law *law =
-            p->liquid && !p->liquid[at] ? &frozen[p->material[at]] : &laws[p->material[at]];
-        if (law == l->of[b]) continue;
-        l->of[b] = law;
-        l->callbacks |= law->varies;
-        GS4I_NTH(l->inv_density, b) = law->inv_density;
-        GS4I_NTH(l->tait, b) = law->tait;
-        GS4I_NTH(l->viscosity, b) = law->viscosity;
-        GS4I_NTH(l->sound_speed, b) = law->sound_speed;
-        GS4I_NTH(l->temperature, b) = law->temperature;
+        const gs4i_material_constants *mat = p->liquid && !p->liquid[at]
+                                                 ? &solid_phase[p->material[at]]
+                                                 : &constants[p->material[at]];
+        if (mat == l->of[b]) continue;
+        l->of[b] = mat;
+        l->callbacks |= mat->varies;
+        GS4I_NTH(l->inv_density, b) = mat->inv_density;
+        GS4I_NTH(l->tait, b) = mat->tait;
+        GS4I_NTH(l->viscosity, b) = mat->viscosity;
+        GS4I_NTH(l->sound_speed, b) = mat->sound_speed;
+        GS4I_NTH(l->temperature, b) = mat->temperature;
     }
 }
 
@@ -5510,7 +5520,8 @@ static gs4_real gs4i_cross_wlf(const gs4_material *m, gs4_real temperature, gs4_
 }
 
 /* Viscosity (Pa s, in all) of particle n at the temperature T and the shear rate sqrt(2 D:D). */
-static gs4_real gs4i_viscosity_of(const gs4i_law *law, gs4_real T, gs4i_gradient L, int n)
+static gs4_real gs4i_viscosity_of(const gs4i_material_constants *mat, gs4_real T, gs4i_gradient L,
+                                  int n)
 {
     gs4_real sum = 0, rate;
     int i, j;
@@ -5520,14 +5531,14 @@ static gs4_real gs4i_viscosity_of(const gs4i_law *law, gs4_real T, gs4i_gradient
             sum += d * d;
         }
     rate = GS4I_SQRT(GS4I_C(0.5) * sum);
-    if (!law->varies) return law->is.viscosity;
-    return law->viscosity_fn ? law->viscosity_fn(T, rate, law->viscosity_user)
-                             : gs4i_cross_wlf(&law->is, T, rate);
+    if (!mat->varies) return mat->is.viscosity;
+    return mat->viscosity_fn ? mat->viscosity_fn(T, rate, mat->viscosity_user)
+                             : gs4i_cross_wlf(&mat->is, T, rate);
 }
 
 /* What follows from the material alone: Cross-WLF constants of the paper where none are given,
  * and both parts of viscosity. */
-static void gs4i_set_law(gs4i_law *l, gs4_real temperature)
+static void gs4i_set_material_constants(gs4i_material_constants *l, gs4_real temperature)
 {
     gs4_material *m = &l->is;
     const int elastic = m->liquid != GS4_NEWTONIAN;
@@ -5567,7 +5578,7 @@ static void gs4i_set_law(gs4i_law *l, gs4_real temperature)
 
 /* Of the solid phase, from that of the liquid one: the stress of F with the same pressure, in
  * place of all stress of liquids. A material that melts but is no solid flows in both phases. */
-static void gs4i_freeze_law(gs4i_law *l)
+static void gs4i_set_solid_phase(gs4i_material_constants *l)
 {
     if (!l->is.can_melt || l->is.solid == GS4_NO_SOLID) return;
     l->shear_modulus = l->is.shear_modulus;
@@ -5581,8 +5592,8 @@ typedef gs4i_lanes gs4i_symmetric[6];
 
 /* Cauchy stress (Pa, tension positive) but for the non-local part: -p I + 2 F_v mu D, and F_v
  * mu. */
-GS4I_INLINE void gs4i_liquid_stress(const gs4i_batch_laws *l, const gs4i_wide *J, gs4i_gradient L,
-                                    gs4i_symmetric sigma, gs4i_wide *mu)
+GS4I_INLINE void gs4i_liquid_stress(const gs4i_batch_constants *l, const gs4i_wide *J,
+                                    gs4i_gradient L, gs4i_symmetric sigma, gs4i_wide *mu)
 {
     int b;
     GS4I_BATCH_LOOP(b) mu[b] = l->viscosity[b];
@@ -5709,11 +5720,11 @@ static int gs4i_preset(const char *name, gs4_material *m)
  * how often is counted. */
 
 /* What the particles of a batch need of their materials. */
-typedef struct gs4i_elastic_laws {
+typedef struct gs4i_elastic_constants {
     gs4i_lanes modulus, inv_lambda, stretch /* 2 r; 0: f = 1 */, nu, alpha, temperature;
-    const gs4i_law *of[GS4I_BATCH];
+    const gs4i_material_constants *of[GS4I_BATCH];
     int pom_pom, varies; /* some of those seen so far are, or do */
-} gs4i_elastic_laws;
+} gs4i_elastic_constants;
 
 /* Of one batch: stress and its rate, Pa and Pa/s. */
 typedef struct gs4i_elastic {
@@ -5732,21 +5743,22 @@ static const int gs4i_place[3][3] = { { GS4I_XX, GS4I_XY, GS4I_XZ },
                                       { GS4I_XY, GS4I_YY, GS4I_YZ },
                                       { GS4I_XZ, GS4I_YZ, GS4I_ZZ } };
 
-static void gs4i_take_elastic_laws(const gs4i_batch_laws *laws, gs4i_elastic_laws *l)
+static void gs4i_load_elastic_constants(const gs4i_batch_constants *constants,
+                                        gs4i_elastic_constants *l)
 {
     int n;
-    memcpy(l->temperature, laws->temperature, sizeof l->temperature);
+    memcpy(l->temperature, constants->temperature, sizeof l->temperature);
     for (n = 0; n < GS4I_BATCH; n++) {
-        const gs4i_law *law = laws->of[n];
-        if (law == l->of[n]) continue;
-        l->of[n] = law;
-        l->pom_pom |= law->stretch > 0;
-        l->varies |= law->varies;
-        GS4I_NTH(l->modulus, n) = law->modulus;
-        GS4I_NTH(l->inv_lambda, n) = law->inv_lambda;
-        GS4I_NTH(l->stretch, n) = law->stretch;
-        GS4I_NTH(l->nu, n) = law->nu;
-        GS4I_NTH(l->alpha, n) = law->alpha;
+        const gs4i_material_constants *mat = constants->of[n];
+        if (mat == l->of[n]) continue;
+        l->of[n] = mat;
+        l->pom_pom |= mat->stretch > 0;
+        l->varies |= mat->varies;
+        GS4I_NTH(l->modulus, n) = mat->modulus;
+        GS4I_NTH(l->inv_lambda, n) = mat->inv_lambda;
+        GS4I_NTH(l->stretch, n) = mat->stretch;
+        GS4I_NTH(l->nu, n) = mat->nu;
+        GS4I_NTH(l->alpha, n) = mat->alpha;
     }
 }
 
@@ -5764,7 +5776,7 @@ GS4I_INLINE void gs4i_pom_pom(double stretch, double nu, double alpha, double tr
 
 /* The right-hand side R at stress s and gradient L, f / lambda_b, and the rate (1/s) of its
  * fastest part that is not in that. */
-static void gs4i_elastic_rate(const gs4i_elastic_laws *l, gs4i_lanes G, gs4i_symmetric s,
+static void gs4i_elastic_rate(const gs4i_elastic_constants *l, gs4i_lanes G, gs4i_symmetric s,
                               gs4i_gradient L, gs4i_symmetric R, gs4i_lanes relax, gs4i_lanes stiff)
 {
     gs4i_symmetric S, SS;
@@ -5887,7 +5899,7 @@ static int gs4i_is_round(const double m[6])
  * Riccati's equation: c = u v^-1 of the linear (u, v)' = [[-g, 1 - alpha], [alpha, g]] (u, v), g
  * = f/2 - alpha, whose exponential e has no negative entry for alpha in [0, 1]. Exact, and
  * positive definite as c is: (e00 c + e01)(e10 c + e11)^-1. */
-static void gs4i_relax_frozen(double alpha, double f, double t, const double c[6], double to[6])
+static void gs4i_relax_fixed(double alpha, double f, double t, const double c[6], double to[6])
 {
     const double g = 0.5 * f - alpha, w = sqrt(g * g + alpha * (1 - alpha));
     double e00 = 1 - g * t, e11 = 1 + g * t, grown = t, d[6], inverse[6], det;
@@ -5959,8 +5971,8 @@ static void gs4i_relax(gs4i_split *p, double m[6], double h)
     if (m[0] == 1 && m[1] == 1 && m[2] == 1 && m[3] == 0 && m[4] == 0 && m[5] == 0) return;
     if (p->alpha <= 1 && gs4i_is_round(m)) {
         memcpy(c, m, sizeof c);
-        gs4i_relax_frozen(p->alpha, gs4i_relaxation(p, c, &before), 0.5 * t, c, half);
-        gs4i_relax_frozen(p->alpha, gs4i_relaxation(p, half, &stiff), t, c, m);
+        gs4i_relax_fixed(p->alpha, gs4i_relaxation(p, c, &before), 0.5 * t, c, half);
+        gs4i_relax_fixed(p->alpha, gs4i_relaxation(p, half, &stiff), t, c, m);
     } else {
         gs4i_eigen(m, c, Q);
         /* rounding of a thin ellipsoid */
@@ -6159,7 +6171,7 @@ typedef struct gs4i_elastic_count {
 
 /* Particle n of a batch by the split over dt; `after`: its stress then, and with `rate` the rate
  * that belongs to rule 1. */
-static void gs4i_split_one(const gs4i_elastic_laws *l, gs4i_lanes G, gs4i_gradient L,
+static void gs4i_split_one(const gs4i_elastic_constants *l, gs4i_lanes G, gs4i_gradient L,
                            const gs4i_elastic *e, int n, double dt, double gamma,
                            gs4i_symmetric after, gs4i_lanes *rate, gs4i_elastic_count *count)
 {
@@ -6198,11 +6210,11 @@ static void gs4i_split_one(const gs4i_elastic_laws *l, gs4i_lanes G, gs4i_gradie
 /* Does rule 1 resolve each particle: |L| dt and what relaxes explicitly small, and c = s/G + I
  * inside the cone, or above 1 - 1/alpha? */
 static int gs4i_resolved(gs4i_lanes G, const gs4i_wide *alpha, gs4i_gradient L, gs4i_symmetric s,
-                         gs4i_lanes relax, gs4i_lanes stiff, const gs4i_rule *rule,
+                         gs4i_lanes relax, gs4i_lanes stiff, const gs4i_integrator *integrator,
                          int ok[GS4I_BATCH])
 {
     /* the midpoint rule of a first step damps nothing */
-    const gs4_real dt = rule->dt, fastest = rule->afresh ? 1 / dt : GS4I_HUGE;
+    const gs4_real dt = integrator->dt, fastest = integrator->restart ? 1 / dt : GS4I_HUGE;
     gs4i_lanes squared, verdict;
     int b, j, all = 1;
     gs4i_gradient_squared(L, squared);
@@ -6230,25 +6242,25 @@ static int gs4i_resolved(gs4i_lanes G, const gs4i_wide *alpha, gs4i_gradient L, 
 }
 
 /* G0 = (1 - F_v) mu / lambda_b; where mu depends on the shear rate, of the mu there. */
-static void gs4i_moduli(const gs4i_elastic_laws *l, gs4i_gradient L, gs4i_lanes G)
+static void gs4i_moduli(const gs4i_elastic_constants *l, gs4i_gradient L, gs4i_lanes G)
 {
     int n;
     memcpy(G, l->modulus, sizeof l->modulus);
     for (n = 0; n < GS4I_BATCH && l->varies; n++) {
-        const gs4i_law *law = l->of[n];
-        if (law->varies && law->inv_lambda > 0)
-            GS4I_NTH(G, n) = (1 - law->local)
-                             * gs4i_viscosity_of(law, GS4I_NTH_CONST(l->temperature, n), L, n)
-                             * law->inv_lambda;
+        const gs4i_material_constants *mat = l->of[n];
+        if (mat->varies && mat->inv_lambda > 0)
+            GS4I_NTH(G, n) = (1 - mat->local)
+                             * gs4i_viscosity_of(mat, GS4I_NTH_CONST(l->temperature, n), L, n)
+                             * mat->inv_lambda;
     }
 }
 
 /* S4: stress at the stage, s~ = s** + w (R + relax (s* - s~)), for n particles of the batch. */
-static void gs4i_stage_elastic(const gs4i_elastic_laws *l, gs4i_lanes G, const gs4i_elastic *e,
-                               const gs4i_rule *rule, gs4i_gradient L, int n, gs4i_symmetric s,
-                               gs4i_elastic_count *count)
+static void gs4i_stage_elastic(const gs4i_elastic_constants *l, gs4i_lanes G, const gs4i_elastic *e,
+                               const gs4i_integrator *integrator, gs4i_gradient L, int n,
+                               gs4i_symmetric s, gs4i_elastic_count *count)
 {
-    const gs4_real ahead = rule->reach.ahead, w = rule->s;
+    const gs4_real ahead = integrator->prediction.ahead, w = integrator->s;
     gs4i_symmetric R;
     gs4i_lanes relax, stiff;
     int b, c, ok[GS4I_BATCH];
@@ -6260,7 +6272,7 @@ static void gs4i_stage_elastic(const gs4i_elastic_laws *l, gs4i_lanes G, const g
             s[c][b] =
                 (e->s[c][b] + (ahead - w) * e->rate[c][b] + w * (R[c][b] + relax[b] * s[c][b]))
                 / (GS4I_C(1) + w * relax[b]);
-    if (gs4i_resolved(G, l->alpha, L, s, relax, stiff, rule, ok)) return;
+    if (gs4i_resolved(G, l->alpha, L, s, relax, stiff, integrator, ok)) return;
     for (b = 0; b < n; b++)
         if (!ok[b]) gs4i_split_one(l, G, L, e, b, (double)ahead, 1, s, NULL, count);
 }
@@ -6269,40 +6281,43 @@ static void gs4i_stage_elastic(const gs4i_elastic_laws *l, gs4i_lanes G, const g
  * dt, for n particles of the batch. y is the predicted stress s*; where there are no rates to
  * predict with, that of the midpoint rule; and it is taken again at s* + w ds' for members with
  * gamma near 1/2, which a prediction alone leaves unstable. */
-static void gs4i_correct_elastic(const gs4i_elastic_laws *l, gs4i_elastic *e, const gs4i_rule *rule,
-                                 gs4i_gradient L, int n, gs4i_elastic_count *count)
+static void gs4i_correct_elastic(const gs4i_elastic_constants *l, gs4i_elastic *e,
+                                 const gs4i_integrator *integrator, gs4i_gradient L, int n,
+                                 gs4i_elastic_count *count)
 {
-    const gs4_real dt = rule->dt, w = rule->alpha_f * rule->gamma * dt;
+    const gs4_real dt = integrator->dt, w = integrator->alpha_f * integrator->gamma * dt;
     const gs4i_elastic old = *e;
     gs4i_symmetric star, y, R, change;
     gs4i_lanes G, relax, stiff;
-    int b, c, ok[GS4I_BATCH], pass, passes = rule->gamma > GS4I_C(0.66) ? 1 : 5;
+    int b, c, ok[GS4I_BATCH], pass, passes = integrator->gamma > GS4I_C(0.66) ? 1 : 5;
     gs4i_moduli(l, L, G);
     for (c = 0; c < 6; c++)
-        GS4I_BATCH_LOOP(b) star[c][b] = y[c][b] = e->s[c][b] + rule->alpha_f * dt * e->rate[c][b];
-    if (rule->afresh) {
+        GS4I_BATCH_LOOP(b)
+            star[c][b] = y[c][b] = e->s[c][b] + integrator->alpha_f * dt * e->rate[c][b];
+    if (integrator->restart) {
         gs4i_elastic_rate(l, G, e->s, L, R, relax, stiff);
         for (c = 0; c < 6; c++)
-            GS4I_BATCH_LOOP(b) y[c][b] += rule->alpha_f * dt * R[c][b];
+            GS4I_BATCH_LOOP(b) y[c][b] += integrator->alpha_f * dt * R[c][b];
     }
     for (pass = 0; pass < passes; pass++) {
         gs4i_elastic_rate(l, G, y, L, R, relax, stiff);
         for (c = 0; c < 6; c++)
             GS4I_BATCH_LOOP(b) {
                 change[c][b] = (R[c][b] + relax[b] * (y[c][b] - star[c][b]) - e->rate[c][b])
-                               / (rule->alpha_m + w * relax[b]);
+                               / (integrator->alpha_m + w * relax[b]);
                 y[c][b] = star[c][b] + w * change[c][b];
             }
     }
     for (c = 0; c < 6; c++)
         GS4I_BATCH_LOOP(b) {
-            e->s[c][b] = (e->s[c][b] + dt * e->rate[c][b]) + rule->gamma * dt * change[c][b];
+            e->s[c][b] = (e->s[c][b] + dt * e->rate[c][b]) + integrator->gamma * dt * change[c][b];
             e->rate[c][b] += change[c][b];
         }
-    if (gs4i_resolved(G, l->alpha, L, e->s, relax, stiff, rule, ok)) return;
+    if (gs4i_resolved(G, l->alpha, L, e->s, relax, stiff, integrator, ok)) return;
     for (b = 0; b < n; b++)
         if (!ok[b])
-            gs4i_split_one(l, G, L, &old, b, (double)dt, (double)rule->gamma, e->s, e->rate, count);
+            gs4i_split_one(l, G, L, &old, b, (double)dt, (double)integrator->gamma, e->s, e->rate,
+                           count);
 }
 
 /* Elastic waves of each particle: density times squared speed at most, 2 G0 c_max, by the
@@ -6372,7 +6387,7 @@ static void gs4i_store_elastic(gs4_real *to, int reals, int n, gs4i_elastic *e)
  * strain, F <- J^(1/3) I - leaves M as it is, so that nothing needs to start afresh.
  *     Yield (2014, 5.1), after each step: singular values of F are clamped to
  *     [1 - theta_c, 1 + theta_s], then all scaled to det F = J.
- *     Solids also keep how they turn, w (rad/s), with its rate: S3, gs4i_correct_turning. */
+ *     Solids also keep how they turn, w (rad/s), with its rate: S3, gs4i_correct_spin. */
 
 /* Density times squared speed of elastic waves, over G times the largest eigenvalue of B: 4/3 by
  * the acoustic tensor, but the grid, which has less of div dev grad than of div grad, sees 0.83
@@ -6381,17 +6396,17 @@ static void gs4i_store_elastic(gs4_real *to, int reals, int n, gs4i_elastic *e)
 #define GS4I_MOST_STRAIN GS4I_C(8) /* |X| of one step; more is refused */
 
 /* What the particles of a batch need of their materials. */
-typedef struct gs4i_solid_laws {
+typedef struct gs4i_solid_constants {
     gs4i_lanes modulus /* 0: not solid */, low, high, corotated /* 1 or 0 */;
-    const gs4i_law *of[GS4I_BATCH];
+    const gs4i_material_constants *of[GS4I_BATCH];
     /* solids in this batch; fixed-corotated ones among those seen so far */
     int present, any_corotated;
-} gs4i_solid_laws;
+} gs4i_solid_constants;
 
 /* F, M, w and dw/dt of a batch. */
 typedef struct gs4i_deformation {
     gs4i_matrix F, rate;
-    gs4i_lanes turning[3], turning_rate[3];
+    gs4i_lanes spin[3], turning_rate[3];
 } gs4i_deformation;
 
 /* How many particles took the exponential, how many had to be bounded; 1 + the last of the batch
@@ -6401,20 +6416,20 @@ typedef struct gs4i_solid_count {
 } gs4i_solid_count;
 
 /* Is any of the batch solid? */
-static int gs4i_take_solid_laws(const gs4i_batch_laws *laws, gs4i_solid_laws *l)
+static int gs4i_load_solid_constants(const gs4i_batch_constants *constants, gs4i_solid_constants *l)
 {
     int n;
     l->present = 0;
     for (n = 0; n < GS4I_BATCH; n++) {
-        const gs4i_law *law = laws->of[n];
-        l->present |= law->shear_modulus > 0;
-        if (law == l->of[n]) continue;
-        l->of[n] = law;
-        l->any_corotated |= law->is.solid == GS4_FIXED_COROTATED;
-        GS4I_NTH(l->modulus, n) = law->shear_modulus;
-        GS4I_NTH(l->low, n) = law->low;
-        GS4I_NTH(l->high, n) = law->high;
-        GS4I_NTH(l->corotated, n) = GS4I_C(law->is.solid == GS4_FIXED_COROTATED);
+        const gs4i_material_constants *mat = constants->of[n];
+        l->present |= mat->shear_modulus > 0;
+        if (mat == l->of[n]) continue;
+        l->of[n] = mat;
+        l->any_corotated |= mat->is.solid == GS4_FIXED_COROTATED;
+        GS4I_NTH(l->modulus, n) = mat->shear_modulus;
+        GS4I_NTH(l->low, n) = mat->low;
+        GS4I_NTH(l->high, n) = mat->high;
+        GS4I_NTH(l->corotated, n) = GS4I_C(mat->is.solid == GS4_FIXED_COROTATED);
     }
     return l->present;
 }
@@ -6491,11 +6506,11 @@ static void gs4i_svd(double F[3][3], double U[3][3], double s[3], double V[3][3]
 }
 
 /* Deviatoric Cauchy stress, added to sigma, and what gs4i_solid_stress calls stiffness. */
-static void gs4i_solid_stress_one(const gs4i_law *law, double F[3][3], double J, double sigma[6],
-                                  double *stiffness)
+static void gs4i_solid_stress_one(const gs4i_material_constants *mat, double F[3][3], double J,
+                                  double sigma[6], double *stiffness)
 {
-    const double q = 1 / cbrt(J), G = (double)law->shear_modulus;
-    const int corotated = law->is.solid == GS4_FIXED_COROTATED;
+    const double q = 1 / cbrt(J), G = (double)mat->shear_modulus;
+    const int corotated = mat->is.solid == GS4_FIXED_COROTATED;
     double U[3][3], s[3], V[3][3], t[3], mean = 0, most = 0;
     int i, j, k;
     gs4i_svd(F, U, s, V);
@@ -6654,8 +6669,9 @@ GS4I_INLINE void gs4i_is_positive(const gs4i_wide s[6], gs4i_wide_mask *positive
 }
 
 /* S4: F at the stage, in its place, for n particles of the batch. */
-static void gs4i_stage_solid(const gs4i_solid_laws *l, gs4i_deformation *e, const gs4i_rule *rule,
-                             gs4i_gradient L, int n, gs4i_solid_count *count)
+static void gs4i_stage_solid(const gs4i_solid_constants *l, gs4i_deformation *e,
+                             const gs4i_integrator *integrator, gs4i_gradient L, int n,
+                             gs4i_solid_count *count)
 {
     gs4i_matrix Y, old;
     gs4i_lanes squared;
@@ -6663,8 +6679,8 @@ static void gs4i_stage_solid(const gs4i_solid_laws *l, gs4i_deformation *e, cons
     for (i = 0; i < 3; i++)
         for (j = 0; j < 3; j++)
             GS4I_BATCH_LOOP(b)
-                Y[i][j][b] = rule->reach.ahead * e->rate[i][j][b]
-                             + rule->s * (L[i][j][b] - e->rate[i][j][b]);
+                Y[i][j][b] = integrator->prediction.ahead * e->rate[i][j][b]
+                             + integrator->s * (L[i][j][b] - e->rate[i][j][b]);
     if (gs4i_is_small_step(Y, squared)) {
         gs4i_deform(Y, e->F, e->F);
         return;
@@ -6684,8 +6700,8 @@ static void gs4i_stage_solid(const gs4i_solid_laws *l, gs4i_deformation *e, cons
 
 /* F of particle n after a step X from `old`, to the volume ratio J, as plasticity and bounds let
  * it be; `now` is what the fraction made of it. */
-static void gs4i_correct_one(const gs4i_law *law, gs4i_matrix X, double squared, gs4i_matrix old,
-                             gs4i_matrix now, double J, int n, gs4i_matrix F,
+static void gs4i_correct_one(const gs4i_material_constants *mat, gs4i_matrix X, double squared,
+                             gs4i_matrix old, gs4i_matrix now, double J, int n, gs4i_matrix F,
                              gs4i_solid_count *count)
 {
     double one[3][3], scale;
@@ -6699,15 +6715,15 @@ static void gs4i_correct_one(const gs4i_law *law, gs4i_matrix X, double squared,
     }
     scale = cbrt(J / gs4i_determinant(one));
     for (i = 0; i < 9; i++) one[i / 3][i % 3] *= scale;
-    if (gs4i_yield_one(one, (double)law->low, (double)law->high))
-        count->bounded += law->is.yield_compression <= 0 && law->is.yield_stretch <= 0;
+    if (gs4i_yield_one(one, (double)mat->low, (double)mat->high))
+        count->bounded += mat->is.yield_compression <= 0 && mat->is.yield_stretch <= 0;
     gs4i_set_matrix(F, n, one);
 }
 
 /* F as it is now, but det F = J; F = J^(1/3) I where there is no solid. Is each within its
  * limits, which F F^T - low^2 and high^2 - F F^T tell, and not so stretched that its determinant
  * would need more digits than there are? */
-static int gs4i_fit_volume(const gs4i_solid_laws *l, gs4i_matrix now, const gs4i_wide *J,
+static int gs4i_fit_volume(const gs4i_solid_constants *l, gs4i_matrix now, const gs4i_wide *J,
                            gs4i_matrix F, gs4i_lanes verdict)
 {
     int b, c, i, j, all = 1;
@@ -6757,10 +6773,11 @@ static void gs4i_let_flow(gs4i_gradient L, const gs4i_wide *J, gs4i_deformation 
 }
 
 /* S7: F and M for known grad u = L, to the volume ratio J; n particles of the batch. */
-static void gs4i_correct_solid(const gs4i_solid_laws *l, gs4i_deformation *e, const gs4i_rule *rule,
-                               gs4i_gradient L, const gs4i_wide *J, int n, gs4i_solid_count *count)
+static void gs4i_correct_solid(const gs4i_solid_constants *l, gs4i_deformation *e,
+                               const gs4i_integrator *integrator, gs4i_gradient L,
+                               const gs4i_wide *J, int n, gs4i_solid_count *count)
 {
-    const gs4_real inv_alpha_m = 1 / rule->alpha_m;
+    const gs4_real inv_alpha_m = 1 / integrator->alpha_m;
     gs4i_matrix X, old, now;
     gs4i_lanes squared, verdict;
     int b, i, j, small, fits;
@@ -6770,7 +6787,7 @@ static void gs4i_correct_solid(const gs4i_solid_laws *l, gs4i_deformation *e, co
                 const gs4i_wide change = (L[i][j][b] - e->rate[i][j][b]) * inv_alpha_m;
                 const gs4i_wide_mask solid = l->modulus[b] > GS4I_C(0);
                 const gs4i_wide next = e->rate[i][j][b] + change;
-                X[i][j][b] = rule->dt * (e->rate[i][j][b] + rule->gamma * change);
+                X[i][j][b] = integrator->dt * (e->rate[i][j][b] + integrator->gamma * change);
                 GS4I_CHOOSE(e->rate[i][j][b], solid, next, L[i][j][b]);
             }
     small = gs4i_is_small_step(X, squared);
@@ -6849,7 +6866,7 @@ static int gs4i_corotated_strain(gs4i_matrix F, gs4i_symmetric strain, gs4i_lane
 
 /* Adds the deviatoric stress of F where the volume ratio is J to sigma. `stiffness`: density
  * rho0 times the squared speed of elastic waves, at most; 0 for liquids. */
-static void gs4i_solid_stress(const gs4i_solid_laws *l, gs4i_matrix F, const gs4i_wide *J,
+static void gs4i_solid_stress(const gs4i_solid_constants *l, gs4i_matrix F, const gs4i_wide *J,
                               gs4i_symmetric sigma, gs4i_lanes stiffness)
 {
     gs4i_matrix iso;
@@ -6908,36 +6925,42 @@ static void gs4i_solid_stress(const gs4i_solid_laws *l, gs4i_matrix F, const gs4
 
 /* Gradients of what the grid says to particles beside its velocity: acceleration, and what
  * contact took at once. */
-typedef struct gs4i_kicks {
+typedef struct gs4i_gathered_rates {
     gs4i_gradient acc, jump;
-} gs4i_kicks;
+} gs4i_gathered_rates;
 
 /* S7: w by rule 1. dw/dt is half the curl of acc - L L, which is what the velocity gradient of a
  * particle does; what the grid cannot see of w fades at the rate that of v does, implicit in
  * itself; and contact turns at once. */
-static void gs4i_correct_turning(const gs4i_solid_laws *l, gs4i_deformation *e,
-                                 const gs4i_rule *rule, gs4i_gradient L, gs4i_kicks *kicks)
+static void gs4i_correct_spin(const gs4i_solid_constants *l, gs4i_deformation *e,
+                              const gs4i_integrator *integrator, gs4i_gradient L,
+                              gs4i_gathered_rates *rates)
 {
-    const gs4_real decay = rule->decay, inv_alpha_m = 1 / rule->alpha_m;
+    const gs4_real decay = integrator->decay, inv_alpha_m = 1 / integrator->alpha_m;
     int b, i;
     for (i = 0; i < 3; i++) {
         const int j = (i + 1) % 3, k = (i + 2) % 3;
         GS4I_BATCH_LOOP(b) {
-            const gs4i_wide w = e->turning[i][b], r = e->turning_rate[i][b], zero = w - w,
+            const gs4i_wide w = e->spin[i][b], r = e->turning_rate[i][b], zero = w - w,
                             seen = GS4I_C(0.5) * (L[k][j][b] - L[j][k][b]);
             const gs4i_wide LL =
                 (L[k][0][b] * L[0][j][b] + L[k][1][b] * L[1][j][b] + L[k][2][b] * L[2][j][b])
                 - (L[j][0][b] * L[0][k][b] + L[j][1][b] * L[1][k][b] + L[j][2][b] * L[2][k][b]);
-            const gs4i_wide rate = GS4I_C(0.5) * (kicks->acc[k][j][b] - kicks->acc[j][k][b] - LL),
-                            at_once = GS4I_C(0.5) * (kicks->jump[k][j][b] - kicks->jump[j][k][b]);
-            const gs4i_wide stage = (rate + decay * (seen - (w + rule->before * r))) * rule->damped,
+            const gs4i_wide rate = GS4I_C(0.5) * (rates->acc[k][j][b] - rates->acc[j][k][b] - LL),
+                            at_once = GS4I_C(0.5) * (rates->jump[k][j][b] - rates->jump[j][k][b]);
+            const gs4i_wide stage = (rate + decay * (seen - (w + integrator->before * r)))
+                                    * integrator->damped,
                             change = (stage - r) * inv_alpha_m;
-            const gs4i_wide all = ((w + rule->dt * r) + rule->gamma * rule->dt * change) + at_once,
+            const gs4i_wide all = ((w + integrator->dt * r)
+                                   + integrator->gamma * integrator->dt * change)
+                                  + at_once,
                             next_rate = r + change;
             const gs4i_wide next =
-                all - rule->fading * (w + rule->before * r + rule->s * stage - seen);
+                all
+                - integrator->decayed_at_once
+                      * (w + integrator->before * r + integrator->s * stage - seen);
             const gs4i_wide_mask solid = l->modulus[b] > GS4I_C(0);
-            GS4I_CHOOSE(e->turning[i][b], solid, next, zero);
+            GS4I_CHOOSE(e->spin[i][b], solid, next, zero);
             GS4I_CHOOSE(e->turning_rate[i][b], solid, next_rate, zero);
         }
     }
@@ -6972,14 +6995,14 @@ static void gs4i_undeform(const gs4i_particles *p, size_t i, gs4_real J)
     F[0] = F[4] = F[8] = GS4I_C(cbrt((double)J));
 }
 
-static void gs4i_set_turning(const gs4i_particles *p, size_t i, gs4_vec3 w)
+static void gs4i_set_spin(const gs4i_particles *p, size_t i, gs4_vec3 w)
 {
-    gs4_real *turning = p->deformation + (size_t)p->deformation_reals * i + 18;
+    gs4_real *spin = p->deformation + (size_t)p->deformation_reals * i + 18;
     if (!p->with_rates) return;
-    turning[0] = w.x;
-    turning[1] = w.y;
-    turning[2] = w.z;
-    turning[3] = turning[4] = turning[5] = 0;
+    spin[0] = w.x;
+    spin[1] = w.y;
+    spin[2] = w.z;
+    spin[3] = spin[4] = spin[5] = 0;
 }
 
 /* ==== [[heat]] temperature, melting and heat flux of particles ================================= *
@@ -7012,11 +7035,11 @@ static void gs4i_set_turning(const gs4i_particles *p, size_t i, gs4_vec3 w)
 /* W/(m K), of what has no conductivity, so that resistances can be added */
 #define GS4I_INSULATES GS4I_C(1e-15)
 
-typedef struct gs4i_heat_laws {
+typedef struct gs4i_heat_constants {
     gs4i_lanes capacity, conductivity, flux_time, fourier, melting, heating /* 1: by viscosity */;
-    const gs4i_law *of[GS4I_BATCH];
+    const gs4i_material_constants *of[GS4I_BATCH];
     int melts; /* some of those seen so far do */
-} gs4i_heat_laws;
+} gs4i_heat_constants;
 
 /* Of one batch: temperature (K), fraction, rate of H/c (K/s), what is owed (K): what warms by
  * less than its last digit in a step warms still; non-local flux (W/m^2) and its rate. */
@@ -7024,20 +7047,20 @@ typedef struct gs4i_heat {
     gs4i_lanes T, fraction, rate, owed, q[4], q_rate[4];
 } gs4i_heat;
 
-static void gs4i_take_heat_laws(const gs4i_batch_laws *laws, gs4i_heat_laws *l)
+static void gs4i_load_heat_constants(const gs4i_batch_constants *constants, gs4i_heat_constants *l)
 {
     int n;
     for (n = 0; n < GS4I_BATCH; n++) {
-        const gs4i_law *law = laws->of[n];
-        if (law == l->of[n]) continue;
-        l->of[n] = law;
-        l->melts |= law->is.can_melt;
-        GS4I_NTH(l->capacity, n) = law->capacity;
-        GS4I_NTH(l->conductivity, n) = law->conductivity;
-        GS4I_NTH(l->flux_time, n) = law->flux_time;
-        GS4I_NTH(l->fourier, n) = law->fourier;
-        GS4I_NTH(l->melting, n) = law->melting;
-        GS4I_NTH(l->heating, n) = law->is.viscous_heating ? GS4I_C(1) : GS4I_C(0);
+        const gs4i_material_constants *mat = constants->of[n];
+        if (mat == l->of[n]) continue;
+        l->of[n] = mat;
+        l->melts |= mat->is.can_melt;
+        GS4I_NTH(l->capacity, n) = mat->capacity;
+        GS4I_NTH(l->conductivity, n) = mat->conductivity;
+        GS4I_NTH(l->flux_time, n) = mat->flux_time;
+        GS4I_NTH(l->fourier, n) = mat->fourier;
+        GS4I_NTH(l->melting, n) = mat->melting;
+        GS4I_NTH(l->heating, n) = mat->is.viscous_heating ? GS4I_C(1) : GS4I_C(0);
     }
 }
 
@@ -7067,28 +7090,30 @@ GS4I_INLINE void gs4i_store_heat(const gs4i_particles *p, size_t i, int n, const
 }
 
 /* Add c * rise to the enthalpy. */
-GS4I_INLINE void gs4i_warm_one(const gs4i_law *law, gs4_real rise, gs4_real *T, gs4_real *fraction)
+GS4I_INLINE void gs4i_add_enthalpy_one(const gs4i_material_constants *mat, gs4_real rise,
+                                       gs4_real *T, gs4_real *fraction)
 {
-    const gs4_real at = law->melting, warm = *T + rise;
+    const gs4_real at = mat->melting, heat_integrator = *T + rise;
     gs4_real above;
-    if ((*fraction <= 0 && warm <= at) || (*fraction >= 1 && warm >= at)) {
-        *T = warm;
+    if ((*fraction <= 0 && heat_integrator <= at) || (*fraction >= 1 && heat_integrator >= at)) {
+        *T = heat_integrator;
         return;
     }
-    above = (*T - at) + *fraction * law->latent + rise;
-    *fraction = above <= 0 ? GS4I_C(0) : above >= law->latent ? GS4I_C(1) : above / law->latent;
-    *T = above <= 0 ? at + above : above >= law->latent ? at + (above - law->latent) : at;
+    above = (*T - at) + *fraction * mat->latent + rise;
+    *fraction = above <= 0 ? GS4I_C(0) : above >= mat->latent ? GS4I_C(1) : above / mat->latent;
+    *T = above <= 0 ? at + above : above >= mat->latent ? at + (above - mat->latent) : at;
 }
 
 /* The same for a batch. */
-GS4I_INLINE void gs4i_warm(const gs4i_heat_laws *l, gs4i_lanes rise, gs4i_lanes T,
-                           gs4i_lanes fraction)
+GS4I_INLINE void gs4i_add_enthalpy(const gs4i_heat_constants *l, gs4i_lanes rise, gs4i_lanes T,
+                                   gs4i_lanes fraction)
 {
     int b, plain = 1;
     GS4I_BATCH_LOOP(b) {
-        const gs4i_wide warm = T[b] + rise[b];
-        const gs4i_wide_mask stays = ((fraction[b] <= GS4I_C(0)) & (warm <= l->melting[b]))
-                                     | ((fraction[b] >= GS4I_C(1)) & (warm >= l->melting[b]));
+        const gs4i_wide heat_integrator = T[b] + rise[b];
+        const gs4i_wide_mask stays =
+            ((fraction[b] <= GS4I_C(0)) & (heat_integrator <= l->melting[b]))
+            | ((fraction[b] >= GS4I_C(1)) & (heat_integrator >= l->melting[b]));
         plain &= gs4i_all(&stays);
     }
     if (plain) {
@@ -7097,14 +7122,14 @@ GS4I_INLINE void gs4i_warm(const gs4i_heat_laws *l, gs4i_lanes rise, gs4i_lanes 
     }
     for (b = 0; b < GS4I_BATCH; b++) {
         gs4_real own = GS4I_NTH(T, b), part = GS4I_NTH(fraction, b);
-        gs4i_warm_one(l->of[b], GS4I_NTH(rise, b), &own, &part);
+        gs4i_add_enthalpy_one(l->of[b], GS4I_NTH(rise, b), &own, &part);
         GS4I_NTH(T, b) = own;
         GS4I_NTH(fraction, b) = part;
     }
 }
 
 /* The temperature of H + ahead dH/dt. */
-static void gs4i_temperature_ahead(const gs4i_heat_laws *l, const gs4i_heat *h, gs4_real ahead,
+static void gs4i_temperature_ahead(const gs4i_heat_constants *l, const gs4i_heat *h, gs4_real ahead,
                                    gs4i_lanes T)
 {
     gs4i_lanes rise, fraction;
@@ -7112,23 +7137,26 @@ static void gs4i_temperature_ahead(const gs4i_heat_laws *l, const gs4i_heat *h, 
     GS4I_BATCH_LOOP(b) rise[b] = ahead * h->rate[b];
     memcpy(T, h->T, sizeof h->T);
     memcpy(fraction, h->fraction, sizeof fraction);
-    gs4i_warm(l, rise, T, fraction);
+    gs4i_add_enthalpy(l, rise, T, fraction);
 }
 
 /* k_eff = k (F t + s) / (t + s), of what the rule takes implicitly. */
-GS4I_INLINE void gs4i_conducts(const gs4i_heat_laws *l, const gs4i_rule *rule, gs4i_lanes k)
+GS4I_INLINE void gs4i_has_conductivity(const gs4i_heat_constants *l,
+                                       const gs4i_integrator *integrator, gs4i_lanes k)
 {
     int b;
     GS4I_BATCH_LOOP(b)
         k[b] = l->conductivity[b]
-               * ((l->fourier[b] * l->flux_time[b] + rule->s) / (l->flux_time[b] + rule->s));
+               * ((l->fourier[b] * l->flux_time[b] + integrator->s)
+                  / (l->flux_time[b] + integrator->s));
 }
 
 /* q** + s L q~, with q~ predicted: what the non-local flux brings to the stage. */
-static void gs4i_flux_before(const gs4i_heat *h, const gs4i_rule *rule, gs4i_gradient L,
+static void gs4i_flux_before(const gs4i_heat *h, const gs4i_integrator *integrator, gs4i_gradient L,
                              gs4i_lanes q[3])
 {
-    const gs4_real ahead = rule->reach.ahead, before = rule->before, s = rule->s;
+    const gs4_real ahead = integrator->prediction.ahead, before = integrator->before,
+                   s = integrator->s;
     gs4i_lanes at[3];
     int b, c;
     for (c = 0; c < 3; c++)
@@ -7143,62 +7171,67 @@ static void gs4i_flux_before(const gs4i_heat *h, const gs4i_rule *rule, gs4i_gra
  * V q** t / (t + s), with a flux only, + w P, and w times the heat that mixes, W/K, see
  * [[conduction]]. */
 typedef struct gs4i_heat_sent {
-    gs4_real content[4 * GS4I_BATCH];
-    gs4i_forces source;
+    gs4_real nodes[4 * GS4I_BATCH];
+    gs4i_forces sources;
 } gs4i_heat_sent;
 
 /* `power` in W; volumes in m^3. */
-static void gs4i_send_heat(const gs4i_heat_laws *l, const gs4i_heat *h, const gs4i_rule *rule,
-                           gs4i_gradient L, const gs4i_wide *mass, gs4i_lanes volume,
-                           gs4i_lanes power, int with_flux, gs4i_heat_sent *to)
+static void gs4i_send_heat(const gs4i_heat_constants *l, const gs4i_heat *h,
+                           const gs4i_integrator *integrator, gs4i_gradient L,
+                           const gs4i_wide *mass, gs4i_lanes volume, gs4i_lanes power,
+                           int with_flux, gs4i_heat_sent *to)
 {
-    gs4i_lanes T, capacity, content, resists, mixes, q[3], none;
+    gs4i_lanes T, capacity, nodes, resists, mixes, q[3], none;
     const gs4i_wide least = (mass[0] - mass[0]) + GS4I_INSULATES;
     int b, c;
-    gs4i_temperature_ahead(l, h, rule->before, T);
-    gs4i_conducts(l, rule, resists);
+    gs4i_temperature_ahead(l, h, integrator->before, T);
+    gs4i_has_conductivity(l, integrator, resists);
     GS4I_BATCH_LOOP(b) {
         capacity[b] = mass[b] * l->capacity[b];
-        content[b] = capacity[b] * T[b];
-        mixes[b] = GS4I_MIXING * rule->inv_area * l->conductivity[b] * volume[b] / capacity[b];
+        nodes[b] = capacity[b] * T[b];
+        mixes[b] =
+            GS4I_MIXING * integrator->inv_area * l->conductivity[b] * volume[b] / capacity[b];
         mixes[b] = capacity[b] * mixes[b]
                    * (l->fourier[b]
                       + (GS4I_C(1) - l->fourier[b]) / (GS4I_C(1) + mixes[b] * l->flux_time[b]));
         GS4I_WIDE_MAX(resists[b], resists[b], least);
         resists[b] = volume[b] / resists[b];
     }
-    gs4i_from_lanes(capacity, content, resists, volume, to->content);
+    gs4i_from_lanes(capacity, nodes, resists, volume, to->nodes);
     memset(none, 0, sizeof none);
-    gs4i_from_lanes(power, mixes, none, none, to->source.weight);
+    gs4i_from_lanes(power, mixes, none, none, to->sources.weight);
     if (!with_flux) return;
-    gs4i_flux_before(h, rule, L, q);
+    gs4i_flux_before(h, integrator, L, q);
     for (c = 0; c < 3; c++)
-        GS4I_BATCH_LOOP(b) q[c][b] *= volume[b] * (l->flux_time[b] / (l->flux_time[b] + rule->s));
-    gs4i_from_lanes(q[0], none, none, none, to->source.x);
-    gs4i_from_lanes(q[1], none, none, none, to->source.y);
-    gs4i_from_lanes(q[2], none, none, none, to->source.z);
+        GS4I_BATCH_LOOP(b)
+            q[c][b] *= volume[b] * (l->flux_time[b] / (l->flux_time[b] + integrator->s));
+    gs4i_from_lanes(q[0], none, none, none, to->sources.x);
+    gs4i_from_lanes(q[1], none, none, none, to->sources.y);
+    gs4i_from_lanes(q[2], none, none, none, to->sources.z);
 }
 
 /* S7: `from` is the sharpened T~ - T**, the rate of mixing, and times the temperature to mix to;
  * `slope` the gradient of T~, and the resistance of the nodes, read with a flux only. Where a
  * worse conductor is near, the non-local flux is that of nodes in series, as between them: more
  * of it than nodes conduct would drive a front that nothing holds. */
-static void gs4i_receive_heat(const gs4i_heat_laws *l, const gs4i_rule *rule, gs4i_lanes from[4],
-                              gs4i_lanes slope[4], gs4i_gradient L, int with_flux, gs4i_heat *h)
+static void gs4i_receive_heat(const gs4i_heat_constants *l, const gs4i_integrator *integrator,
+                              gs4i_lanes from[4], gs4i_lanes slope[4], gs4i_gradient L,
+                              int with_flux, gs4i_heat *h)
 {
     gs4i_lanes gain, T, fraction, q[3], drives;
     int b, c;
-    gs4i_temperature_ahead(l, h, rule->before, T);
+    gs4i_temperature_ahead(l, h, integrator->before, T);
     GS4I_BATCH_LOOP(b) {
         const gs4i_wide change =
-            ((from[0][b] * (1 / rule->s) - (from[1][b] * T[b] - from[2][b])) - h->rate[b])
-            * rule->inv_alpha_m;
-        gain[b] = (rule->dt * h->rate[b] + rule->gamma * rule->dt * change) + h->owed[b];
+            ((from[0][b] * (1 / integrator->s) - (from[1][b] * T[b] - from[2][b])) - h->rate[b])
+            * integrator->inv_alpha_m;
+        gain[b] = (integrator->dt * h->rate[b] + integrator->gamma * integrator->dt * change)
+                  + h->owed[b];
         h->rate[b] += change;
     }
     memcpy(T, h->T, sizeof T);
     memcpy(fraction, h->fraction, sizeof fraction);
-    gs4i_warm(l, gain, h->T, h->fraction);
+    gs4i_add_enthalpy(l, gain, h->T, h->fraction);
     GS4I_BATCH_LOOP(b) {
         const gs4i_wide zero = gain[b] - gain[b], owed = gain[b] - (h->T[b] - T[b]);
         const gs4i_wide_mask same =
@@ -7206,8 +7239,8 @@ static void gs4i_receive_heat(const gs4i_heat_laws *l, const gs4i_rule *rule, gs
         GS4I_CHOOSE(h->owed[b], same, owed, zero);
     }
     if (!with_flux) return;
-    gs4i_flux_before(h, rule, L, q);
-    gs4i_conducts(l, rule, drives);
+    gs4i_flux_before(h, integrator, L, q);
+    gs4i_has_conductivity(l, integrator, drives);
     GS4I_BATCH_LOOP(b) {
         const gs4i_wide one = (h->T[b] - h->T[b]) + GS4I_C(1);
         gs4i_wide resists = drives[b] * slope[3][b];
@@ -7216,12 +7249,14 @@ static void gs4i_receive_heat(const gs4i_heat_laws *l, const gs4i_rule *rule, gs
     }
     for (c = 0; c < 3; c++)
         GS4I_BATCH_LOOP(b) {
-            const gs4i_wide before = h->q[c][b] + rule->before * h->q_rate[c][b];
-            const gs4i_wide stage = (l->flux_time[b] * q[c][b] - rule->s * drives[b] * slope[c][b])
-                                    / (l->flux_time[b] + rule->s);
-            const gs4i_wide change =
-                ((stage - before) * (1 / rule->s) - h->q_rate[c][b]) * rule->inv_alpha_m;
-            h->q[c][b] += rule->dt * h->q_rate[c][b] + rule->gamma * rule->dt * change;
+            const gs4i_wide before = h->q[c][b] + integrator->before * h->q_rate[c][b];
+            const gs4i_wide stage =
+                (l->flux_time[b] * q[c][b] - integrator->s * drives[b] * slope[c][b])
+                / (l->flux_time[b] + integrator->s);
+            const gs4i_wide change = ((stage - before) * (1 / integrator->s) - h->q_rate[c][b])
+                                     * integrator->inv_alpha_m;
+            h->q[c][b] +=
+                integrator->dt * h->q_rate[c][b] + integrator->gamma * integrator->dt * change;
             h->q_rate[c][b] += change;
         }
 }
@@ -7239,23 +7274,24 @@ static void gs4i_set_phase(const gs4i_particles *p, size_t i, int liquid)
 
 /* Fraction and phase that belong to the temperature of particle i; at T_m itself those that are
  * there stay. */
-static void gs4i_settle_phase(const gs4i_particles *p, size_t i, const gs4i_law *law)
+static void gs4i_settle_phase(const gs4i_particles *p, size_t i, const gs4i_material_constants *mat)
 {
     gs4_real *heat = p->heat + 4 * i;
-    if (!law->is.can_melt || heat[0] == law->melting) return;
-    heat[1] = GS4I_C(heat[0] > law->melting ? 1 : 0);
-    gs4i_set_phase(p, i, heat[0] > law->melting);
+    if (!mat->is.can_melt || heat[0] == mat->melting) return;
+    heat[1] = GS4I_C(heat[0] > mat->melting ? 1 : 0);
+    gs4i_set_phase(p, i, heat[0] > mat->melting);
 }
 
 /* Particle i begins at the temperature T. */
-static void gs4i_begin_heat(const gs4i_particles *p, size_t i, const gs4i_law *law, gs4_real T)
+static void gs4i_begin_heat(const gs4i_particles *p, size_t i, const gs4i_material_constants *mat,
+                            gs4_real T)
 {
     gs4_real *heat = p->heat + 4 * i;
     heat[0] = T;
     heat[2] = heat[3] = 0;
-    p->liquid[i] = !law->is.can_melt && law->is.solid == GS4_NO_SOLID;
+    p->liquid[i] = !mat->is.can_melt && mat->is.solid == GS4_NO_SOLID;
     heat[1] = GS4I_C(p->liquid[i]);
-    gs4i_settle_phase(p, i, law);
+    gs4i_settle_phase(p, i, mat);
     if (p->with_flux) {
         memset(p->flux + 4 * i, 0, 4 * sizeof *p->flux);
         memset(p->flux_rate + 4 * i, 0, 4 * sizeof *p->flux_rate);
@@ -7269,16 +7305,16 @@ static void gs4i_begin_heat(const gs4i_particles *p, size_t i, const gs4i_law *l
  * too, with the sign S of the reflection (stick: -1 in all components; slip: -1 in the normal
  * one; periodic: the node a period away, S = 1); afterwards images hold S times the field of
  * their mirror node. Slippery bodies hold the nodes inside of them; sticky ones act by images of
- * particles, see gs4i_place_ghost.
+ * particles, see gs4i_place_image_particle.
  *
  * What contact takes from the velocity of a node at once is no acceleration: it is kept as a
  * jump, which goes to the velocity of the particles directly and never into their rates (METHOD:
  * "contact stays out of the rates"). */
 
 /* node numbers: 64 slot + place in the block */
-typedef struct gs4i_image {
-    uint32_t image, mirror;
-} gs4i_image;
+typedef struct gs4i_mirror_pair {
+    uint32_t mirror, inner;
+} gs4i_mirror_pair;
 
 /* A body or a mouth: a shape with a pose. World point p is shape point R^T (p - at) + pivot. */
 /* sampled distance of a mesh: trilinear in n[0] x n[1] x n[2] samples */
@@ -7289,19 +7325,19 @@ typedef struct gs4i_field {
     size_t count;
 } gs4i_field;
 
-typedef struct gs4i_body {
+typedef struct gs4i_collider {
     gs4_collider is; /* as described */
     /* where the pivot is now; orientation, unit quaternion w x y z */
     double at[3], turn[4];
     gs4_real axes[9]; /* R, row-major */
     gs4i_field field; /* for a mesh */
     /* of an emitter: holds what is inside at the velocity `flow`; not in use now */
-    int is_mouth, asleep;
+    int is_emitter, asleep;
     gs4_vec3 flow;
-} gs4i_body;
+} gs4i_collider;
 
-/* A particle before a sticky body, and its image behind the surface: see gs4i_place_ghost. */
-typedef struct gs4i_ghost {
+/* A particle before a sticky collider and its image behind it: gs4i_place_image_particle. */
+typedef struct gs4i_image_particle {
     /* place and mass; normal of the surface; the body's velocity at its foot and angular
      * velocity */
     gs4_real x[4], n[3], v[3], spin[3];
@@ -7314,29 +7350,29 @@ typedef struct gs4i_ghost {
     /* from them: velocity and acceleration, value and columns of the gradient */
     gs4_real seen[2][4][4];
     int kind, whole, slot; /* GS4I_GHOST_*; all its nodes exist; block of x */
-} gs4i_ghost;
+} gs4i_image_particle;
 
-typedef struct gs4i_ghosts {
+typedef struct gs4i_image_particles {
     /* one for each particle of the blocks near sticky bodies; 0: there are none */
     int count;
-    /* gs4i_ghost; per occupied block: its first one, or -1 (int32_t) */
+    /* gs4i_image_particle; per occupied block: its first one, or -1 (int32_t) */
     gs4i_scratch all, of;
     /* int32_t: sorted by slot; per slot, where it begins; slots that have some, by colour */
     gs4i_scratch order, first, slots;
     int colour_first[9];
-} gs4i_ghosts;
+} gs4i_image_particles;
 
 typedef struct gs4i_boundary {
     gs4_wall walls[6];
     /* per wall, while the blocks stay */
-    gs4i_image *images[6];
-    int image_count[6], image_capacity[6];
-    gs4i_body *bodies;
-    int body_count, body_capacity;
+    gs4i_mirror_pair *mirrors[6];
+    int mirror_count[6], mirror_capacity[6];
+    gs4i_collider *colliders;
+    int collider_count, collider_capacity;
     gs4_real h;
 } gs4i_boundary;
 
-static void gs4i_body_orient(gs4i_body *b)
+static void gs4i_collider_orient(gs4i_collider *b)
 {
     double w = b->turn[0], x = b->turn[1], y = b->turn[2], z = b->turn[3];
     const double r[9] = {
@@ -7349,7 +7385,7 @@ static void gs4i_body_orient(gs4i_body *b)
 }
 
 /* Pose after dt: the pivot moves, the body turns about it by the angle |omega| dt. */
-static void gs4i_body_move(gs4i_body *b, double dt)
+static void gs4i_collider_move(gs4i_collider *b, double dt)
 {
     double o[3], rate, half, norm = 0, q[4], s, c, x, y, z;
     const double *t = b->turn;
@@ -7372,14 +7408,14 @@ static void gs4i_body_move(gs4i_body *b, double dt)
     q[3] = c * t[3] + x * t[2] - y * t[1] + z * t[0];
     for (i = 0; i < 4; i++) norm += q[i] * q[i];
     for (i = 0; i < 4; i++) b->turn[i] = q[i] / sqrt(norm);
-    gs4i_body_orient(b);
+    gs4i_collider_orient(b);
 }
 
 /* World velocity of the body at p. */
-static gs4_vec3 gs4i_body_velocity(const gs4i_body *b, gs4_vec3 p)
+static gs4_vec3 gs4i_collider_velocity(const gs4i_collider *b, gs4_vec3 p)
 {
     gs4_vec3 r = gs4i_sub(p, gs4i_vec3(GS4I_C(b->at[0]), GS4I_C(b->at[1]), GS4I_C(b->at[2])));
-    if (b->is_mouth) return b->flow;
+    if (b->is_emitter) return b->flow;
     return gs4i_add(b->is.velocity, gs4i_cross(b->is.angular_velocity, r));
 }
 
@@ -7409,14 +7445,14 @@ static gs4_real gs4i_field_distance(const gs4i_field *f, gs4_vec3 p)
 }
 
 /* The same in the coordinates of the shape. */
-static gs4_real gs4i_shape_or_field(const gs4i_body *b, gs4_vec3 p)
+static gs4_real gs4i_shape_or_field(const gs4i_collider *b, gs4_vec3 p)
 {
     return b->field.distance ? gs4i_field_distance(&b->field, p)
                              : gs4i_shape_distance(&b->is.shape, p);
 }
 
 /* World point p in the coordinates of the shape. */
-static gs4_vec3 gs4i_to_body(const gs4i_body *b, gs4_vec3 p)
+static gs4_vec3 gs4i_to_collider(const gs4i_collider *b, gs4_vec3 p)
 {
     const gs4_real *r = b->axes;
     gs4_vec3 d = gs4i_sub(p, gs4i_vec3(GS4I_C(b->at[0]), GS4I_C(b->at[1]), GS4I_C(b->at[2])));
@@ -7427,34 +7463,34 @@ static gs4_vec3 gs4i_to_body(const gs4i_body *b, gs4_vec3 p)
 }
 
 /* Signed distance (m) from the body's surface to the world point p. */
-static gs4_real gs4i_body_distance(const gs4i_body *b, gs4_vec3 p)
+static gs4_real gs4i_collider_distance(const gs4i_collider *b, gs4_vec3 p)
 {
-    return gs4i_shape_or_field(b, gs4i_to_body(b, p));
+    return gs4i_shape_or_field(b, gs4i_to_collider(b, p));
 }
 
 /* gs4i_shape_is_flat for a body, of world points. */
-static int gs4i_body_is_flat(const gs4i_body *b, gs4_vec3 p, gs4_real reach, gs4_real deep,
-                             gs4_vec3 *normal)
+static int gs4i_collider_is_flat(const gs4i_collider *b, gs4_vec3 p, gs4_real reach, gs4_real deep,
+                                 gs4_vec3 *normal)
 {
     const gs4_real *r = b->axes;
     gs4_vec3 n;
-    if (!gs4i_shape_is_flat(&b->is.shape, gs4i_to_body(b, p), reach, deep, &n)) return 0;
+    if (!gs4i_shape_is_flat(&b->is.shape, gs4i_to_collider(b, p), reach, deep, &n)) return 0;
     *normal = gs4i_vec3(r[0] * n.x + r[1] * n.y + r[2] * n.z, r[3] * n.x + r[4] * n.y + r[5] * n.z,
                         r[6] * n.x + r[7] * n.y + r[8] * n.z);
     return 1;
 }
 
 /* Outward unit normal: gradient of the distance over `step`; zero where it has none. */
-static gs4_vec3 gs4i_body_normal(const gs4i_body *b, gs4_vec3 p, gs4_real step)
+static gs4_vec3 gs4i_collider_normal(const gs4i_collider *b, gs4_vec3 p, gs4_real step)
 {
     gs4_vec3 g;
     gs4_real length;
-    g.x = gs4i_body_distance(b, gs4i_vec3(p.x + step, p.y, p.z))
-          - gs4i_body_distance(b, gs4i_vec3(p.x - step, p.y, p.z));
-    g.y = gs4i_body_distance(b, gs4i_vec3(p.x, p.y + step, p.z))
-          - gs4i_body_distance(b, gs4i_vec3(p.x, p.y - step, p.z));
-    g.z = gs4i_body_distance(b, gs4i_vec3(p.x, p.y, p.z + step))
-          - gs4i_body_distance(b, gs4i_vec3(p.x, p.y, p.z - step));
+    g.x = gs4i_collider_distance(b, gs4i_vec3(p.x + step, p.y, p.z))
+          - gs4i_collider_distance(b, gs4i_vec3(p.x - step, p.y, p.z));
+    g.y = gs4i_collider_distance(b, gs4i_vec3(p.x, p.y + step, p.z))
+          - gs4i_collider_distance(b, gs4i_vec3(p.x, p.y - step, p.z));
+    g.z = gs4i_collider_distance(b, gs4i_vec3(p.x, p.y, p.z + step))
+          - gs4i_collider_distance(b, gs4i_vec3(p.x, p.y, p.z - step));
     length = gs4i_length(g);
     return length > 0 ? gs4i_scale(g, 1 / length) : gs4i_vec3(0, 0, 0);
 }
@@ -7697,27 +7733,28 @@ static void gs4i_field_free(gs4i_memory *m, gs4i_field *f)
 /* --- images of the walls ---------------------------------------------------------------------- */
 
 /* Mirror of node `at` (which is outside 0 .. n-1) at its wall. */
-GS4I_INLINE int gs4i_mirror(gs4_wall wall, int at, int n)
+GS4I_INLINE int gs4i_mirrored(gs4_wall wall, int at, int n)
 {
     if (wall == GS4_WALL_PERIODIC) return at < 0 ? at + n : at - n;
     return at < 0 ? -1 - at : 2 * n - 1 - at;
 }
 
 /* List the pairs of every wall; called when the blocks have changed. */
-static int gs4i_list_images(gs4i_memory *m, gs4i_boundary *b, const gs4i_grid *g)
+static int gs4i_list_mirror_nodes(gs4i_memory *m, gs4i_boundary *b, const gs4i_grid *g)
 {
     int wall, s, pass, i;
     for (wall = 0; wall < 6; wall++) {
         int axis = wall / 2, n = g->cells[axis], count = 0;
         if (b->walls[wall] == GS4_WALL_OPEN) continue;
         for (pass = 0; pass < 2; pass++) { /* count, then fill */
-            if (pass && count > b->image_capacity[wall]) {
+            if (pass && count > b->mirror_capacity[wall]) {
                 int wanted = count + count / 4;
-                gs4i_image *list = (gs4i_image *)gs4i_alloc(m, (size_t)wanted, sizeof *list);
+                gs4i_mirror_pair *list =
+                    (gs4i_mirror_pair *)gs4i_alloc(m, (size_t)wanted, sizeof *list);
                 if (!list) return GS4_ERROR_MEMORY;
-                gs4i_free(m, b->images[wall], (size_t)b->image_capacity[wall], sizeof *list);
-                b->images[wall] = list;
-                b->image_capacity[wall] = wanted;
+                gs4i_free(m, b->mirrors[wall], (size_t)b->mirror_capacity[wall], sizeof *list);
+                b->mirrors[wall] = list;
+                b->mirror_capacity[wall] = wanted;
             }
             count = 0;
             for (s = 0; s < g->active; s++) {
@@ -7726,27 +7763,27 @@ static int gs4i_list_images(gs4i_memory *m, gs4i_boundary *b, const gs4i_grid *g
                 first = 4 * (at[axis] - 1);
                 if (wall & 1 ? first + 3 < n : first >= 0) continue;
                 for (i = 0; i < GS4I_BLOCK_NODES; i++) {
-                    int x[3], mirror;
+                    int x[3], inner;
                     ptrdiff_t to;
                     x[0] = 4 * (at[0] - 1) + (i & 3);
                     x[1] = 4 * (at[1] - 1) + (i >> 2 & 3);
                     x[2] = 4 * (at[2] - 1) + (i >> 4);
                     if (wall & 1 ? x[axis] < n || x[axis] > n + 1 : x[axis] > -1 || x[axis] < -2)
                         continue;
-                    mirror = gs4i_mirror(b->walls[wall], x[axis], n);
-                    x[axis] = mirror;
+                    inner = gs4i_mirrored(b->walls[wall], x[axis], n);
+                    x[axis] = inner;
                     to = gs4i_node_at(g, x[0], x[1], x[2]);
                     if (to < 0) continue;
                     if (pass) {
-                        gs4i_image *p = &b->images[wall][count];
-                        p->image = (uint32_t)(64 * s + i);
-                        p->mirror = (uint32_t)(to / 4);
+                        gs4i_mirror_pair *p = &b->mirrors[wall][count];
+                        p->mirror = (uint32_t)(64 * s + i);
+                        p->inner = (uint32_t)(to / 4);
                     }
                     count++;
                 }
             }
         }
-        b->image_count[wall] = count;
+        b->mirror_count[wall] = count;
     }
     return GS4_OK;
 }
@@ -7756,8 +7793,8 @@ static int gs4i_list_images(gs4i_memory *m, gs4i_boundary *b, const gs4i_grid *g
 #define GS4I_STICKY_REACH GS4I_C(0.75)
 /* particles that have images are within so many cells of a surface; nodes that see one within
  * GHOST_NODES */
-#define GS4I_GHOST_REACH GS4I_C(3)
-#define GS4I_GHOST_NODES GS4I_C(1.5)
+#define GS4I_IMAGE_REACH GS4I_C(3)
+#define GS4I_IMAGE_NODES GS4I_C(1.5)
 
 static gs4_vec3 gs4i_block_midst(const gs4i_grid *g, uint32_t block)
 {
@@ -7770,10 +7807,10 @@ static gs4_vec3 gs4i_block_midst(const gs4i_grid *g, uint32_t block)
 
 /* Can a body hold any node of a block? By its distance from the midst: half the diagonal of the
  * block's nodes, and its reach. */
-static int gs4i_body_is_near(const gs4i_body *b, const gs4i_grid *g, int slot)
+static int gs4i_collider_is_near(const gs4i_collider *b, const gs4i_grid *g, int slot)
 {
-    return gs4i_body_distance(b, gs4i_block_midst(g, g->block[slot]))
-           < (GS4I_C(2.7) + GS4I_GHOST_NODES) * g->h;
+    return gs4i_collider_distance(b, gs4i_block_midst(g, g->block[slot]))
+           < (GS4I_C(2.7) + GS4I_IMAGE_NODES) * g->h;
 }
 
 /* Give a place for jumps to the blocks that touch a wall or a body. */
@@ -7782,13 +7819,13 @@ static int gs4i_place_jumps(gs4i_memory *m, const gs4i_boundary *b, gs4i_grid *g
     int wall, i, s, n = 0;
     memset(g->jump_of, 0, (size_t)g->active * sizeof *g->jump_of);
     for (wall = 0; wall < 6; wall++)
-        for (i = 0; i < b->image_count[wall] && b->walls[wall] < GS4_WALL_OPEN; i++) {
-            g->jump_of[b->images[wall][i].image / 64] = 1;
-            g->jump_of[b->images[wall][i].mirror / 64] = 1;
+        for (i = 0; i < b->mirror_count[wall] && b->walls[wall] < GS4_WALL_OPEN; i++) {
+            g->jump_of[b->mirrors[wall][i].mirror / 64] = 1;
+            g->jump_of[b->mirrors[wall][i].inner / 64] = 1;
         }
-    for (i = 0; i < b->body_count; i++)
+    for (i = 0; i < b->collider_count; i++)
         for (s = 0; s < g->active; s++)
-            g->jump_of[s] = g->jump_of[s] || gs4i_body_is_near(&b->bodies[i], g, s);
+            g->jump_of[s] = g->jump_of[s] || gs4i_collider_is_near(&b->colliders[i], g, s);
     for (s = 0; s < g->active; s++)
         if (g->jump_of[s]) g->jump_of[s] = ++n;
     g->jump_count = n;
@@ -7837,14 +7874,14 @@ GS4I_INLINE void gs4i_reflection(gs4_wall wall, int axis, gs4_real sign[3])
 
 /* Is this image of a separating wall in contact? While material moves into the wall, or pressed
  * on it in the last step. */
-static int gs4i_wall_touches(const gs4i_grid *g, const gs4i_image *pair, int wall)
+static int gs4i_wall_touches(const gs4i_grid *g, const gs4i_mirror_pair *pair, int wall)
 {
     int axis = wall / 2;
     gs4_real outward = wall & 1 ? GS4I_C(1) : GS4I_C(-1);
-    gs4_real into = (g->momentum[4 * (size_t)pair->image + (size_t)axis]
-                     + g->momentum[4 * (size_t)pair->mirror + (size_t)axis])
+    gs4_real into = (g->momentum[4 * (size_t)pair->mirror + (size_t)axis]
+                     + g->momentum[4 * (size_t)pair->inner + (size_t)axis])
                     * outward;
-    return into > 0 || (g->memory && g->memory[4 * (size_t)pair->image + 3] >= 2);
+    return into > 0 || (g->remembered && g->remembered[4 * (size_t)pair->mirror + 3] >= 2);
 }
 
 /* Fold mass and momentum back from images; the fourth number of the jump is 1 where one did,
@@ -7855,14 +7892,14 @@ static void gs4i_fold_momentum(const gs4i_boundary *b, const gs4i_grid *g)
     for (wall = 0; wall < 6; wall++) {
         gs4_real sign[3];
         gs4i_reflection(b->walls[wall], wall / 2, sign);
-        for (i = 0; i < b->image_count[wall]; i++) {
-            const gs4i_image *pair = &b->images[wall][i];
-            const gs4_real *from = g->momentum + 4 * (size_t)pair->image;
-            gs4_real *to = g->momentum + 4 * (size_t)pair->mirror;
+        for (i = 0; i < b->mirror_count[wall]; i++) {
+            const gs4i_mirror_pair *pair = &b->mirrors[wall][i];
+            const gs4_real *from = g->momentum + 4 * (size_t)pair->mirror;
+            gs4_real *to = g->momentum + 4 * (size_t)pair->inner;
             if (b->walls[wall] == GS4_WALL_SEPARATE && !gs4i_wall_touches(g, pair, wall)) continue;
             if (b->walls[wall] != GS4_WALL_PERIODIC) {
-                gs4i_jump_at(g, pair->image)[3] = 1;
-                *gs4i_contact_at(g, pair->image) |= (uint8_t)(1 << wall / 2);
+                gs4i_jump_at(g, pair->mirror)[3] = 1;
+                *gs4i_contact_at(g, pair->mirror) |= (uint8_t)(1 << wall / 2);
             }
             for (a = 0; a < 3; a++) to[a] += sign[a] * from[a];
             to[3] += from[3];
@@ -7870,11 +7907,11 @@ static void gs4i_fold_momentum(const gs4i_boundary *b, const gs4i_grid *g)
     }
 }
 
-GS4I_INLINE int gs4i_is_folded(const gs4i_boundary *b, const gs4i_grid *g, const gs4i_image *pair,
-                               int wall)
+GS4I_INLINE int gs4i_is_folded(const gs4i_boundary *b, const gs4i_grid *g,
+                               const gs4i_mirror_pair *pair, int wall)
 {
     return b->walls[wall] == GS4_WALL_PERIODIC
-           || (*gs4i_contact_at(g, pair->image) >> (wall / 2) & 1);
+           || (*gs4i_contact_at(g, pair->mirror) >> (wall / 2) & 1);
 }
 
 /* Fold forces; where `stress` is among them, what pushes out presses on the wall. */
@@ -7884,13 +7921,13 @@ static void gs4i_fold_force(const gs4i_boundary *b, const gs4i_grid *g, int stre
     for (wall = 0; wall < 6; wall++) {
         gs4_real sign[3], outward = wall & 1 ? GS4I_C(1) : GS4I_C(-1);
         gs4i_reflection(b->walls[wall], wall / 2, sign);
-        for (i = 0; i < b->image_count[wall]; i++) {
-            const gs4i_image *pair = &b->images[wall][i];
-            const gs4_real *from = g->force + 4 * (size_t)pair->image;
-            gs4_real *to = g->force + 4 * (size_t)pair->mirror;
+        for (i = 0; i < b->mirror_count[wall]; i++) {
+            const gs4i_mirror_pair *pair = &b->mirrors[wall][i];
+            const gs4_real *from = g->force + 4 * (size_t)pair->mirror;
+            gs4_real *to = g->force + 4 * (size_t)pair->inner;
             int folded = gs4i_is_folded(b, g, pair, wall);
             if (stress && b->walls[wall] == GS4_WALL_SEPARATE && from[wall / 2] * outward > 0)
-                *gs4i_contact_at(g, pair->image) |= GS4I_PRESSED;
+                *gs4i_contact_at(g, pair->mirror) |= GS4I_PRESSED;
             if (folded)
                 for (a = 0; a < 3; a++) to[a] += sign[a] * from[a];
         }
@@ -7898,44 +7935,45 @@ static void gs4i_fold_force(const gs4i_boundary *b, const gs4i_grid *g, int stre
 }
 
 /* Images take S times the field of their mirror nodes; axes in the reverse order of folding. */
-static void gs4i_fill_images(const gs4i_boundary *b, const gs4i_grid *g, gs4_real *field)
+static void gs4i_fill_mirror_nodes(const gs4i_boundary *b, const gs4i_grid *g, gs4_real *field)
 {
     int wall, i, a;
     for (wall = 5; wall >= 0; wall--) {
         gs4_real sign[3];
         gs4i_reflection(b->walls[wall], wall / 2, sign);
-        for (i = 0; i < b->image_count[wall]; i++) {
-            const gs4i_image *pair = &b->images[wall][i];
+        for (i = 0; i < b->mirror_count[wall]; i++) {
+            const gs4i_mirror_pair *pair = &b->mirrors[wall][i];
             if (!gs4i_is_folded(b, g, pair, wall)) continue;
             for (a = 0; a < 3; a++)
-                field[4 * (size_t)pair->image + (size_t)a] =
-                    sign[a] * field[4 * (size_t)pair->mirror + (size_t)a];
+                field[4 * (size_t)pair->mirror + (size_t)a] =
+                    sign[a] * field[4 * (size_t)pair->inner + (size_t)a];
             if (b->walls[wall] == GS4_WALL_PERIODIC && field == g->momentum)
-                field[4 * (size_t)pair->image + 3] = field[4 * (size_t)pair->mirror + 3];
+                field[4 * (size_t)pair->mirror + 3] = field[4 * (size_t)pair->inner + 3];
         }
     }
 }
 
 /* The same of one number a node. */
-static void gs4i_fill_fullness(const gs4i_boundary *b, const gs4i_grid *g)
+static void gs4i_fill_mirror_fractions(const gs4i_boundary *b, const gs4i_grid *g)
 {
     int wall, i;
     for (wall = 5; wall >= 0; wall--)
-        for (i = 0; i < b->image_count[wall]; i++) {
-            const gs4i_image *pair = &b->images[wall][i];
-            if (gs4i_is_folded(b, g, pair, wall)) g->full[pair->image] = g->full[pair->mirror];
+        for (i = 0; i < b->mirror_count[wall]; i++) {
+            const gs4i_mirror_pair *pair = &b->mirrors[wall][i];
+            if (gs4i_is_folded(b, g, pair, wall))
+                g->fill_fraction[pair->mirror] = g->fill_fraction[pair->inner];
         }
 }
 
 /* Images that fold carry their weight alone: their other forces are folded already. The fourth
  * number of a force is the mass. */
-static void gs4i_weigh_images(const gs4i_boundary *b, const gs4i_grid *g, gs4_vec3 gravity)
+static void gs4i_weigh_mirror_nodes(const gs4i_boundary *b, const gs4i_grid *g, gs4_vec3 gravity)
 {
     int wall, i;
     for (wall = 0; wall < 6; wall++)
-        for (i = 0; i < b->image_count[wall]; i++) {
-            const gs4i_image *pair = &b->images[wall][i];
-            gs4_real *f = g->force + 4 * (size_t)pair->image;
+        for (i = 0; i < b->mirror_count[wall]; i++) {
+            const gs4i_mirror_pair *pair = &b->mirrors[wall][i];
+            gs4_real *f = g->force + 4 * (size_t)pair->mirror;
             if (!gs4i_is_folded(b, g, pair, wall)) continue;
             f[0] = f[3] * gravity.x;
             f[1] = f[3] * gravity.y;
@@ -7946,15 +7984,15 @@ static void gs4i_weigh_images(const gs4i_boundary *b, const gs4i_grid *g, gs4_ve
 /* What body `b` does to a node at p that would go with velocity v and acceleration acc over the
  * time dt: both become those of the body in the components that contact holds. Returns whether
  * it holds any. */
-static int gs4i_body_hold(const gs4i_body *b, gs4_vec3 p, gs4_real h, gs4_real dt, gs4_real v[3],
-                          gs4_real acc[3])
+static int gs4i_collider_hold(const gs4i_collider *b, gs4_vec3 p, gs4_real h, gs4_real dt,
+                              gs4_real v[3], gs4_real acc[3])
 {
     gs4_vec3 own, n, rel, side;
     gs4_real into, push, slip, bite, a_side;
-    if (gs4i_body_distance(b, p)
-        >= (b->is.contact == GS4_WALL_STICK && !b->is_mouth ? GS4I_STICKY_REACH * h : GS4I_C(0)))
+    if (gs4i_collider_distance(b, p)
+        >= (b->is.contact == GS4_WALL_STICK && !b->is_emitter ? GS4I_STICKY_REACH * h : GS4I_C(0)))
         return 0;
-    own = gs4i_body_velocity(b, p);
+    own = gs4i_collider_velocity(b, p);
     if (b->is.contact == GS4_WALL_STICK) {
         v[0] = own.x;
         v[1] = own.y;
@@ -7962,7 +8000,7 @@ static int gs4i_body_hold(const gs4i_body *b, gs4_vec3 p, gs4_real h, gs4_real d
         acc[0] = acc[1] = acc[2] = 0;
         return 1;
     }
-    n = gs4i_body_normal(b, p, GS4I_C(0.5) * h);
+    n = gs4i_collider_normal(b, p, GS4I_C(0.5) * h);
     rel = gs4i_sub(gs4i_vec3(v[0], v[1], v[2]), own);
     into = -gs4i_dot(rel, n);                             /* > 0: velocity into the body */
     push = -(acc[0] * n.x + acc[1] * n.y + acc[2] * n.z); /* > 0: acceleration into it */
@@ -8001,15 +8039,16 @@ static void gs4i_put_back(const gs4i_boundary *b, const gs4i_grid *g, gs4_real x
 {
     int i, a, pass, moved = 1;
     for (pass = 0; pass < 2 && moved; pass++) /* two bodies may meet */
-        for (moved = 0, i = 0; i < b->body_count; i++) {
-            const gs4i_body *body = &b->bodies[i];
+        for (moved = 0, i = 0; i < b->collider_count; i++) {
+            const gs4i_collider *collider = &b->colliders[i];
             gs4_vec3 p = gs4i_vec3(x[0], x[1], x[2]), n, rel;
-            gs4_real d = body->is_mouth ? GS4I_C(0) : gs4i_body_distance(body, p), into;
+            gs4_real d = collider->is_emitter ? GS4I_C(0) : gs4i_collider_distance(collider, p),
+                     into;
             if (!(d < 0)) continue;
             moved = 1;
             d = gs4i_max(d, -2 * g->h); /* no farther than that in a step */
-            n = gs4i_body_normal(body, p, GS4I_C(0.1) * g->h);
-            rel = gs4i_sub(gs4i_vec3(v[0], v[1], v[2]), gs4i_body_velocity(body, p));
+            n = gs4i_collider_normal(collider, p, GS4I_C(0.1) * g->h);
+            rel = gs4i_sub(gs4i_vec3(v[0], v[1], v[2]), gs4i_collider_velocity(collider, p));
             into = gs4i_min(gs4i_dot(rel, n), 0);
             x[0] -= d * n.x;
             x[1] -= d * n.y;
@@ -8044,24 +8083,24 @@ static void gs4i_put_back(const gs4i_boundary *b, const gs4i_grid *g, gs4_real x
 
 /* In the mouth of an emitter a particle goes with the flow: at its velocity, uncompressed,
  * without rates. The mouth, NULL outside of all. */
-static const gs4i_body *gs4i_hold_in_mouth(const gs4i_boundary *b, const gs4_real x[3],
-                                           gs4_real v[4])
+static const gs4i_collider *gs4i_hold_in_emitter(const gs4i_boundary *b, const gs4_real x[3],
+                                                 gs4_real v[4])
 {
-    const gs4i_body *mouth = NULL;
+    const gs4i_collider *emitter = NULL;
     int i;
-    for (i = 0; i < b->body_count; i++) {
-        const gs4i_body *body = &b->bodies[i];
-        if (body->is_mouth && !body->asleep
-            && gs4i_body_distance(body, gs4i_vec3(x[0], x[1], x[2])) < 0)
-            mouth = body;
+    for (i = 0; i < b->collider_count; i++) {
+        const gs4i_collider *collider = &b->colliders[i];
+        if (collider->is_emitter && !collider->asleep
+            && gs4i_collider_distance(collider, gs4i_vec3(x[0], x[1], x[2])) < 0)
+            emitter = collider;
     }
-    if (mouth) {
-        v[0] = mouth->flow.x;
-        v[1] = mouth->flow.y;
-        v[2] = mouth->flow.z;
+    if (emitter) {
+        v[0] = emitter->flow.x;
+        v[1] = emitter->flow.y;
+        v[2] = emitter->flow.z;
         v[3] = 1;
     }
-    return mouth;
+    return emitter;
 }
 
 /* ==== [[state]] what a simulation is ========================================================== */
@@ -8070,7 +8109,7 @@ static const gs4i_body *gs4i_hold_in_mouth(const gs4i_boundary *b, const gs4_rea
  * matter. */
 typedef struct gs4i_report {
     gs4_real max_speed, max_gradient, min_J, max_J, max_viscosity /* kinematic */, max_sound;
-    int strayed;            /* particles outside of the tile: sort and try again */
+    int left_tile;          /* particles outside of the tile: sort and try again */
     gs4_real max_stiffness; /* elastic, over density: squared speed of elastic waves */
     /* particles that need the robust local integrator; that took it; whose stretch was bounded */
     int hard, split, bounded;
@@ -8082,7 +8121,7 @@ typedef struct gs4i_report {
 
 typedef struct gs4i_emitter {
     gs4_emitter is;
-    int body; /* its mouth among the bodies */
+    int collider; /* its mouth among the bodies */
     /* how far the lattice has moved through the mouth; and when last looked at */
     double drift[3], looked[3];
     int begun;
@@ -8104,7 +8143,7 @@ enum {
 typedef struct gs4i_conduction {
     /* 4 a node: m c, m c T**, V / k_eff, V -> what gs4i_heat_back says; source (W), mixing
      * (W/K), 0, 0 -> the same; NULL where there is none */
-    gs4_real *content, *source;
+    gs4_real *heat_nodes, *heat_sources;
     int slots;
     int heats; /* some material is heated by viscosity */
     /* the box: its first node, and how many there are along each axis */
@@ -8136,18 +8175,18 @@ struct gs4_sim {
     gs4i_grid grid;
     gs4i_particles particles;
     gs4i_boundary boundary;
-    gs4i_ghosts ghosts;
+    gs4i_image_particles image_particles;
     gs4i_conduction conduction;
     /* of each material; of its solid phase */
-    gs4i_law *laws, *frozen;
-    int material_count, material_capacity, frozen_capacity;
+    gs4i_material_constants *constants, *solid_phase;
+    int material_count, material_capacity, solid_phase_capacity;
     gs4i_emitter *emitters;
     int emitter_count, emitter_capacity;
     gs4i_report *reports;
     int report_capacity; /* per occupied block */
     /* extremes of the present state, as far as steps have seen them */
     gs4i_report worst;
-    gs4i_rule rule, warm; /* of this step; the same for heat */
+    gs4i_integrator integrator, heat_integrator; /* of this step; the same for heat */
     double time, last_dt, seconds[GS4I_CLOCKS];
     /* stress integrated robustly, bounded: particles and steps so far */
     uint64_t steps, split, bounded;
@@ -8157,12 +8196,12 @@ struct gs4_sim {
     gs4_real fastest;
     gs4_real shift; /* of the rates of positions, left by the last step */
     /* start rates anew; sort before the next step; `worst` is out of date */
-    int afresh, unsorted, unseen;
+    int restart, needs_sort, limits_stale;
     /* stable dt by what the stage of the last step saw; 0: it did not get there */
     gs4_real stage_limit;
     int edited; /* by hand, not checked yet */
     /* velocities were set by hand: how solids turn must be found out */
-    int unturned;
+    int needs_spin;
     char error[320];
 };
 
@@ -8189,7 +8228,7 @@ static void gs4i_report_merge(gs4i_report *into, const gs4i_report *r)
     into->max_stiffness = gs4i_max(into->max_stiffness, r->max_stiffness);
     into->split += r->split;
     into->bounded += r->bounded;
-    into->strayed += r->strayed;
+    into->left_tile += r->left_tile;
     into->left += r->left;
     if (r->bad && !into->bad) {
         into->bad = r->bad;
@@ -8198,10 +8237,11 @@ static void gs4i_report_merge(gs4i_report *into, const gs4i_report *r)
 }
 
 /* The law of a particle in its phase. */
-GS4I_INLINE const gs4i_law *gs4i_law_of(const gs4_sim *sim, size_t i)
+GS4I_INLINE const gs4i_material_constants *gs4i_constants_of(const gs4_sim *sim, size_t i)
 {
     const gs4i_particles *p = &sim->particles;
-    return p->liquid && !p->liquid[i] ? &sim->frozen[p->material[i]] : &sim->laws[p->material[i]];
+    return p->liquid && !p->liquid[i] ? &sim->solid_phase[p->material[i]]
+                                      : &sim->constants[p->material[i]];
 }
 
 /* --- errors in words -------------------------------------------------------------------------- */
@@ -8240,7 +8280,7 @@ static int gs4i_fail_memory(gs4_sim *sim)
 /* The velocities of nodes whose gradients particles see. */
 GS4I_INLINE const gs4_real *gs4i_seen_nodes(const gs4i_grid *g)
 {
-    return g->with_sharp ? g->sharp : g->momentum;
+    return g->with_deconvolution ? g->deconvolved : g->momentum;
 }
 
 enum {
@@ -8300,12 +8340,13 @@ GS4I_INLINE gs4i_frame gs4i_tile_frame(const gs4i_grid *g, uint32_t block)
 }
 
 /* S2: a batch and its weights at the predicted positions. */
-GS4I_INLINE void gs4i_stage_batch(const gs4i_particles *p, size_t i, int n, gs4i_reach reach,
-                                  const gs4i_frame *f, gs4i_batch *q, gs4i_stencils *s)
+GS4I_INLINE void gs4i_stage_batch(const gs4i_particles *p, size_t i, int n,
+                                  gs4i_prediction prediction, const gs4i_frame *f, gs4i_batch *q,
+                                  gs4i_stencils *s)
 {
     gs4i_lanes x[3];
-    gs4i_load_batch(p, i, n, reach, q);
-    gs4i_predict_positions(q, reach, x);
+    gs4i_load_batch(p, i, n, prediction, q);
+    gs4i_predict_positions(q, prediction, x);
     gs4i_stencils_at(s, f, x);
 }
 
@@ -8322,7 +8363,7 @@ GS4I_INLINE void gs4i_see_nothing(gs4i_seen *r)
     GS4I_BATCH_LOOP(b) r->min_J[b] += GS4I_HUGE;
 }
 
-GS4I_INLINE void gs4i_see_liquids(gs4i_seen *r, const gs4i_batch_laws *l, const gs4i_wide *J,
+GS4I_INLINE void gs4i_see_liquids(gs4i_seen *r, const gs4i_batch_constants *l, const gs4i_wide *J,
                                   const gs4i_wide *mu)
 {
     int b;
@@ -8405,20 +8446,20 @@ GS4I_INLINE void gs4i_check_liquids(gs4i_report *r, gs4i_lanes J, gs4i_lanes mu,
 /* --- stress with a memory --------------------------------------------------------------------- */
 
 /* Laws of materials whose stress depends on what was before. */
-typedef struct gs4i_history_laws {
-    gs4i_elastic_laws elastic;
-    gs4i_solid_laws solid;
-} gs4i_history_laws;
+typedef struct gs4i_history_constants {
+    gs4i_elastic_constants elastic;
+    gs4i_solid_constants solid;
+} gs4i_history_constants;
 
 /* What is stiff: squared speed of elastic waves, and particles where it is no number. */
 static void gs4i_see_stiffness(const gs4i_particles *p, size_t i, int n,
-                               const gs4i_batch_laws *laws, gs4i_lanes stiffness, gs4i_seen *seen,
-                               gs4i_report *report)
+                               const gs4i_batch_constants *constants, gs4i_lanes stiffness,
+                               gs4i_seen *seen, gs4i_report *report)
 {
     int b, good = 1;
     GS4I_BATCH_LOOP(b) {
         const gs4i_wide_mask fine = stiffness[b] < GS4I_HUGE;
-        const gs4i_wide speed2 = stiffness[b] * laws->inv_density[b];
+        const gs4i_wide speed2 = stiffness[b] * constants->inv_density[b];
         GS4I_WIDE_MAX(seen->max_stiffness[b], seen->max_stiffness[b], speed2);
         good &= gs4i_all(&fine);
     }
@@ -8429,44 +8470,47 @@ static void gs4i_see_stiffness(const gs4i_particles *p, size_t i, int n,
 
 /* Adds the non-local stress of the stage (GS4) or of now (Euler) to sigma, for particles i to i
  * + n. */
-static void gs4i_add_elastic(const gs4i_particles *p, size_t i, int n, const gs4i_rule *rule,
-                             const gs4i_batch_laws *laws, gs4i_elastic_laws *l, gs4i_gradient L,
-                             gs4i_symmetric sigma, gs4i_seen *seen, gs4i_report *report)
+static void gs4i_add_elastic(const gs4i_particles *p, size_t i, int n,
+                             const gs4i_integrator *integrator,
+                             const gs4i_batch_constants *constants, gs4i_elastic_constants *l,
+                             gs4i_gradient L, gs4i_symmetric sigma, gs4i_seen *seen,
+                             gs4i_report *report)
 {
     gs4i_elastic e;
     gs4i_elastic_count count = { 0, 0, 0 };
     gs4i_symmetric s;
     gs4i_lanes G, stiffness;
     int b, c;
-    gs4i_take_elastic_laws(laws, l);
+    gs4i_load_elastic_constants(constants, l);
     gs4i_moduli(l, L, G);
     gs4i_load_elastic(p->elastic + (size_t)p->elastic_reals * i, p->elastic_reals, n, &e);
     if (p->with_rates)
-        gs4i_stage_elastic(l, G, &e, rule, L, n, s, &count);
+        gs4i_stage_elastic(l, G, &e, integrator, L, n, s, &count);
     else
         memcpy(s, e.s, sizeof s);
     for (c = 0; c < 6; c++)
         GS4I_BATCH_LOOP(b) sigma[c][b] += s[c][b];
     gs4i_see_elastic(G, s, stiffness);
-    gs4i_see_stiffness(p, i, n, laws, stiffness, seen, report);
+    gs4i_see_stiffness(p, i, n, constants, stiffness, seen, report);
     if (count.failed) gs4i_see_bad(report, GS4I_BAD_STRESS, p->id[i + (size_t)count.failed - 1]);
     report->hard += count.split;
 }
 
 /* S7 of the non-local stress; with `commit` 0 only whether it can be done. */
-static void gs4i_advance_elastic(const gs4i_particles *p, size_t i, int n, const gs4i_rule *rule,
-                                 const gs4i_batch_laws *laws, gs4i_elastic_laws *l, gs4i_gradient L,
-                                 gs4i_report *report, int commit)
+static void gs4i_advance_elastic(const gs4i_particles *p, size_t i, int n,
+                                 const gs4i_integrator *integrator,
+                                 const gs4i_batch_constants *constants, gs4i_elastic_constants *l,
+                                 gs4i_gradient L, gs4i_report *report, int commit)
 {
     gs4i_elastic e;
     gs4i_elastic_count count = { 0, 0, 0 };
     gs4_real *at = p->elastic + (size_t)p->elastic_reals * i;
-    gs4i_rule euler = *rule;
-    gs4i_take_elastic_laws(laws, l);
+    gs4i_integrator euler = *integrator;
+    gs4i_load_elastic_constants(constants, l);
     gs4i_load_elastic(at, p->elastic_reals, n, &e);
     euler.alpha_m = euler.alpha_f = euler.gamma = 1;
-    euler.afresh = 0;
-    gs4i_correct_elastic(l, &e, p->with_rates ? rule : &euler, L, n, &count);
+    euler.restart = 0;
+    gs4i_correct_elastic(l, &e, p->with_rates ? integrator : &euler, L, n, &count);
     if (count.failed) gs4i_see_bad(report, GS4I_BAD_STRESS, p->id[i + (size_t)count.failed - 1]);
     if (!commit) return;
     report->split += count.split;
@@ -8475,43 +8519,44 @@ static void gs4i_advance_elastic(const gs4i_particles *p, size_t i, int n, const
 }
 
 /* The same of solids: their stress at the stage, where the volume ratio is J, or now. */
-static void gs4i_add_solid(const gs4i_particles *p, size_t i, int n, const gs4i_rule *rule,
-                           const gs4i_batch_laws *laws, gs4i_solid_laws *l, gs4i_gradient L,
-                           const gs4i_wide *J, gs4i_symmetric sigma, gs4i_seen *seen,
-                           gs4i_report *report)
+static void gs4i_add_solid(const gs4i_particles *p, size_t i, int n,
+                           const gs4i_integrator *integrator, const gs4i_batch_constants *constants,
+                           gs4i_solid_constants *l, gs4i_gradient L, const gs4i_wide *J,
+                           gs4i_symmetric sigma, gs4i_seen *seen, gs4i_report *report)
 {
     gs4i_deformation e;
     gs4i_solid_count count = { 0, 0, 0 };
     gs4i_lanes stiffness;
-    if (!gs4i_take_solid_laws(laws, l)) return;
+    if (!gs4i_load_solid_constants(constants, l)) return;
     gs4i_load_deformation(p->deformation + (size_t)p->deformation_reals * i, p->deformation_reals,
                           n, &e);
-    if (p->with_rates) gs4i_stage_solid(l, &e, rule, L, n, &count);
+    if (p->with_rates) gs4i_stage_solid(l, &e, integrator, L, n, &count);
     gs4i_solid_stress(l, e.F, J, sigma, stiffness);
-    gs4i_see_stiffness(p, i, n, laws, stiffness, seen, report);
+    gs4i_see_stiffness(p, i, n, constants, stiffness, seen, report);
     if (count.failed)
         gs4i_see_bad(report, GS4I_BAD_DEFORMATION, p->id[i + (size_t)count.failed - 1]);
 }
 
 /* S7 of F, to the volume ratio J, and of w, but for Euler; with `commit` 0 only whether it can
  * be done. */
-static void gs4i_advance_solid(const gs4i_particles *p, size_t i, int n, const gs4i_rule *rule,
-                               const gs4i_batch_laws *laws, gs4i_solid_laws *l, gs4i_gradient L,
-                               gs4i_kicks *kicks, const gs4i_wide *J, gs4i_report *report,
-                               int commit)
+static void gs4i_advance_solid(const gs4i_particles *p, size_t i, int n,
+                               const gs4i_integrator *integrator,
+                               const gs4i_batch_constants *constants, gs4i_solid_constants *l,
+                               gs4i_gradient L, gs4i_gathered_rates *rates, const gs4i_wide *J,
+                               gs4i_report *report, int commit)
 {
     gs4i_deformation e;
     gs4i_solid_count count = { 0, 0, 0 };
     gs4_real *at = p->deformation + (size_t)p->deformation_reals * i;
-    gs4i_rule euler = *rule;
-    if (!gs4i_take_solid_laws(laws, l))
+    gs4i_integrator euler = *integrator;
+    if (!gs4i_load_solid_constants(constants, l))
         gs4i_let_flow(L, J, &e);
     else {
         gs4i_load_deformation(at, p->deformation_reals, n, &e);
         euler.alpha_m = euler.alpha_f = euler.gamma = 1;
-        euler.afresh = 0;
-        gs4i_correct_solid(l, &e, p->with_rates ? rule : &euler, L, J, n, &count);
-        if (p->with_rates) gs4i_correct_turning(l, &e, rule, L, kicks);
+        euler.restart = 0;
+        gs4i_correct_solid(l, &e, p->with_rates ? integrator : &euler, L, J, n, &count);
+        if (p->with_rates) gs4i_correct_spin(l, &e, integrator, L, rates);
     }
     if (count.failed)
         gs4i_see_bad(report, GS4I_BAD_DEFORMATION, p->id[i + (size_t)count.failed - 1]);
@@ -8613,19 +8658,18 @@ GS4I_INLINE void gs4i_affine_bound(gs4i_gradient C, gs4_real dt, gs4i_lanes boun
 
 /* Solids turn about their particles too: m v~ + m w~ x (x_i - x~) for particles i to i + n. 0
  * where none of them turns. */
-static int gs4i_turning_momentum(const gs4i_particles *p, size_t i, int n, const gs4i_stencils *s,
-                                 gs4_real h, const gs4i_rule *rule, const gs4i_wide *mass,
-                                 gs4i_lanes mv[3], gs4i_affine_forces *f)
+static int gs4i_spin_momentum(const gs4i_particles *p, size_t i, int n, const gs4i_stencils *s,
+                              gs4_real h, const gs4i_integrator *integrator, const gs4i_wide *mass,
+                              gs4i_lanes mv[3], gs4i_affine_forces *f)
 {
     gs4_real own[4 * GS4I_BATCH], any = 0;
     gs4i_lanes w[4], bound;
     gs4i_gradient Q;
     int a, b, c;
     for (b = 0; b < n; b++) {
-        const gs4_real *turning =
-            p->deformation + (size_t)p->deformation_reals * (i + (size_t)b) + 18;
+        const gs4_real *spin = p->deformation + (size_t)p->deformation_reals * (i + (size_t)b) + 18;
         for (a = 0; a < 3; a++) {
-            own[4 * b + a] = turning[a] + rule->reach.ahead * turning[a + 3];
+            own[4 * b + a] = spin[a] + integrator->prediction.ahead * spin[a + 3];
             any += gs4i_abs(own[4 * b + a]);
         }
         own[4 * b + 3] = 0;
@@ -8641,7 +8685,7 @@ static int gs4i_turning_momentum(const gs4i_particles *p, size_t i, int n, const
             Q[c][j][b] = -w[k][b];
         }
     }
-    gs4i_affine_bound(Q, rule->dt, bound);
+    gs4i_affine_bound(Q, integrator->dt, bound);
     for (a = 0; a < 9; a++)
         GS4I_BATCH_LOOP(b) Q[a / 3][a % 3][b] *= bound[b] * (h * mass[b]);
     for (c = 0; c < 3; c++)
@@ -8661,13 +8705,13 @@ static void gs4i_scatter_momentum(int index, void *context)
     const gs4i_pass *pass = (const gs4i_pass *)context;
     gs4_sim *sim = pass->sim;
     const gs4i_particles p = sim->particles; /* a copy: stores cannot alias it */
-    const gs4i_reach reach = sim->rule.reach;
+    const gs4i_prediction prediction = sim->integrator.prediction;
     const int o = pass->blocks[index];
     const gs4i_frame frame = gs4i_tile_frame(&sim->grid, sim->grid.occupied_block[o]);
     gs4_real tile[GS4I_TILE_REALS];
     int row = 0;
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
-    int strayed = 0;
+    int left_tile = 0;
     uint64_t rows = 0;
     gs4i_report_clear(&sim->reports[o]);
     memset(tile, 0, sizeof tile);
@@ -8677,35 +8721,35 @@ static void gs4i_scatter_momentum(int index, void *context)
         gs4i_stencils s;
         gs4i_lanes mv[3];
         gs4_real momentum[4 * GS4I_BATCH];
-        gs4i_affine_forces turning;
+        gs4i_affine_forces spin;
         int b, c, turns;
         gs4i_tile_prefetch(&sim->grid, o, row, sim->grid.momentum);
-        gs4i_stage_batch(&p, i, n, reach, &frame, &q, &s);
+        gs4i_stage_batch(&p, i, n, prediction, &frame, &q, &s);
         for (c = 0; c < 3; c++)
-            GS4I_BATCH_LOOP(b) mv[c][b] = q.x[3][b] * (q.v[c][b] + reach.ahead * q.a[c][b]);
+            GS4I_BATCH_LOOP(b) mv[c][b] = q.x[3][b] * (q.v[c][b] + prediction.ahead * q.a[c][b]);
         gs4i_from_lanes(mv[0], mv[1], mv[2], q.x[3], momentum);
         turns =
             p.deformation_reals
-            && gs4i_turning_momentum(&p, i, n, &s, sim->grid.h, &sim->rule, q.x[3], mv, &turning);
+            && gs4i_spin_momentum(&p, i, n, &s, sim->grid.h, &sim->integrator, q.x[3], mv, &spin);
         for (b = 0; b < n; b++) {
             if (s.base[b] < 0) {
-                strayed++;
+                left_tile++;
                 continue;
             }
             rows |= gs4i_touched_rows(s.base[b]);
             if (turns)
-                gs4i_scatter_affine(tile, &s, b, &turning);
+                gs4i_scatter_affine(tile, &s, b, &spin);
             else
                 gs4i_scatter_quad(tile, &s, b, momentum + 4 * b);
         }
     }
-    sim->reports[o].strayed = strayed;
+    sim->reports[o].left_tile = left_tile;
     sim->reports[o].rows = rows;
     gs4i_tile_add(&sim->grid, o, rows, tile, sim->grid.momentum);
 }
 
-/* How particles turn, by the velocities of the nodes: see gs4i_find_turning. */
-static void gs4i_see_turning_task(int index, void *context)
+/* How particles turn, by the velocities of the nodes: see gs4i_find_spin. */
+static void gs4i_find_spin_task(int index, void *context)
 {
     const gs4i_pass *pass = (const gs4i_pass *)context;
     gs4_sim *sim = pass->sim;
@@ -8721,13 +8765,13 @@ static void gs4i_see_turning_task(int index, void *context)
         gs4i_stencils s;
         gs4i_gathered v;
         int b;
-        gs4i_stage_batch(&p, i, n, sim->rule.reach, &frame, &q, &s);
+        gs4i_stage_batch(&p, i, n, sim->integrator.prediction, &frame, &q, &s);
         for (b = 0; b < n; b++) {
             gs4i_row w, d;
-            if (!(gs4i_law_of(sim, i + (size_t)b)->shear_modulus > 0)) continue;
+            if (!(gs4i_constants_of(sim, i + (size_t)b)->shear_modulus > 0)) continue;
             gs4i_x_weights(&s, b, &w, &d);
             gs4i_gather_local(nodes + 4 * s.base[b], &s, b, &w, &d, &v);
-            gs4i_set_turning(
+            gs4i_set_spin(
                 &p, i + (size_t)b,
                 gs4i_scale(gs4i_vec3(v.dy[4 * b + 2] - v.dz[4 * b + 1],
                                      v.dz[4 * b] - v.dx[4 * b + 2], v.dx[4 * b + 1] - v.dy[4 * b]),
@@ -8740,9 +8784,9 @@ static void gs4i_see_turning_task(int index, void *context)
 
 /* tau:D (W) of particles that viscosity heats: the stress without the pressure, whose work
  * compression gives back. */
-static void gs4i_take_power(const gs4i_heat_laws *h, const gs4i_batch_laws *l, const gs4i_wide *J,
-                            gs4i_gradient L, gs4i_symmetric sigma, gs4i_lanes volume,
-                            gs4i_lanes power)
+static void gs4i_viscous_power(const gs4i_heat_constants *h, const gs4i_batch_constants *l,
+                               const gs4i_wide *J, gs4i_gradient L, gs4i_symmetric sigma,
+                               gs4i_lanes volume, gs4i_lanes power)
 {
     int b;
     GS4I_BATCH_LOOP(b) {
@@ -8759,55 +8803,57 @@ static void gs4i_take_power(const gs4i_heat_laws *h, const gs4i_batch_laws *l, c
 /* What a kernel needs on top in a scene with heat, on the stack of such scenes alone; the
  * kernels get NULL in others. One tile has what goes to the nodes or comes from them, the other
  * the sources, or what gives gradients for the flux: as in gs4i_conduction. */
-typedef struct gs4i_warmth {
-    gs4i_heat_laws laws;
+typedef struct gs4i_heat_pass {
+    gs4i_heat_constants constants;
     gs4i_heat h;
     gs4i_heat_sent sent;
-    const gs4i_rule *rule;
-    gs4_real content[GS4I_TILE_REALS], source[GS4I_TILE_REALS];
-} gs4i_warmth;
+    const gs4i_integrator *integrator;
+    gs4_real nodes[GS4I_TILE_REALS], sources[GS4I_TILE_REALS];
+} gs4i_heat_pass;
 
 /* Laws see the temperature of the stage (Euler: of now). */
-static void gs4i_begin_warmth(const gs4i_particles *p, size_t i, int n, gs4_real ahead,
-                              gs4i_batch_laws *l, gs4i_warmth *w)
+static void gs4i_begin_heat_pass(const gs4i_particles *p, size_t i, int n, gs4_real ahead,
+                                 gs4i_batch_constants *l, gs4i_heat_pass *w)
 {
     gs4i_load_heat(p, i, n, &w->h);
-    gs4i_take_heat_laws(l, &w->laws);
-    if (l->callbacks) gs4i_temperature_ahead(&w->laws, &w->h, ahead, l->temperature);
+    gs4i_load_heat_constants(l, &w->constants);
+    if (l->callbacks) gs4i_temperature_ahead(&w->constants, &w->h, ahead, l->temperature);
 }
 
-static void gs4i_send_warmth(const gs4i_batch_laws *l, const gs4i_wide *mass, const gs4i_wide *J,
-                             gs4i_gradient L, gs4i_symmetric sigma, int with_flux, gs4i_warmth *w)
+static void gs4i_send_heat_pass(const gs4i_batch_constants *l, const gs4i_wide *mass,
+                                const gs4i_wide *J, gs4i_gradient L, gs4i_symmetric sigma,
+                                int with_flux, gs4i_heat_pass *w)
 {
     gs4i_lanes volume, power;
     int b;
     GS4I_BATCH_LOOP(b) volume[b] = mass[b] * l->inv_density[b] * J[b];
-    gs4i_take_power(&w->laws, l, J, L, sigma, volume, power);
-    gs4i_send_heat(&w->laws, &w->h, w->rule, L, mass, volume, power, with_flux, &w->sent);
+    gs4i_viscous_power(&w->constants, l, J, L, sigma, volume, power);
+    gs4i_send_heat(&w->constants, &w->h, w->integrator, L, mass, volume, power, with_flux,
+                   &w->sent);
 }
 
 /* Volume and stress at the stage, J~ by rule 1, implicit in itself for known div v: (J~ - J**) /
  * s = J~ div v. */
 GS4I_INLINE void gs4i_stage_forces(const gs4i_particles *p, size_t i, int n, const gs4i_batch *q,
-                                   const gs4i_batch_laws *l, gs4i_history_laws *past,
-                                   const gs4i_rule *rule, gs4i_gradient L,
-                                   const gs4_real gravity[3], int with_sharp, gs4i_forces *f,
-                                   gs4i_lanes J, gs4i_lanes mu, gs4i_seen *seen,
-                                   gs4i_report *report, gs4i_warmth *warmth)
+                                   const gs4i_batch_constants *l, gs4i_history_constants *past,
+                                   const gs4i_integrator *integrator, gs4i_gradient L,
+                                   const gs4_real gravity[3], int with_deconvolution,
+                                   gs4i_forces *f, gs4i_lanes J, gs4i_lanes mu, gs4i_seen *seen,
+                                   gs4i_report *report, gs4i_heat_pass *heat)
 {
     gs4i_symmetric sigma;
     gs4i_lanes g[3], none;
     int b, c;
     GS4I_BATCH_LOOP(b) {
         const gs4i_wide div = L[0][0][b] + L[1][1][b] + L[2][2][b];
-        J[b] = (q->v[3][b] + rule->before * q->a[3][b]) / (GS4I_C(1) - rule->s * div);
+        J[b] = (q->v[3][b] + integrator->before * q->a[3][b]) / (GS4I_C(1) - integrator->s * div);
     }
     gs4i_liquid_stress(l, J, L, sigma, mu);
     if (p->elastic_reals)
-        gs4i_add_elastic(p, i, n, rule, l, &past->elastic, L, sigma, seen, report);
+        gs4i_add_elastic(p, i, n, integrator, l, &past->elastic, L, sigma, seen, report);
     if (p->deformation_reals)
-        gs4i_add_solid(p, i, n, rule, l, &past->solid, L, J, sigma, seen, report);
-    if (warmth) gs4i_send_warmth(l, q->x[3], J, L, sigma, p->with_flux, warmth);
+        gs4i_add_solid(p, i, n, integrator, l, &past->solid, L, J, sigma, seen, report);
+    if (heat) gs4i_send_heat_pass(l, q->x[3], J, L, sigma, p->with_flux, heat);
     for (c = 0; c < 6; c++)
         GS4I_BATCH_LOOP(b) sigma[c][b] *= -q->x[3][b] * l->inv_density[b] * J[b];
     for (c = 0; c < 3; c++)
@@ -8816,7 +8862,7 @@ GS4I_INLINE void gs4i_stage_forces(const gs4i_particles *p, size_t i, int n, con
     gs4i_from_lanes(sigma[0], sigma[3], sigma[4], none, f->x);
     gs4i_from_lanes(sigma[3], sigma[1], sigma[5], none, f->y);
     gs4i_from_lanes(sigma[4], sigma[5], sigma[2], none, f->z);
-    gs4i_from_lanes(g[0], g[1], g[2], with_sharp ? q->x[3] : none, f->weight);
+    gs4i_from_lanes(g[0], g[1], g[2], with_deconvolution ? q->x[3] : none, f->weight);
 }
 
 /* tile += (-V sigma) grad w + w m g, for particle n of a batch */
@@ -8862,38 +8908,38 @@ static void gs4i_scatter_by_colour(gs4_sim *sim, const int32_t *blocks, const in
  * v), stress -sigma R and weight -m g, with R = I - 2 n n. Near the surface particles see the
  * odd part of what the nodes have, u = v_body + (u(x) - u(x'))/2, and its gradient. So a body is
  * a wall of second order wherever its surface lies, as far as particles fill the space before
- * it. Where it is too thin or too crooked for images, nodes are held: gs4i_body_hold. */
+ * it. Where it is too thin or too crooked for images, nodes are held: gs4i_collider_hold. */
 
 enum {
-    GS4I_GHOST_NONE,
-    GS4I_GHOST_IMAGE,
-    GS4I_GHOST_HELD /* no image can be had */
+    GS4I_NO_IMAGE,
+    GS4I_HAS_IMAGE,
+    GS4I_HOLDS_NODES /* no image can be had */
 };
 /* what is scattered; first of all marks */
 enum {
-    GS4I_GHOST_MARK,
-    GS4I_GHOST_MOMENTUM,
-    GS4I_GHOST_AFFINE,
-    GS4I_GHOST_FORCE
+    GS4I_IMAGE_MARKS,
+    GS4I_IMAGE_MOMENTUM,
+    GS4I_IMAGE_AFFINE,
+    GS4I_IMAGE_FORCE
 };
 
-static int gs4i_is_sticky(const gs4i_body *b)
+static int gs4i_is_sticky(const gs4i_collider *b)
 {
-    return b->is.contact == GS4_WALL_STICK && !b->is_mouth && !b->asleep;
+    return b->is.contact == GS4_WALL_STICK && !b->is_emitter && !b->asleep;
 }
 
 /* The sticky body nearest to p, if one is nearer than `within`; and how far it is. */
-static const gs4i_body *gs4i_nearest_sticky(const gs4i_boundary *b, gs4_vec3 p, gs4_real within,
-                                            gs4_real *distance)
+static const gs4i_collider *gs4i_nearest_sticky(const gs4i_boundary *b, gs4_vec3 p, gs4_real within,
+                                                gs4_real *distance)
 {
-    const gs4i_body *found = NULL;
+    const gs4i_collider *found = NULL;
     int i;
-    for (i = 0; i < b->body_count; i++) {
+    for (i = 0; i < b->collider_count; i++) {
         const gs4_real d =
-            gs4i_is_sticky(&b->bodies[i]) ? gs4i_body_distance(&b->bodies[i], p) : within;
+            gs4i_is_sticky(&b->colliders[i]) ? gs4i_collider_distance(&b->colliders[i], p) : within;
         if (d < within) {
             *distance = within = d;
-            found = &b->bodies[i];
+            found = &b->colliders[i];
         }
     }
     return found;
@@ -8915,7 +8961,7 @@ static int gs4i_slot_of(const gs4i_grid *g, const gs4_real p[3])
 /* A flat surface near a block: all of the sticky bodies that its particles are near. */
 /* distance d at the midst of the block; body NULL: none */
 typedef struct gs4i_face {
-    const gs4i_body *body;
+    const gs4i_collider *collider;
     gs4_vec3 at, n;
     gs4_real d;
 } gs4i_face;
@@ -8925,58 +8971,61 @@ typedef struct gs4i_face {
 
 static gs4i_face gs4i_find_face(const gs4_sim *sim, int o)
 {
-    const gs4_real h = sim->grid.h, reach = GS4I_BLOCK_REACH * h, deep = GS4I_GHOST_NODES * h;
+    const gs4_real h = sim->grid.h, prediction = GS4I_BLOCK_REACH * h, deep = GS4I_IMAGE_NODES * h;
     gs4i_face f;
     int i, near = 0;
-    memset(&f, 0, sizeof f); /* gs4i_place_ghost reads d and n */
+    memset(&f, 0, sizeof f); /* gs4i_place_image_particle reads d and n */
     f.at = gs4i_block_midst(&sim->grid, sim->grid.occupied_block[o]);
-    for (i = 0; i < sim->boundary.body_count; i++) {
-        const gs4i_body *b = &sim->boundary.bodies[i];
-        const gs4_real d = gs4i_is_sticky(b) ? gs4i_body_distance(b, f.at) : GS4I_HUGE;
-        if (d < reach + GS4I_GHOST_REACH * h) {
+    for (i = 0; i < sim->boundary.collider_count; i++) {
+        const gs4i_collider *b = &sim->boundary.colliders[i];
+        const gs4_real d = gs4i_is_sticky(b) ? gs4i_collider_distance(b, f.at) : GS4I_HUGE;
+        if (d < prediction + GS4I_IMAGE_REACH * h) {
             near++;
             f.d = d;
-            f.body = b;
+            f.collider = b;
         }
     }
-    if (near != 1 || !gs4i_body_is_flat(f.body, f.at, reach, deep, &f.n)) f.body = NULL;
+    if (near != 1 || !gs4i_collider_is_flat(f.collider, f.at, prediction, deep, &f.n))
+        f.collider = NULL;
     return f;
 }
 
 /* The sticky body near p, NULL if there is none, how far p is from it and its outward normal
  * there. */
-static const gs4i_body *gs4i_find_surface(const gs4_sim *sim, gs4_vec3 p, gs4_real *d, gs4_vec3 *n)
+static const gs4i_collider *gs4i_find_surface(const gs4_sim *sim, gs4_vec3 p, gs4_real *d,
+                                              gs4_vec3 *n)
 {
     const gs4_real step = GS4I_C(0.1) * sim->grid.h;
-    const gs4i_body *body =
-        gs4i_nearest_sticky(&sim->boundary, p, GS4I_GHOST_REACH * sim->grid.h, d);
-    if (!body) return NULL;
-    *n = gs4i_vec3(gs4i_body_distance(body, gs4i_vec3(p.x + step, p.y, p.z)) - *d,
-                   gs4i_body_distance(body, gs4i_vec3(p.x, p.y + step, p.z)) - *d,
-                   gs4i_body_distance(body, gs4i_vec3(p.x, p.y, p.z + step)) - *d);
+    const gs4i_collider *collider =
+        gs4i_nearest_sticky(&sim->boundary, p, GS4I_IMAGE_REACH * sim->grid.h, d);
+    if (!collider) return NULL;
+    *n = gs4i_vec3(gs4i_collider_distance(collider, gs4i_vec3(p.x + step, p.y, p.z)) - *d,
+                   gs4i_collider_distance(collider, gs4i_vec3(p.x, p.y + step, p.z)) - *d,
+                   gs4i_collider_distance(collider, gs4i_vec3(p.x, p.y, p.z + step)) - *d);
     if (!(gs4i_length(*n) > 0)) return NULL;
     *n = gs4i_scale(*n, 1 / gs4i_length(*n));
-    return body;
+    return collider;
 }
 
 /* The image of a particle at p. It can be had where the body is flat and thick enough: a point
  * as deep behind the surface, at most one and a half cells, is as deep in the body, within a
  * quarter of a cell. One that would stick out on the far side is left out. */
-static void gs4i_place_ghost(const gs4_sim *sim, gs4_vec3 p, const gs4i_face *face, gs4i_ghost *g)
+static void gs4i_place_image_particle(const gs4_sim *sim, gs4_vec3 p, const gs4i_face *face,
+                                      gs4i_image_particle *g)
 {
-    const gs4_real h = sim->grid.h, deep = GS4I_GHOST_NODES * h;
+    const gs4_real h = sim->grid.h, deep = GS4I_IMAGE_NODES * h;
     gs4_real d = face->d + gs4i_dot(face->n, gs4i_sub(p, face->at));
     gs4_vec3 n = face->n, foot, image, v;
-    const int flat = face->body && d > -deep;
-    const gs4i_body *body = !flat                      ? gs4i_find_surface(sim, p, &d, &n)
-                            : d < GS4I_GHOST_REACH * h ? face->body
-                                                       : NULL;
-    g->kind = GS4I_GHOST_NONE;
+    const int flat = face->collider && d > -deep;
+    const gs4i_collider *collider = !flat                      ? gs4i_find_surface(sim, p, &d, &n)
+                                    : d < GS4I_IMAGE_REACH * h ? face->collider
+                                                               : NULL;
+    g->kind = GS4I_NO_IMAGE;
     g->whole = 0;
-    if (!body) return;
+    if (!collider) return;
     foot = gs4i_sub(p, gs4i_scale(n, d));
     image = gs4i_sub(foot, gs4i_scale(n, d));
-    v = gs4i_body_velocity(body, foot);
+    v = gs4i_collider_velocity(collider, foot);
     g->x[0] = image.x;
     g->x[1] = image.y;
     g->x[2] = image.z;
@@ -8986,47 +9035,48 @@ static void gs4i_place_ghost(const gs4_sim *sim, gs4_vec3 p, const gs4i_face *fa
     g->v[0] = v.x;
     g->v[1] = v.y;
     g->v[2] = v.z;
-    g->spin[0] = body->is.angular_velocity.x;
-    g->spin[1] = body->is.angular_velocity.y;
-    g->spin[2] = body->is.angular_velocity.z;
-    g->share = gs4i_max(gs4i_min(GS4I_GHOST_NODES - d * sim->grid.inv_h, 1), 0);
+    g->spin[0] = collider->is.angular_velocity.x;
+    g->spin[1] = collider->is.angular_velocity.y;
+    g->spin[2] = collider->is.angular_velocity.z;
+    g->share = gs4i_max(gs4i_min(GS4I_IMAGE_NODES - d * sim->grid.inv_h, 1), 0);
     if (d > -GS4I_C(0.5) * h
         && (flat
-            || gs4i_abs(gs4i_body_distance(body, gs4i_sub(foot, gs4i_scale(n, deep))) + deep)
+            || gs4i_abs(gs4i_collider_distance(collider, gs4i_sub(foot, gs4i_scale(n, deep)))
+                        + deep)
                    < GS4I_C(0.25) * h)) {
         const gs4_real nearer[3] = { image.x + h * n.x, image.y + h * n.y, image.z + h * n.z };
         g->slot = gs4i_slot_of(&sim->grid, g->x);
         /* a tile has room for a cell around its block */
         if (g->slot < 0) g->slot = gs4i_slot_of(&sim->grid, nearer);
-        if (g->slot >= 0 && (flat || d < deep || gs4i_body_distance(body, image) < 0))
-            g->kind = GS4I_GHOST_IMAGE;
+        if (g->slot >= 0 && (flat || d < deep || gs4i_collider_distance(collider, image) < 0))
+            g->kind = GS4I_HAS_IMAGE;
         return;
     }
     /* of nodes that would be held it sees next to nothing */
-    if (d > (GS4I_STICKY_REACH + GS4I_GHOST_NODES) * h) return;
+    if (d > (GS4I_STICKY_REACH + GS4I_IMAGE_NODES) * h) return;
     g->x[0] = p.x;
     g->x[1] = p.y;
     g->x[2] = p.z;
     g->slot = gs4i_slot_of(&sim->grid, g->x);
-    if (g->slot >= 0) g->kind = GS4I_GHOST_HELD;
+    if (g->slot >= 0) g->kind = GS4I_HOLDS_NODES;
 }
 
 /* The ghosts of occupied block o, NULL where it is near no sticky body; that of its particle i
  * is the (i - first)th. */
-GS4I_INLINE gs4i_ghost *gs4i_ghosts_of(const gs4_sim *sim, int o)
+GS4I_INLINE gs4i_image_particle *gs4i_image_particles_of(const gs4_sim *sim, int o)
 {
-    const gs4i_ghosts *g = &sim->ghosts;
+    const gs4i_image_particles *g = &sim->image_particles;
     return g->count && ((const int32_t *)g->of.data)[o] >= 0
-               ? (gs4i_ghost *)g->all.data + ((const int32_t *)g->of.data)[o]
+               ? (gs4i_image_particle *)g->all.data + ((const int32_t *)g->of.data)[o]
                : NULL;
 }
 
-static void gs4i_place_ghosts(int index, void *context)
+static void gs4i_place_image_particles(int index, void *context)
 {
     gs4_sim *sim = ((const gs4i_pass *)context)->sim;
     const gs4i_particles *p = &sim->particles;
-    const gs4_real ahead = sim->rule.reach.ahead;
-    gs4i_ghost *g = gs4i_ghosts_of(sim, index);
+    const gs4_real ahead = sim->integrator.prediction.ahead;
+    gs4i_image_particle *g = gs4i_image_particles_of(sim, index);
     gs4i_face face;
     size_t i = (size_t)sim->grid.first[index], end = (size_t)sim->grid.first[index + 1];
     if (!g) return;
@@ -9036,10 +9086,10 @@ static void gs4i_place_ghosts(int index, void *context)
         gs4i_batch q;
         gs4i_lanes x[3];
         int b, c;
-        gs4i_load_batch(p, i, n, sim->rule.reach, &q);
-        gs4i_predict_positions(&q, sim->rule.reach, x);
+        gs4i_load_batch(p, i, n, sim->integrator.prediction, &q);
+        gs4i_predict_positions(&q, sim->integrator.prediction, x);
         for (b = 0; b < n; b++, g++) {
-            gs4i_place_ghost(
+            gs4i_place_image_particle(
                 sim, gs4i_vec3(GS4I_NTH(x[0], b), GS4I_NTH(x[1], b), GS4I_NTH(x[2], b)), &face, g);
             g->x[3] = GS4I_NTH(q.x[3], b);
             memset(g->carried, 0, sizeof g->carried);
@@ -9052,10 +9102,10 @@ static void gs4i_place_ghosts(int index, void *context)
 }
 
 /* Sort what has a kind by slot, stably, and the slots by colour. */
-static int gs4i_sort_ghosts(gs4_sim *sim)
+static int gs4i_sort_image_particles(gs4_sim *sim)
 {
-    gs4i_ghosts *g = &sim->ghosts;
-    const gs4i_ghost *all = (const gs4i_ghost *)g->all.data;
+    gs4i_image_particles *g = &sim->image_particles;
+    const gs4i_image_particle *all = (const gs4i_image_particle *)g->all.data;
     const int active = sim->grid.active;
     int32_t *order = (int32_t *)gs4i_scratch_reserve(&sim->memory, &g->order,
                                                      (size_t)g->count * sizeof *order, 0);
@@ -9084,16 +9134,16 @@ static int gs4i_sort_ghosts(gs4_sim *sim)
 }
 
 /* Find the images of all particles where they are at the stage. */
-static int gs4i_find_ghosts(gs4_sim *sim)
+static int gs4i_find_image_particles(gs4_sim *sim)
 {
     const gs4i_grid *grid = &sim->grid;
-    gs4i_ghosts *g = &sim->ghosts;
+    gs4i_image_particles *g = &sim->image_particles;
     gs4i_pass pass;
     int32_t *of;
     int i, o, sticky = 0;
     g->count = 0;
-    for (i = 0; i < sim->boundary.body_count; i++)
-        sticky |= gs4i_is_sticky(&sim->boundary.bodies[i]);
+    for (i = 0; i < sim->boundary.collider_count; i++)
+        sticky |= gs4i_is_sticky(&sim->boundary.colliders[i]);
     if (!sticky) return GS4_OK;
     of = (int32_t *)gs4i_scratch_reserve(&sim->memory, &g->of, (size_t)grid->occupied * sizeof *of,
                                          0);
@@ -9101,30 +9151,31 @@ static int gs4i_find_ghosts(gs4_sim *sim)
     for (o = 0; o < grid->occupied; o++) {
         gs4_real d;
         of[o] = gs4i_nearest_sticky(&sim->boundary, gs4i_block_midst(grid, grid->occupied_block[o]),
-                                    (GS4I_BLOCK_REACH + GS4I_GHOST_REACH) * grid->h, &d)
+                                    (GS4I_BLOCK_REACH + GS4I_IMAGE_REACH) * grid->h, &d)
                     ? g->count
                     : -1;
         if (of[o] >= 0) g->count += grid->first[o + 1] - grid->first[o];
     }
     if (!g->count) return GS4_OK;
-    if (!gs4i_scratch_reserve(&sim->memory, &g->all, (size_t)g->count * sizeof(gs4i_ghost), 0)) {
+    if (!gs4i_scratch_reserve(&sim->memory, &g->all, (size_t)g->count * sizeof(gs4i_image_particle),
+                              0)) {
         g->count = 0;
         return gs4i_fail_memory(sim);
     }
     memset(&pass, 0, sizeof pass);
     pass.sim = sim;
-    gs4i_parallel_for(&sim->tasks, grid->occupied, gs4i_place_ghosts, &pass);
-    return gs4i_sort_ghosts(sim);
+    gs4i_parallel_for(&sim->tasks, grid->occupied, gs4i_place_image_particles, &pass);
+    return gs4i_sort_image_particles(sim);
 }
 
 /* Where the nodes of the 27 blocks around a slot are, negative where there are none; and its
  * frame. */
-typedef struct gs4i_ghost_tile {
+typedef struct gs4i_sticky_tile {
     ptrdiff_t at[27];
     gs4i_frame frame;
-} gs4i_ghost_tile;
+} gs4i_sticky_tile;
 
-static void gs4i_ghost_tile_of(const gs4i_grid *g, int slot, gs4i_ghost_tile *t)
+static void gs4i_sticky_tile_of(const gs4i_grid *g, int slot, gs4i_sticky_tile *t)
 {
     int at[3], i;
     gs4i_block_coordinates(g, g->block[slot], at);
@@ -9139,15 +9190,16 @@ static void gs4i_ghost_tile_of(const gs4i_grid *g, int slot, gs4i_ghost_tile *t)
 }
 
 /* Where node (x, y, z) of a tile is, negative where it does not exist. */
-GS4I_INLINE ptrdiff_t gs4i_ghost_node(const gs4i_ghost_tile *t, int x, int y, int z)
+GS4I_INLINE ptrdiff_t gs4i_sticky_tile_node(const gs4i_sticky_tile *t, int x, int y, int z)
 {
     const ptrdiff_t at = t->at[(((z + 2) >> 2) * 3 + ((y + 2) >> 2)) * 3 + ((x + 2) >> 2)];
     return at < 0 ? -1 : at + 4 * ((((z + 2) & 3) << 4) | (((y + 2) & 3) << 2) | ((x + 2) & 3));
 }
 
 /* The next n ghosts of a slot and their weights. */
-static void gs4i_load_ghosts(gs4i_ghost *all, const int32_t *order, int n, const gs4i_ghost_tile *t,
-                             gs4i_ghost *g[GS4I_BATCH], gs4i_stencils *s)
+static void gs4i_load_image_particles(gs4i_image_particle *all, const int32_t *order, int n,
+                                      const gs4i_sticky_tile *t, gs4i_image_particle *g[GS4I_BATCH],
+                                      gs4i_stencils *s)
 {
     gs4_real four[4 * GS4I_BATCH];
     gs4i_lanes x[4];
@@ -9161,38 +9213,38 @@ static void gs4i_load_ghosts(gs4i_ghost *all, const int32_t *order, int n, const
 }
 
 /* Mark the nodes that a particle reaches which has no image. */
-static void gs4i_mark_unimaged(const gs4i_grid *grid, const gs4i_ghost_tile *t, int base)
+static void gs4i_mark_unimaged(const gs4i_grid *grid, const gs4i_sticky_tile *t, int base)
 {
     int i;
     for (i = 0; i < 27; i++) {
-        const ptrdiff_t at =
-            gs4i_ghost_node(t, base % GS4I_TILE + i % 3, base / GS4I_TILE % GS4I_TILE + i / 3 % 3,
-                            base / (GS4I_TILE * GS4I_TILE) + i / 9);
+        const ptrdiff_t at = gs4i_sticky_tile_node(t, base % GS4I_TILE + i % 3,
+                                                   base / GS4I_TILE % GS4I_TILE + i / 3 % 3,
+                                                   base / (GS4I_TILE * GS4I_TILE) + i / 9);
         if (at >= 0 && grid->jump_of[at / GS4I_NODE_REALS])
             *gs4i_contact_at(grid, (uint32_t)(at / 4)) |= GS4I_UNIMAGED;
     }
 }
 
 /* Do all nodes around a particle exist? Three in a row lie in two blocks at most. */
-static int gs4i_is_whole(const gs4i_ghost_tile *t, int base)
+static int gs4i_is_whole(const gs4i_sticky_tile *t, int base)
 {
     const int x = base % GS4I_TILE, y = base / GS4I_TILE % GS4I_TILE,
               z = base / (GS4I_TILE * GS4I_TILE);
     int i, whole = 1;
     for (i = 0; i < 8; i++)
-        whole &= gs4i_ghost_node(t, x + 2 * (i & 1), y + (i & 2), z + 2 * (i >> 2)) >= 0;
+        whole &= gs4i_sticky_tile_node(t, x + 2 * (i & 1), y + (i & 2), z + 2 * (i >> 2)) >= 0;
     return whole;
 }
 
 /* Add the tile to the nodes that exist and are not held; those that get momentum are marked. */
-static void gs4i_ghost_tile_add(const gs4i_grid *grid, const gs4i_ghost_tile *t,
-                                const gs4_real *tile, gs4_real *field)
+static void gs4i_sticky_tile_add(const gs4i_grid *grid, const gs4i_sticky_tile *t,
+                                 const gs4_real *tile, gs4_real *field)
 {
     int x, y, z, c;
     for (z = 0; z < GS4I_TILE; z++)
         for (y = 0; y < GS4I_TILE; y++)
             for (x = 0; x < GS4I_TILE; x++, tile += 4) {
-                const ptrdiff_t at = gs4i_ghost_node(t, x, y, z);
+                const ptrdiff_t at = gs4i_sticky_tile_node(t, x, y, z);
                 uint8_t *contact = at >= 0 && grid->jump_of[at / GS4I_NODE_REALS]
                                        ? gs4i_contact_at(grid, (uint32_t)(at / 4))
                                        : NULL;
@@ -9202,35 +9254,36 @@ static void gs4i_ghost_tile_add(const gs4i_grid *grid, const gs4i_ghost_tile *t,
             }
 }
 
-static void gs4i_scatter_ghosts_of(const gs4i_pass *pass, int index, int what)
+static void gs4i_scatter_image_block(const gs4i_pass *pass, int index, int what)
 {
     gs4_sim *sim = pass->sim;
     const int slot = pass->blocks[index];
-    const int32_t *first = (const int32_t *)sim->ghosts.first.data,
-                  *order = (const int32_t *)sim->ghosts.order.data;
+    const int32_t *first = (const int32_t *)sim->image_particles.first.data,
+                  *order = (const int32_t *)sim->image_particles.order.data;
     gs4_real tile[GS4I_TILE_REALS];
-    gs4i_ghost_tile t;
+    gs4i_sticky_tile t;
     int k, b, c;
-    gs4i_ghost_tile_of(&sim->grid, slot, &t);
+    gs4i_sticky_tile_of(&sim->grid, slot, &t);
     memset(tile, 0, sizeof tile);
     for (k = first[slot]; k < first[slot + 1]; k += GS4I_BATCH) {
         const int n = first[slot + 1] - k < GS4I_BATCH ? first[slot + 1] - k : GS4I_BATCH;
-        gs4i_ghost *g[GS4I_BATCH];
+        gs4i_image_particle *g[GS4I_BATCH];
         gs4i_stencils s;
         gs4i_forces f;
         gs4i_affine_forces m;
-        gs4i_load_ghosts((gs4i_ghost *)sim->ghosts.all.data, order + k, n, &t, g, &s);
+        gs4i_load_image_particles((gs4i_image_particle *)sim->image_particles.all.data, order + k,
+                                  n, &t, g, &s);
         for (b = 0; b < n; b++) {
             gs4_real(*from)[4] = g[b]->carried;
             const size_t four = 4 * sizeof *tile;
             if (s.base[b] < 0) continue;
-            if (what == GS4I_GHOST_MARK && g[b]->kind == GS4I_GHOST_HELD)
+            if (what == GS4I_IMAGE_MARKS && g[b]->kind == GS4I_HOLDS_NODES)
                 gs4i_mark_unimaged(&sim->grid, &t, s.base[b]);
-            if (what == GS4I_GHOST_MARK) g[b]->whole = gs4i_is_whole(&t, s.base[b]);
-            if (what == GS4I_GHOST_MARK || g[b]->kind == GS4I_GHOST_HELD) continue;
-            if (what == GS4I_GHOST_MOMENTUM)
+            if (what == GS4I_IMAGE_MARKS) g[b]->whole = gs4i_is_whole(&t, s.base[b]);
+            if (what == GS4I_IMAGE_MARKS || g[b]->kind == GS4I_HOLDS_NODES) continue;
+            if (what == GS4I_IMAGE_MOMENTUM)
                 gs4i_scatter_quad(tile, &s, b, from[0]);
-            else if (what == GS4I_GHOST_FORCE) {
+            else if (what == GS4I_IMAGE_FORCE) {
                 memcpy(f.x + 4 * b, from[0], four);
                 memcpy(f.y + 4 * b, from[1], four);
                 memcpy(f.z + 4 * b, from[2], four);
@@ -9249,37 +9302,37 @@ static void gs4i_scatter_ghosts_of(const gs4i_pass *pass, int index, int what)
             }
         }
     }
-    if (what != GS4I_GHOST_MARK)
-        gs4i_ghost_tile_add(&sim->grid, &t, tile,
-                            what == GS4I_GHOST_FORCE ? sim->grid.force : sim->grid.momentum);
+    if (what != GS4I_IMAGE_MARKS)
+        gs4i_sticky_tile_add(&sim->grid, &t, tile,
+                             what == GS4I_IMAGE_FORCE ? sim->grid.force : sim->grid.momentum);
 }
 
-static void gs4i_mark_ghosts(int index, void *context)
+static void gs4i_mark_image_nodes(int index, void *context)
 {
-    gs4i_scatter_ghosts_of((const gs4i_pass *)context, index, GS4I_GHOST_MARK);
+    gs4i_scatter_image_block((const gs4i_pass *)context, index, GS4I_IMAGE_MARKS);
 }
-static void gs4i_scatter_ghost_momentum(int index, void *context)
+static void gs4i_scatter_image_momentum(int index, void *context)
 {
-    gs4i_scatter_ghosts_of((const gs4i_pass *)context, index, GS4I_GHOST_MOMENTUM);
+    gs4i_scatter_image_block((const gs4i_pass *)context, index, GS4I_IMAGE_MOMENTUM);
 }
-static void gs4i_scatter_ghost_affine(int index, void *context)
+static void gs4i_scatter_image_affine(int index, void *context)
 {
-    gs4i_scatter_ghosts_of((const gs4i_pass *)context, index, GS4I_GHOST_AFFINE);
+    gs4i_scatter_image_block((const gs4i_pass *)context, index, GS4I_IMAGE_AFFINE);
 }
-static void gs4i_scatter_ghost_force(int index, void *context)
+static void gs4i_scatter_image_force(int index, void *context)
 {
-    gs4i_scatter_ghosts_of((const gs4i_pass *)context, index, GS4I_GHOST_FORCE);
+    gs4i_scatter_image_block((const gs4i_pass *)context, index, GS4I_IMAGE_FORCE);
 }
 
-static void gs4i_scatter_ghosts(gs4_sim *sim, gs4_task_fn kernel)
+static void gs4i_scatter_image_particles(gs4_sim *sim, gs4_task_fn kernel)
 {
-    if (sim->ghosts.count)
-        gs4i_scatter_by_colour(sim, (const int32_t *)sim->ghosts.slots.data,
-                               sim->ghosts.colour_first, kernel);
+    if (sim->image_particles.count)
+        gs4i_scatter_by_colour(sim, (const int32_t *)sim->image_particles.slots.data,
+                               sim->image_particles.colour_first, kernel);
 }
 
 /* What nodes give to particle n beside velocity; a batch with solids wants its gradient too. */
-GS4I_INLINE void gs4i_gather_kick(int solids, const gs4_real *at, const gs4i_stencils *s, int n,
+GS4I_INLINE void gs4i_gather_rate(int solids, const gs4_real *at, const gs4i_stencils *s, int n,
                                   const gs4i_row *w, const gs4i_row *d, gs4i_gathered *g)
 {
     if (solids)
@@ -9289,36 +9342,37 @@ GS4I_INLINE void gs4i_gather_kick(int solids, const gs4_real *at, const gs4i_ste
 }
 
 /* What the nodes have of a field at the images, velocity (what 0) or acceleration (1). */
-static void gs4i_gather_ghosts_of(const gs4i_pass *pass, int index, int what)
+static void gs4i_gather_image_block(const gs4i_pass *pass, int index, int what)
 {
     gs4_sim *sim = pass->sim;
     const int slot = pass->blocks[index];
-    const int32_t *first = (const int32_t *)sim->ghosts.first.data,
-                  *order = (const int32_t *)sim->ghosts.order.data;
+    const int32_t *first = (const int32_t *)sim->image_particles.first.data,
+                  *order = (const int32_t *)sim->image_particles.order.data;
     const gs4_real *field = what ? sim->grid.force : gs4i_seen_nodes(&sim->grid);
     gs4_real tile[GS4I_TILE_REALS], *to = tile;
-    gs4i_ghost_tile t;
+    gs4i_sticky_tile t;
     int x, y, z, k, b, c;
-    gs4i_ghost_tile_of(&sim->grid, slot, &t);
+    gs4i_sticky_tile_of(&sim->grid, slot, &t);
     for (z = 0; z < GS4I_TILE; z++)
         for (y = 0; y < GS4I_TILE; y++)
             for (x = 0; x < GS4I_TILE; x++, to += 4) {
-                const ptrdiff_t at = gs4i_ghost_node(&t, x, y, z);
+                const ptrdiff_t at = gs4i_sticky_tile_node(&t, x, y, z);
                 for (c = 0; c < 4; c++) to[c] = at < 0 ? 0 : field[at + c];
             }
     memset(to, 0, 16 * sizeof *to);
     for (k = first[slot]; k < first[slot + 1]; k += GS4I_BATCH) {
         const int n = first[slot + 1] - k < GS4I_BATCH ? first[slot + 1] - k : GS4I_BATCH;
-        gs4i_ghost *g[GS4I_BATCH];
+        gs4i_image_particle *g[GS4I_BATCH];
         gs4i_stencils s;
         gs4i_gathered u;
-        gs4i_load_ghosts((gs4i_ghost *)sim->ghosts.all.data, order + k, n, &t, g, &s);
+        gs4i_load_image_particles((gs4i_image_particle *)sim->image_particles.all.data, order + k,
+                                  n, &t, g, &s);
         for (b = 0; b < n; b++) {
             gs4i_row w, d;
             if (s.base[b] < 0 || !g[b]->whole || !(g[b]->share > 0)) continue;
             gs4i_x_weights(&s, b, &w, &d);
             if (what)
-                gs4i_gather_kick(sim->particles.deformation_reals, tile + 4 * s.base[b], &s, b, &w,
+                gs4i_gather_rate(sim->particles.deformation_reals, tile + 4 * s.base[b], &s, b, &w,
                                  &d, &u);
             else
                 gs4i_gather_local(tile + 4 * s.base[b], &s, b, &w, &d, &u);
@@ -9331,27 +9385,27 @@ static void gs4i_gather_ghosts_of(const gs4i_pass *pass, int index, int what)
     }
 }
 
-static void gs4i_gather_ghost_velocity(int index, void *context)
+static void gs4i_gather_image_velocity(int index, void *context)
 {
-    gs4i_gather_ghosts_of((const gs4i_pass *)context, index, 0);
+    gs4i_gather_image_block((const gs4i_pass *)context, index, 0);
 }
-static void gs4i_gather_ghost_acceleration(int index, void *context)
+static void gs4i_gather_image_acceleration(int index, void *context)
 {
-    gs4i_gather_ghosts_of((const gs4i_pass *)context, index, 1);
+    gs4i_gather_image_block((const gs4i_pass *)context, index, 1);
 }
 
-static void gs4i_gather_ghosts(gs4_sim *sim, gs4_task_fn kernel)
+static void gs4i_gather_image_particles(gs4_sim *sim, gs4_task_fn kernel)
 {
     gs4i_pass pass;
-    if (!sim->ghosts.count) return;
+    if (!sim->image_particles.count) return;
     pass.sim = sim;
-    pass.blocks = (const int32_t *)sim->ghosts.slots.data;
-    pass.count = sim->ghosts.colour_first[8];
+    pass.blocks = (const int32_t *)sim->image_particles.slots.data;
+    pass.count = sim->image_particles.colour_first[8];
     gs4i_parallel_for(&sim->tasks, pass.count, kernel, &pass);
 }
 
 /* Columns of spin x (I - n n), how the body's velocity changes along its surface. */
-GS4I_INLINE void gs4i_ghost_turn(const gs4i_ghost *g, gs4_real turn[3][3])
+GS4I_INLINE void gs4i_surface_spin(const gs4i_image_particle *g, gs4_real turn[3][3])
 {
     const gs4_real *w = g->spin, *n = g->n;
     const gs4_real columns[3][3] = { { 0, w[2], -w[1] }, { -w[2], 0, w[0] }, { w[1], -w[0], 0 } };
@@ -9363,14 +9417,14 @@ GS4I_INLINE void gs4i_ghost_turn(const gs4i_ghost *g, gs4_real turn[3][3])
 }
 
 /* Has a particle an odd part to take? */
-GS4I_INLINE int gs4i_is_odd(const gs4i_ghost *g)
+GS4I_INLINE int gs4i_is_odd(const gs4i_image_particle *g)
 {
-    return g->kind == GS4I_GHOST_IMAGE && g->whole && g->share > 0;
+    return g->kind == GS4I_HAS_IMAGE && g->whole && g->share > 0;
 }
 
 /* Replace the values that n particles gathered by their part that is odd about the surface, of
  * velocities (what 0) about the body's, by their shares: u = (u(x) - u(x'))/2 + v */
-static void gs4i_make_value_odd(const gs4i_ghost *g, int n, int what, gs4i_gathered *u)
+static void gs4i_make_value_odd(const gs4i_image_particle *g, int n, int what, gs4i_gathered *u)
 {
     int b, c;
     for (b = 0; b < n; b++, g++)
@@ -9381,7 +9435,7 @@ static void gs4i_make_value_odd(const gs4i_ghost *g, int n, int what, gs4i_gathe
 }
 
 /* The same of gradients: grad u = (grad u(x) - grad u(x') R)/2 + spin x (I - n n). */
-static void gs4i_make_gradient_odd(const gs4i_ghost *g, int n, int what, gs4i_gathered *u)
+static void gs4i_make_gradient_odd(const gs4i_image_particle *g, int n, int what, gs4i_gathered *u)
 {
     int b, c, a;
     for (b = 0; b < n; b++, g++) {
@@ -9390,7 +9444,7 @@ static void gs4i_make_gradient_odd(const gs4i_ghost *g, int n, int what, gs4i_ga
         column[0] = u->dx + 4 * b;
         column[1] = u->dy + 4 * b;
         column[2] = u->dz + 4 * b;
-        if (!what) gs4i_ghost_turn(g, turn);
+        if (!what) gs4i_surface_spin(g, turn);
         for (c = 0; c < 3; c++)
             across[c] = g->seen[what][1][c] * g->n[0] + g->seen[what][2][c] * g->n[1]
                         + g->seen[what][3][c] * g->n[2];
@@ -9403,18 +9457,18 @@ static void gs4i_make_gradient_odd(const gs4i_ghost *g, int n, int what, gs4i_ga
 }
 
 /* Both, of velocities. */
-static void gs4i_make_odd(const gs4i_ghost *g, int n, gs4i_gathered *u)
+static void gs4i_make_odd(const gs4i_image_particle *g, int n, gs4i_gathered *u)
 {
     gs4i_make_value_odd(g, n, 0, u);
     gs4i_make_gradient_odd(g, n, 0, u);
 }
 
 /* Is what the images of block o see of velocity no cause for alarm? Of a reflection of L the
- * trace is at most sum |L_ij|. See gs4i_is_calm. */
-static int gs4i_ghosts_are_calm(const gs4_sim *sim, int o)
+ * trace is at most sum |L_ij|. See gs4i_is_safe. */
+static int gs4i_images_are_safe(const gs4_sim *sim, int o)
 {
-    const gs4i_ghost *g = gs4i_ghosts_of(sim, o),
-                     *end = g ? g + (sim->grid.first[o + 1] - sim->grid.first[o]) : g;
+    const gs4i_image_particle *g = gs4i_image_particles_of(sim, o),
+                              *end = g ? g + (sim->grid.first[o + 1] - sim->grid.first[o]) : g;
     for (; g < end; g++) {
         gs4_real moved = 0, all = 0;
         int a, c;
@@ -9423,14 +9477,15 @@ static int gs4i_ghosts_are_calm(const gs4_sim *sim, int o)
             moved += gs4i_abs(g->seen[0][0][c]) + 2 * gs4i_abs(g->v[c]);
             for (a = 1; a < 4; a++) all += gs4i_abs(g->seen[0][a][c]);
         }
-        if (!(moved * sim->rule.dt < sim->grid.h && all * sim->rule.dt < GS4I_C(0.2))) return 0;
+        if (!(moved * sim->integrator.dt < sim->grid.h && all * sim->integrator.dt < GS4I_C(0.2)))
+            return 0;
     }
     return 1;
 }
 
 /* -A R, of the columns x, y, z of n particles, for their images. */
-static void gs4i_reflect_columns(gs4i_ghost *g, int n, const gs4_real *x, const gs4_real *y,
-                                 const gs4_real *z, int to)
+static void gs4i_reflect_columns(gs4i_image_particle *g, int n, const gs4_real *x,
+                                 const gs4_real *y, const gs4_real *z, int to)
 {
     int b, c;
     for (b = 0; b < n; b++, g++)
@@ -9444,7 +9499,7 @@ static void gs4i_reflect_columns(gs4i_ghost *g, int n, const gs4_real *x, const 
 }
 
 /* Forces of the images of n particles. */
-static void gs4i_reflect_forces(gs4i_ghost *g, int n, const gs4i_forces *f)
+static void gs4i_reflect_forces(gs4i_image_particle *g, int n, const gs4i_forces *f)
 {
     int b, c;
     gs4i_reflect_columns(g, n, f->x, f->y, f->z, 0);
@@ -9456,14 +9511,14 @@ static void gs4i_reflect_forces(gs4i_ghost *g, int n, const gs4i_forces *f)
 
 /* Affine momentum of the images of n particles: 2 m v - P(x), and its change from node to node,
  * that of 2 m v along the surface included. */
-static void gs4i_reflect_affine(gs4i_ghost *g, int n, const gs4i_stencils *s,
+static void gs4i_reflect_affine(gs4i_image_particle *g, int n, const gs4i_stencils *s,
                                 const gs4i_affine_forces *f, gs4_real h)
 {
     int b, c, a;
     gs4i_reflect_columns(g, n, f->x, f->y, f->z, 1);
     for (b = 0; b < n; b++, g++) {
         gs4_real turn[3][3];
-        gs4i_ghost_turn(g, turn);
+        gs4i_surface_spin(g, turn);
         for (c = 0; c < 3; c++) {
             const gs4_real at_x = f->middle[4 * b + c]
                                   + f->x[4 * b + c] * GS4I_NTH_CONST(s->xi[0], b)
@@ -9475,7 +9530,7 @@ static void gs4i_reflect_affine(gs4i_ghost *g, int n, const gs4i_stencils *s,
     }
 }
 
-static void gs4i_free_ghosts(gs4i_memory *m, gs4i_ghosts *g)
+static void gs4i_free_image_particles(gs4i_memory *m, gs4i_image_particles *g)
 {
     gs4i_scratch *const parts[5] = { &g->all, &g->of, &g->order, &g->first, &g->slots };
     int i;
@@ -9483,87 +9538,90 @@ static void gs4i_free_ghosts(gs4i_memory *m, gs4i_ghosts *g)
     memset(g, 0, sizeof *g);
 }
 
-static void gs4i_clear_warmth(const gs4_sim *sim, gs4i_warmth *w)
+static void gs4i_clear_heat_pass(const gs4_sim *sim, gs4i_heat_pass *w)
 {
-    memset(&w->laws, 0, sizeof w->laws);
-    w->rule = &sim->warm;
-    memset(w->content, 0, sizeof w->content);
-    memset(w->source, 0, sizeof w->source);
+    memset(&w->constants, 0, sizeof w->constants);
+    w->integrator = &sim->heat_integrator;
+    memset(w->nodes, 0, sizeof w->nodes);
+    memset(w->sources, 0, sizeof w->sources);
 }
 
 /* What the particles of a batch give to the tiles of heat. */
-GS4I_INLINE void gs4i_scatter_warmth(const gs4_sim *sim, gs4i_warmth *w, const gs4i_stencils *s,
-                                     int n)
+GS4I_INLINE void gs4i_scatter_heat(const gs4_sim *sim, gs4i_heat_pass *w, const gs4i_stencils *s,
+                                   int n)
 {
     int b;
     for (b = 0; b < n; b++)
         if (s->base[b] >= 0) {
-            gs4i_scatter_quad(w->content, s, b, w->sent.content + 4 * b);
-            if (!sim->conduction.source) continue;
+            gs4i_scatter_quad(w->nodes, s, b, w->sent.nodes + 4 * b);
+            if (!sim->conduction.heat_sources) continue;
             if (sim->particles.with_flux)
-                gs4i_scatter_force(w->source, s, b, &w->sent.source);
+                gs4i_scatter_force(w->sources, s, b, &w->sent.sources);
             else
-                gs4i_scatter_quad(w->source, s, b, w->sent.source.weight + 4 * b);
+                gs4i_scatter_quad(w->sources, s, b, w->sent.sources.weight + 4 * b);
         }
 }
 
-static void gs4i_add_warmth(const gs4_sim *sim, int o, const gs4i_warmth *w)
+static void gs4i_add_heat(const gs4_sim *sim, int o, const gs4i_heat_pass *w)
 {
-    gs4i_tile_add(&sim->grid, o, sim->reports[o].rows, w->content, sim->conduction.content);
-    if (sim->conduction.source)
-        gs4i_tile_add(&sim->grid, o, sim->reports[o].rows, w->source, sim->conduction.source);
+    gs4i_tile_add(&sim->grid, o, sim->reports[o].rows, w->nodes, sim->conduction.heat_nodes);
+    if (sim->conduction.heat_sources)
+        gs4i_tile_add(&sim->grid, o, sim->reports[o].rows, w->sources,
+                      sim->conduction.heat_sources);
 }
 
-GS4I_INLINE void gs4i_prefetch_hidden(const gs4i_particles *p, size_t i)
+GS4I_INLINE void gs4i_prefetch_subgrid(const gs4i_particles *p, size_t i)
 {
     int b;
     for (b = 0; b < 4 * GS4I_BATCH && i < (size_t)p->count; b += 16)
-        GS4I_PREFETCH(p->hidden + 4 * i + b);
+        GS4I_PREFETCH(p->subgrid + 4 * i + b);
 }
 
 /* V - v~ of n particles, of which V = sum w v_i was gathered. Their momenta sum up to none. */
-GS4I_INLINE void gs4i_store_hidden(const gs4i_particles *p, size_t i, int n, gs4i_reach reach,
-                                   const gs4i_batch *q, const gs4_real *V)
+GS4I_INLINE void gs4i_store_subgrid(const gs4i_particles *p, size_t i, int n,
+                                    gs4i_prediction prediction, const gs4i_batch *q,
+                                    const gs4_real *V)
 {
     gs4_real out[4 * GS4I_BATCH];
-    gs4i_lanes hidden[4];
+    gs4i_lanes subgrid[4];
     int b, c;
-    gs4i_to_lanes(V, n, hidden);
+    gs4i_to_lanes(V, n, subgrid);
     for (c = 0; c < 3; c++)
-        GS4I_BATCH_LOOP(b) hidden[c][b] -= q->v[c][b] + reach.ahead * q->a[c][b];
-    gs4i_from_lanes(hidden[0], hidden[1], hidden[2], hidden[3], out);
-    gs4i_prefetch_hidden(p, i + 4 * GS4I_BATCH);
-    memcpy(p->hidden + 4 * i, out, 4 * (size_t)n * sizeof *out);
+        GS4I_BATCH_LOOP(b) subgrid[c][b] -= q->v[c][b] + prediction.ahead * q->a[c][b];
+    gs4i_from_lanes(subgrid[0], subgrid[1], subgrid[2], subgrid[3], out);
+    gs4i_prefetch_subgrid(p, i + 4 * GS4I_BATCH);
+    memcpy(p->subgrid + 4 * i, out, 4 * (size_t)n * sizeof *out);
 }
 
 /* S4 and S5: L~ = sum v_i (x) grad w, J~ and stress there, and f_i = - sum V sigma grad w + sum
  * w m g. */
-static void gs4i_scatter_stage(const gs4i_pass *pass, int index, gs4i_warmth *warmth)
+static void gs4i_scatter_stage(const gs4i_pass *pass, int index, gs4i_heat_pass *heat)
 {
     gs4_sim *sim = pass->sim;
     const gs4i_particles p = sim->particles;
-    const gs4i_rule rule = sim->rule;
+    const gs4i_integrator integrator = sim->integrator;
     const int o = pass->blocks[index],
               next = pass->blocks[index + 1 < pass->count ? index + 1 : index];
     const gs4i_frame frame = gs4i_tile_frame(&sim->grid, sim->grid.occupied_block[o]);
-    /* then nodes weigh what is on them, see gs4i_sharpen_forces */
-    const int sharp = sim->grid.with_sharp;
-    const gs4_real gravity[3] = { sharp ? 0 : sim->desc.gravity.x, sharp ? 0 : sim->desc.gravity.y,
-                                  sharp ? 0 : sim->desc.gravity.z };
+    /* then nodes weigh what is on them, see gs4i_deconvolve_forces */
+    const int deconvolved = sim->grid.with_deconvolution;
+    const gs4_real gravity[3] = { deconvolved ? 0 : sim->desc.gravity.x,
+                                  deconvolved ? 0 : sim->desc.gravity.y,
+                                  deconvolved ? 0 : sim->desc.gravity.z };
     gs4i_report *report = &sim->reports[o];
-    gs4i_batch_laws laws;
-    gs4i_history_laws past;
+    gs4i_batch_constants constants;
+    gs4i_history_constants past;
     gs4i_seen seen;
     gs4_real nodes[GS4I_TILE_REALS], plain[GS4I_TILE_REALS], tile[GS4I_TILE_REALS];
-    gs4i_ghost *ghosts = gs4i_ghosts_of(sim, o);
+    gs4i_image_particle *image_particles = gs4i_image_particles_of(sim, o);
     int row = 0;
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
     gs4i_tile_load(&sim->grid, o, report->rows, gs4i_seen_nodes(&sim->grid), nodes);
-    if (sharp && p.with_fading)
+    if (deconvolved && p.with_subgrid)
         gs4i_tile_load(&sim->grid, o, report->rows, sim->grid.momentum, plain);
     memset(tile, 0, sizeof tile);
-    if (warmth) gs4i_clear_warmth(sim, warmth);
-    memset(&laws, 0, sizeof laws);
+    if (heat) gs4i_clear_heat_pass(sim, heat);
+    memset(&constants, 0, sizeof constants);
     memset(&past, 0, sizeof past);
     gs4i_see_nothing(&seen);
     for (; i < end; i += GS4I_BATCH, row += 2) {
@@ -9577,33 +9635,34 @@ static void gs4i_scatter_stage(const gs4i_pass *pass, int index, gs4i_warmth *wa
         int b;
         gs4i_tile_prefetch(&sim->grid, next, row, gs4i_seen_nodes(&sim->grid));
         gs4i_tile_prefetch(&sim->grid, o, row, sim->grid.force);
-        gs4i_stage_batch(&p, i, n, rule.reach, &frame, &q, &s);
+        gs4i_stage_batch(&p, i, n, integrator.prediction, &frame, &q, &s);
         for (b = 0; b < n; b++) {
             gs4i_row w, d;
             gs4i_x_weights(&s, b, &w, &d);
             gs4i_gather_local(nodes + 4 * s.base[b], &s, b, &w, &d, &v);
-            if (sharp && p.with_fading)
+            if (deconvolved && p.with_subgrid)
                 gs4i_gather_value(plain + 4 * s.base[b], &s, b, &w, v.value);
         }
-        if (ghosts) gs4i_make_odd(ghosts, n, &v);
-        if (p.with_fading) gs4i_store_hidden(&p, i, n, rule.reach, &q, v.value);
+        if (image_particles) gs4i_make_odd(image_particles, n, &v);
+        if (p.with_subgrid) gs4i_store_subgrid(&p, i, n, integrator.prediction, &q, v.value);
         gs4i_gradient_lanes(v.dx, v.dy, v.dz, n, L);
-        gs4i_take_laws(sim->laws, sim->frozen, &p, i, n, &laws);
-        if (warmth) gs4i_begin_warmth(&p, i, n, sim->warm.reach.ahead, &laws, warmth);
-        gs4i_stage_forces(&p, i, n, &q, &laws, &past, &rule, L, gravity, sharp, &f, J, mu, &seen,
-                          report, warmth);
-        gs4i_see_liquids(&seen, &laws, J, mu);
+        gs4i_load_constants(sim->constants, sim->solid_phase, &p, i, n, &constants);
+        if (heat)
+            gs4i_begin_heat_pass(&p, i, n, sim->heat_integrator.prediction.ahead, &constants, heat);
+        gs4i_stage_forces(&p, i, n, &q, &constants, &past, &integrator, L, gravity, deconvolved, &f,
+                          J, mu, &seen, report, heat);
+        gs4i_see_liquids(&seen, &constants, J, mu);
         gs4i_check_liquids(report, J, mu, p.id + i, n);
         for (b = 0; b < n; b++) gs4i_scatter_force(tile, &s, b, &f);
-        if (ghosts) {
-            gs4i_reflect_forces(ghosts, n, &f);
-            ghosts += n;
+        if (image_particles) {
+            gs4i_reflect_forces(image_particles, n, &f);
+            image_particles += n;
         }
-        if (warmth) gs4i_scatter_warmth(sim, warmth, &s, n);
+        if (heat) gs4i_scatter_heat(sim, heat, &s, n);
     }
     gs4i_report_liquids(report, &seen);
     gs4i_tile_add(&sim->grid, o, report->rows, tile, sim->grid.force);
-    if (warmth) gs4i_add_warmth(sim, o, warmth);
+    if (heat) gs4i_add_heat(sim, o, heat);
 }
 
 static void gs4i_scatter_forces(int index, void *context)
@@ -9612,8 +9671,8 @@ static void gs4i_scatter_forces(int index, void *context)
 }
 static void gs4i_scatter_forces_and_heat(int index, void *context)
 {
-    gs4i_warmth warmth;
-    gs4i_scatter_stage((const gs4i_pass *)context, index, &warmth);
+    gs4i_heat_pass heat;
+    gs4i_scatter_stage((const gs4i_pass *)context, index, &heat);
 }
 
 /* --- S7 --------------------------------------------------------------------------------------- */
@@ -9654,18 +9713,18 @@ static int gs4i_at_edge(const gs4i_grid *g, int o)
  * %, smoothly to 0 at 20 %. What it does not see of such spray would swing ever more (nodes this
  * light take no part in the corrected gradient), so there it fades at the rate c0 / h; so it
  * does at walls, by the weight of the images. Both are rates: dt does not matter. */
-GS4I_INLINE void gs4i_unseen(const gs4i_wide *filled, gs4i_wide *unseen)
+GS4I_INLINE void gs4i_decay_weight(const gs4i_wide *filled, gs4i_wide *weight)
 {
     const gs4i_wide zero = *filled - *filled, one = zero + GS4I_C(1);
     gs4i_wide t = (*filled - GS4I_C(0.08)) * GS4I_C(1 / 0.12);
     GS4I_WIDE_MIN(t, t, one);
     GS4I_WIDE_MAX(t, t, zero);
-    *unseen = one - t * t * (GS4I_C(3) - GS4I_C(2) * t);
+    *weight = one - t * t * (GS4I_C(3) - GS4I_C(2) * t);
 }
 
 /* What nodes and contact say to a batch in S7. */
 typedef struct gs4i_corrections {
-    gs4i_lanes U[4] /* and mass there */, A[4], jump[4] /* and the share of images */, hidden[4];
+    gs4i_lanes U[4] /* and mass there */, A[4], jump[4] /* and the share of images */, subgrid[4];
     gs4i_gradient L;
 } gs4i_corrections;
 
@@ -9673,36 +9732,36 @@ typedef struct gs4i_corrections {
  * 1/flip_decay_time, in spray and at walls v - U faster, implicit in itself; J by 2021 (57),
  * implicit in J for known div u; position by rule 1 with the grid's velocity U. In: move is
  * dx/dt; out: what the new dx/dt lags behind v - shift a. */
-GS4I_INLINE void gs4i_correct_batch(gs4i_rule r, const gs4i_corrections *k, gs4i_batch *q)
+GS4I_INLINE void gs4i_correct_batch(gs4i_integrator r, const gs4i_corrections *k, gs4i_batch *q)
 {
     gs4i_lanes decay, damped;
     int b, c;
     GS4I_BATCH_LOOP(b) {
-        const gs4i_wide filled = k->U[3][b] * r.inv_full;
-        gs4i_wide unseen;
-        gs4i_unseen(&filled, &unseen);
-        decay[b] = (unseen + k->jump[3][b]) * r.fast_decay;
+        const gs4i_wide filled = k->U[3][b] * r.inv_node_mass;
+        gs4i_wide weight;
+        gs4i_decay_weight(&filled, &weight);
+        decay[b] = (weight + k->jump[3][b]) * r.fast_decay;
         damped[b] = GS4I_C(1) / (GS4I_C(1) + r.s * decay[b]);
     }
     for (c = 0; c < 3; c++)
         GS4I_BATCH_LOOP(b) {
             const gs4i_wide v = q->v[c][b], a = q->a[c][b], move = q->move[c][b] + k->jump[c][b];
-            const gs4i_wide stage_a = (k->A[c][b] + r.fade * k->hidden[c][b]
+            const gs4i_wide stage_a = (k->A[c][b] + r.stable_decay * k->subgrid[c][b]
                                        + decay[b] * (k->U[c][b] - (v + r.before * a)))
                                       * damped[b];
             const gs4i_wide da = (stage_a - a) * r.inv_alpha_m,
                             change = (k->U[c][b] - move) * r.inv_alpha_m;
             q->v[c][b] = ((v + r.dt * a) + r.gamma * r.dt * da) + k->jump[c][b];
             q->a[c][b] = a + da;
-            if (r.fading > 0) q->v[c][b] += r.fading * k->hidden[c][b];
+            if (r.decayed_at_once > 0) q->v[c][b] += r.decayed_at_once * k->subgrid[c][b];
             q->x[c][b] = (q->x[c][b] + r.dt * move) + r.gamma * r.dt * change;
             q->move[c][b] = (q->v[c][b] - (move + change)) - r.next_shift * q->a[c][b];
         }
     GS4I_BATCH_LOOP(b) {
         const gs4i_wide J = q->v[3][b], Jr = q->a[3][b],
                         div = k->L[0][0][b] + k->L[1][1][b] + k->L[2][2][b];
-        const gs4i_wide dJ =
-            ((J + r.reach.ahead * Jr) * div - Jr) / (r.alpha_m - r.alpha_f * r.gamma * r.dt * div);
+        const gs4i_wide dJ = ((J + r.prediction.ahead * Jr) * div - Jr)
+                             / (r.alpha_m - r.alpha_f * r.gamma * r.dt * div);
         q->v[3][b] = (J + r.dt * Jr) + r.gamma * r.dt * dJ;
         q->a[3][b] = Jr + dJ;
     }
@@ -9711,12 +9770,12 @@ GS4I_INLINE void gs4i_correct_batch(gs4i_rule r, const gs4i_corrections *k, gs4i
 /* A batch as it goes back to memory: four numbers a particle, four halves of the lag. */
 typedef struct gs4i_stored {
     gs4_real x[4 * GS4I_BATCH], v[4 * GS4I_BATCH], a[4 * GS4I_BATCH];
-    gs4i_half lag[4 * GS4I_BATCH];
+    gs4i_half position_residual[4 * GS4I_BATCH];
 } gs4i_stored;
 
 GS4I_INLINE void gs4i_pack_batch(const gs4i_batch *q, int with_rates, gs4i_stored *o)
 {
-    gs4_real lag[4 * GS4I_BATCH];
+    gs4_real position_residual[4 * GS4I_BATCH];
     gs4i_lanes none;
     int e;
     gs4i_from_lanes(q->x[0], q->x[1], q->x[2], q->x[3], o->x);
@@ -9724,8 +9783,9 @@ GS4I_INLINE void gs4i_pack_batch(const gs4i_batch *q, int with_rates, gs4i_store
     if (!with_rates) return;
     memset(none, 0, sizeof none);
     gs4i_from_lanes(q->a[0], q->a[1], q->a[2], q->a[3], o->a);
-    gs4i_from_lanes(q->move[0], q->move[1], q->move[2], none, lag);
-    for (e = 0; e < 4 * GS4I_BATCH; e++) o->lag[e] = gs4i_to_half(lag[e]);
+    gs4i_from_lanes(q->move[0], q->move[1], q->move[2], none, position_residual);
+    for (e = 0; e < 4 * GS4I_BATCH; e++)
+        o->position_residual[e] = gs4i_to_half(position_residual[e]);
 }
 
 GS4I_INLINE void gs4i_store_batch(const gs4i_particles *p, size_t i, int n, const gs4i_stored *o)
@@ -9734,7 +9794,8 @@ GS4I_INLINE void gs4i_store_batch(const gs4i_particles *p, size_t i, int n, cons
     memcpy(p->velocity + 4 * i, o->v, 4 * (size_t)n * sizeof *o->v);
     if (!p->with_rates) return;
     memcpy(p->rate + 4 * i, o->a, 4 * (size_t)n * sizeof *o->a);
-    memcpy(p->lag + 4 * i, o->lag, 4 * (size_t)n * sizeof *o->lag);
+    memcpy(p->position_residual + 4 * i, o->position_residual,
+           4 * (size_t)n * sizeof *o->position_residual);
 }
 
 GS4I_INLINE int gs4i_has_left(const gs4i_grid *g, const gs4_real x[3])
@@ -9747,10 +9808,10 @@ GS4I_INLINE int gs4i_has_left(const gs4i_grid *g, const gs4_real x[3])
 /* Is any of n positions inside of a body, or may be? By the ball around their box. */
 static int gs4i_may_touch(const gs4i_boundary *b, const gs4_real *x, int n, gs4_real h)
 {
-    gs4_real low[3], high[3], reach;
+    gs4_real low[3], high[3], prediction;
     gs4_vec3 midst;
     int i, a;
-    if (!b->body_count) return 0;
+    if (!b->collider_count) return 0;
     for (a = 0; a < 3; a++) {
         for (low[a] = high[a] = x[a], i = 1; i < n; i++) {
             low[a] = gs4i_min(low[a], x[4 * i + a]);
@@ -9760,10 +9821,12 @@ static int gs4i_may_touch(const gs4i_boundary *b, const gs4_real *x, int n, gs4_
         high[a] *= GS4I_C(0.5);
     }
     midst = gs4i_vec3(low[0] + high[0], low[1] + high[1], low[2] + high[2]);
-    reach = gs4i_length(gs4i_vec3(high[0] - low[0], high[1] - low[1], high[2] - low[2]))
-            + GS4I_C(0.1) * h;
-    for (i = 0; i < b->body_count; i++)
-        if (!b->bodies[i].asleep && !(gs4i_body_distance(&b->bodies[i], midst) > reach)) return 1;
+    prediction = gs4i_length(gs4i_vec3(high[0] - low[0], high[1] - low[1], high[2] - low[2]))
+                 + GS4I_C(0.1) * h;
+    for (i = 0; i < b->collider_count; i++)
+        if (!b->colliders[i].asleep
+            && !(gs4i_collider_distance(&b->colliders[i], midst) > prediction))
+            return 1;
     return 0;
 }
 
@@ -9777,20 +9840,20 @@ static void gs4i_correct_contact(gs4_sim *sim, size_t i, int n, gs4i_stored *o, 
     const int touches = gs4i_may_touch(&sim->boundary, o->x, n, sim->grid.h);
     int b;
     for (b = 0; b < n; b++) {
-        const gs4i_body *mouth;
+        const gs4i_collider *emitter;
         if (!touches && !gs4i_has_left(&sim->grid, o->x + 4 * b)) continue;
         gs4i_put_back(&sim->boundary, &sim->grid, o->x + 4 * b, o->v + 4 * b);
-        mouth = gs4i_hold_in_mouth(&sim->boundary, o->x + 4 * b, o->v + 4 * b);
-        if (mouth) {
+        emitter = gs4i_hold_in_emitter(&sim->boundary, o->x + 4 * b, o->v + 4 * b);
+        if (emitter) {
             memset(o->a + 4 * b, 0, 4 * sizeof *o->a);
-            memset(o->lag + 4 * b, 0, 4 * sizeof *o->lag);
+            memset(o->position_residual + 4 * b, 0, 4 * sizeof *o->position_residual);
             memset(L->dx + 4 * b, 0, 4 * sizeof *L->dx);
             memset(L->dy + 4 * b, 0, 4 * sizeof *L->dy);
             memset(L->dz + 4 * b, 0, 4 * sizeof *L->dz);
             if (sim->particles.with_heat)
                 gs4i_begin_heat(&sim->particles, i + (size_t)b,
-                                &sim->laws[sim->particles.material[i + (size_t)b]],
-                                mouth->is.temperature);
+                                &sim->constants[sim->particles.material[i + (size_t)b]],
+                                emitter->is.temperature);
             if (sim->particles.deformation_reals) gs4i_undeform(&sim->particles, i + (size_t)b, 1);
             if (elastic)
                 memset(elastic + (size_t)sim->particles.elastic_reals * (size_t)b, 0,
@@ -9801,8 +9864,8 @@ static void gs4i_correct_contact(gs4_sim *sim, size_t i, int n, gs4i_stored *o, 
 }
 
 /* Is the result one that may be kept? Moved at most two cells, all finite, J in its range. */
-static void gs4i_judge(gs4i_batch *q, gs4i_gradient L, const gs4_real *old_x, int n, gs4_real h,
-                       const uint32_t *id, gs4i_report *report)
+static void gs4i_validate_batch(gs4i_batch *q, gs4i_gradient L, const gs4_real *old_x, int n,
+                                gs4_real h, const uint32_t *id, gs4i_report *report)
 {
     int b, i, j;
     for (b = 0; b < n; b++) {
@@ -9824,7 +9887,7 @@ static void gs4i_judge(gs4i_batch *q, gs4i_gradient L, const gs4_real *old_x, in
  * has weight at most m_i/m_p and gradient at most sqrt(2 m_i/m_p)/h in any particle p, so with
  * q_i = min(1, 14 sqrt(m_i/m_min)) and any velocity r no particle sees |div u| > 4.7/h max_i q_i
  * |u_i - r|_1; `spread` has that maximum about a block's own mean (gs4i_node_spreads). */
-static int gs4i_is_calm(const gs4i_pass *pass, int index)
+static int gs4i_is_safe(const gs4i_pass *pass, int index)
 {
     const gs4_sim *sim = pass->sim;
     const gs4i_grid *g = &sim->grid;
@@ -9832,13 +9895,13 @@ static int gs4i_is_calm(const gs4i_pass *pass, int index)
     const int32_t *nb = g->neighbour + 27 * (size_t)o;
     const gs4i_report *report = &sim->reports[o];
     const gs4_real *mean = g->spread + 4 * (size_t)nb[13],
-                   limit = GS4I_C(0.2 / 4.7) * g->h / sim->rule.dt;
+                   limit = GS4I_C(0.2 / 4.7) * g->h / sim->integrator.dt;
     int i, c;
     if (!(report->min_J > GS4I_C(0.25) && report->max_J < 4) || report->hard
-        || !gs4i_ghosts_are_calm(sim, o))
+        || !gs4i_images_are_safe(sim, o))
         return 0;
     for (c = 0; c < 3; c++)
-        if (!(gs4i_abs(mean[c]) * sim->rule.dt < g->h)) return 0;
+        if (!(gs4i_abs(mean[c]) * sim->integrator.dt < g->h)) return 0;
     for (i = 0; i < 27; i++) {
         const gs4_real *of = g->spread + 4 * (size_t)nb[i];
         gs4_real all = of[3];
@@ -9849,18 +9912,19 @@ static int gs4i_is_calm(const gs4i_pass *pass, int index)
     return 1;
 }
 
-static void gs4i_load_warmth(const gs4_sim *sim, int o, gs4i_warmth *w)
+static void gs4i_load_heat_tiles(const gs4_sim *sim, int o, gs4i_heat_pass *w)
 {
-    memset(&w->laws, 0, sizeof w->laws);
-    w->rule = &sim->warm;
-    gs4i_tile_load(&sim->grid, o, sim->reports[o].rows, sim->conduction.content, w->content);
+    memset(&w->constants, 0, sizeof w->constants);
+    w->integrator = &sim->heat_integrator;
+    gs4i_tile_load(&sim->grid, o, sim->reports[o].rows, sim->conduction.heat_nodes, w->nodes);
     if (sim->particles.with_flux)
-        gs4i_tile_load(&sim->grid, o, sim->reports[o].rows, sim->conduction.source, w->source);
+        gs4i_tile_load(&sim->grid, o, sim->reports[o].rows, sim->conduction.heat_sources,
+                       w->sources);
 }
 
 /* S7 of heat for particles i to i + n. */
 static void gs4i_gather_heat(const gs4_sim *sim, size_t i, int n, const gs4i_stencils *s,
-                             gs4i_batch_laws *l, gs4i_gradient L, gs4i_warmth *w)
+                             gs4i_batch_constants *l, gs4i_gradient L, gs4i_heat_pass *w)
 {
     const gs4i_particles *p = &sim->particles;
     gs4i_gathered g;
@@ -9868,13 +9932,13 @@ static void gs4i_gather_heat(const gs4_sim *sim, size_t i, int n, const gs4i_ste
     gs4_real rise[4 * GS4I_BATCH];
     int b;
     gs4i_load_heat(p, i, n, &w->h);
-    gs4i_take_heat_laws(l, &w->laws);
+    gs4i_load_heat_constants(l, &w->constants);
     memset(slope, 0, sizeof slope);
     for (b = 0; b < n; b++) {
         gs4i_row x, d;
         gs4i_x_weights(s, b, &x, &d);
-        gs4i_gather_value(w->content + 4 * s->base[b], s, b, &x, rise);
-        if (p->with_flux) gs4i_gather_local(w->source + 4 * s->base[b], s, b, &x, &d, &g);
+        gs4i_gather_value(w->nodes + 4 * s->base[b], s, b, &x, rise);
+        if (p->with_flux) gs4i_gather_local(w->sources + 4 * s->base[b], s, b, &x, &d, &g);
     }
     gs4i_to_lanes(rise, n, value);
     if (p->with_flux) {
@@ -9887,82 +9951,84 @@ static void gs4i_gather_heat(const gs4_sim *sim, size_t i, int n, const gs4i_ste
         gs4i_to_lanes(g.value, n, column);
         memcpy(slope[3], column[3], sizeof slope[3]);
     }
-    gs4i_receive_heat(&w->laws, &sim->warm, value, slope, L, p->with_flux, &w->h);
+    gs4i_receive_heat(&w->constants, &sim->heat_integrator, value, slope, L, p->with_flux, &w->h);
     gs4i_store_heat(p, i, n, &w->h);
     /* hysteresis: in between the phase stays */
-    for (b = 0; b < n && w->laws.melts; b++)
+    for (b = 0; b < n && w->constants.melts; b++)
         if (GS4I_NTH(w->h.fraction, b) >= 1 || GS4I_NTH(w->h.fraction, b) <= 0)
             gs4i_set_phase(p, i + (size_t)b, GS4I_NTH(w->h.fraction, b) > 0);
 }
 
 /* The odd part of both, and of the gradients that were gathered. */
-static void gs4i_see_ghosts(int solids, const gs4i_ghost *ghosts, int n, gs4i_gathered *u,
-                            gs4i_gathered *acc)
+static void gs4i_take_odd_parts(int solids, const gs4i_image_particle *image_particles, int n,
+                                gs4i_gathered *u, gs4i_gathered *acc)
 {
-    gs4i_make_odd(ghosts, n, u);
-    gs4i_make_value_odd(ghosts, n, 1, acc);
-    if (solids) gs4i_make_gradient_odd(ghosts, n, 1, acc);
+    gs4i_make_odd(image_particles, n, u);
+    gs4i_make_value_odd(image_particles, n, 1, acc);
+    if (solids) gs4i_make_gradient_odd(image_particles, n, 1, acc);
 }
 
-static void gs4i_take_kicks(const gs4i_gathered *acc, const gs4i_gathered *jump, int n,
-                            gs4i_kicks *kicks)
+static void gs4i_load_gathered_rates(const gs4i_gathered *acc, const gs4i_gathered *jump, int n,
+                                     gs4i_gathered_rates *rates)
 {
-    gs4i_gradient_lanes(acc->dx, acc->dy, acc->dz, n, kicks->acc);
+    gs4i_gradient_lanes(acc->dx, acc->dy, acc->dz, n, rates->acc);
     if (jump)
-        gs4i_gradient_lanes(jump->dx, jump->dy, jump->dz, n, kicks->jump);
+        gs4i_gradient_lanes(jump->dx, jump->dy, jump->dz, n, rates->jump);
     else
-        memset(kicks->jump, 0, sizeof kicks->jump);
+        memset(rates->jump, 0, sizeof rates->jump);
 }
 
 /* S7 of stress and deformation, which see the temperature of the stage. */
-static void gs4i_advance_history(const gs4_sim *sim, size_t i, int n, gs4i_batch_laws *laws,
-                                 gs4i_history_laws *past, gs4i_warmth *warmth, gs4i_gradient L,
-                                 gs4i_kicks *kicks, const gs4i_wide *J, gs4i_report *report,
-                                 int commit)
+static void gs4i_advance_history(const gs4_sim *sim, size_t i, int n,
+                                 gs4i_batch_constants *constants, gs4i_history_constants *past,
+                                 gs4i_heat_pass *heat, gs4i_gradient L, gs4i_gathered_rates *rates,
+                                 const gs4i_wide *J, gs4i_report *report, int commit)
 {
     const gs4i_particles *p = &sim->particles;
-    gs4i_take_laws(sim->laws, sim->frozen, p, i, n, laws);
-    if (p->with_heat && laws->callbacks)
-        gs4i_begin_warmth(p, i, n, sim->warm.reach.ahead, laws, warmth);
+    gs4i_load_constants(sim->constants, sim->solid_phase, p, i, n, constants);
+    if (p->with_heat && constants->callbacks)
+        gs4i_begin_heat_pass(p, i, n, sim->heat_integrator.prediction.ahead, constants, heat);
     if (p->elastic_reals)
-        gs4i_advance_elastic(p, i, n, &sim->rule, laws, &past->elastic, L, report, commit);
+        gs4i_advance_elastic(p, i, n, &sim->integrator, constants, &past->elastic, L, report,
+                             commit);
     if (p->deformation_reals)
-        gs4i_advance_solid(p, i, n, &sim->rule, laws, &past->solid, L, kicks, J, report, commit);
+        gs4i_advance_solid(p, i, n, &sim->integrator, constants, &past->solid, L, rates, J, report,
+                           commit);
 }
 
 /* S7: gather and correct. With `commit` 0 nothing is written: a rehearsal that only reports, of
  * blocks that are not calm. */
-static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_warmth *warmth)
+static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_heat_pass *heat)
 {
     gs4_sim *sim = pass->sim;
     const int o = pass->blocks[index],
               next = pass->blocks[index + 1 < pass->count ? index + 1 : index];
-    const gs4i_rule rule = sim->rule;
+    const gs4i_integrator integrator = sim->integrator;
     const gs4i_particles p = sim->particles;
     gs4i_grid *grid = &sim->grid;
     gs4i_report *report = &sim->reports[o];
     const gs4i_frame frame = gs4i_tile_frame(grid, grid->occupied_block[o]);
-    gs4i_batch_laws laws;
-    gs4i_history_laws past;
+    gs4i_batch_constants constants;
+    gs4i_history_constants past;
     gs4i_seen seen;
     gs4i_corrections k;
-    gs4i_kicks kicks;
+    gs4i_gathered_rates rates;
     gs4_real u_nodes[GS4I_TILE_REALS], a_nodes[GS4I_TILE_REALS], j_nodes[GS4I_TILE_REALS];
     const int jumps = gs4i_load_jumps(grid, o, report->rows, j_nodes),
               edge = jumps || gs4i_at_edge(grid, o);
-    const gs4i_ghost *ghosts = gs4i_ghosts_of(sim, o);
+    const gs4i_image_particle *image_particles = gs4i_image_particles_of(sim, o);
     gs4i_gathered u;
     gs4i_stored out;
     int row = 0;
     size_t i = (size_t)grid->first[o], end = (size_t)grid->first[o + 1];
-    if (!commit && gs4i_is_calm(pass, index)) return;
+    if (!commit && gs4i_is_safe(pass, index)) return;
     gs4i_tile_load(grid, o, report->rows, gs4i_seen_nodes(grid), u_nodes);
     gs4i_tile_load(grid, o, report->rows, grid->force, a_nodes);
     gs4i_see_nothing(&seen);
-    memset(&laws, 0, sizeof laws);
+    memset(&constants, 0, sizeof constants);
     memset(&past, 0, sizeof past);
     memset(&k, 0, sizeof k);
-    if (warmth) gs4i_load_warmth(sim, o, warmth);
+    if (heat) gs4i_load_heat_tiles(sim, o, heat);
     for (; i < end; i += GS4I_BATCH, row += 2) {
         const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
         gs4i_batch q;
@@ -9972,37 +10038,37 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_warm
         gs4i_tile_prefetch(grid, next, row, gs4i_seen_nodes(grid));
         gs4i_tile_prefetch(grid, next, row, grid->force);
         if (p.deformation_reals) {
-            gs4i_take_laws(sim->laws, sim->frozen, &p, i, n, &laws);
-            solids = gs4i_take_solid_laws(&laws, &past.solid);
+            gs4i_load_constants(sim->constants, sim->solid_phase, &p, i, n, &constants);
+            solids = gs4i_load_solid_constants(&constants, &past.solid);
         }
-        gs4i_stage_batch(&p, i, n, rule.reach, &frame, &q, &s);
+        gs4i_stage_batch(&p, i, n, integrator.prediction, &frame, &q, &s);
         for (b = 0; b < n; b++) {
             gs4i_row w, d;
             gs4i_x_weights(&s, b, &w, &d);
             gs4i_gather_local(u_nodes + 4 * s.base[b], &s, b, &w, &d, &u);
-            gs4i_gather_kick(solids, a_nodes + 4 * s.base[b], &s, b, &w, &d, &acc);
-            if (jumps) gs4i_gather_kick(solids, j_nodes + 4 * s.base[b], &s, b, &w, &d, &jump);
+            gs4i_gather_rate(solids, a_nodes + 4 * s.base[b], &s, b, &w, &d, &acc);
+            if (jumps) gs4i_gather_rate(solids, j_nodes + 4 * s.base[b], &s, b, &w, &d, &jump);
         }
-        if (ghosts) {
-            gs4i_see_ghosts(solids, ghosts, n, &u, &acc);
-            ghosts += n;
+        if (image_particles) {
+            gs4i_take_odd_parts(solids, image_particles, n, &u, &acc);
+            image_particles += n;
         }
         gs4i_to_lanes(u.value, n, k.U);
         gs4i_gradient_lanes(u.dx, u.dy, u.dz, n, k.L);
         gs4i_to_lanes(acc.value, n, k.A);
         if (jumps) gs4i_to_lanes(jump.value, n, k.jump);
-        if (p.with_fading) {
-            gs4i_prefetch_hidden(&p, i + 4 * GS4I_BATCH);
-            gs4i_to_lanes(p.hidden + 4 * i, n, k.hidden);
+        if (p.with_subgrid) {
+            gs4i_prefetch_subgrid(&p, i + 4 * GS4I_BATCH);
+            gs4i_to_lanes(p.subgrid + 4 * i, n, k.subgrid);
         }
-        gs4i_correct_batch(rule, &k, &q);
-        if (solids) gs4i_take_kicks(&acc, jumps ? &jump : NULL, n, &kicks);
-        if (p.elastic_reals || p.deformation_reals || warmth)
-            gs4i_advance_history(sim, i, n, &laws, &past, warmth, k.L, &kicks, q.v[3], report,
+        gs4i_correct_batch(integrator, &k, &q);
+        if (solids) gs4i_load_gathered_rates(&acc, jumps ? &jump : NULL, n, &rates);
+        if (p.elastic_reals || p.deformation_reals || heat)
+            gs4i_advance_history(sim, i, n, &constants, &past, heat, k.L, &rates, q.v[3], report,
                                  commit);
-        if (warmth && commit) gs4i_gather_heat(sim, i, n, &s, &laws, k.L, warmth);
+        if (heat && commit) gs4i_gather_heat(sim, i, n, &s, &constants, k.L, heat);
         if (!commit) {
-            gs4i_judge(&q, k.L, p.position + 4 * i, n, grid->h, p.id + i, report);
+            gs4i_validate_batch(&q, k.L, p.position + 4 * i, n, grid->h, p.id + i, report);
             continue;
         }
         gs4i_pack_batch(&q, 1, &out);
@@ -10017,19 +10083,19 @@ static void gs4i_correct_task(int index, void *context)
 {
     gs4i_correct((const gs4i_pass *)context, index, 1, NULL);
 }
-static void gs4i_rehearse_task(int index, void *context)
+static void gs4i_trial_task(int index, void *context)
 {
     gs4i_correct((const gs4i_pass *)context, index, 0, NULL);
 }
 static void gs4i_correct_with_heat_task(int index, void *context)
 {
-    gs4i_warmth warmth;
-    gs4i_correct((const gs4i_pass *)context, index, 1, &warmth);
+    gs4i_heat_pass heat;
+    gs4i_correct((const gs4i_pass *)context, index, 1, &heat);
 }
-static void gs4i_rehearse_with_heat_task(int index, void *context)
+static void gs4i_trial_with_heat_task(int index, void *context)
 {
-    gs4i_warmth warmth;
-    gs4i_correct((const gs4i_pass *)context, index, 0, &warmth);
+    gs4i_heat_pass heat;
+    gs4i_correct((const gs4i_pass *)context, index, 0, &heat);
 }
 
 /* --- symplectic Euler ------------------------------------------------------------------------- */
@@ -10043,23 +10109,23 @@ GS4I_INLINE void gs4i_load_affine(const gs4i_particles *p, size_t i, int n, gs4i
 /* Momentum and impulse of stress and weight as one affine field: m (v + dt g) + (m C - dt V
  * sigma 4/h^2) (x_i - x). */
 GS4I_INLINE void gs4i_affine_momentum(const gs4i_particles *p, size_t at, int n,
-                                      const gs4i_rule *rule, const gs4i_batch *q,
-                                      const gs4i_batch_laws *l, gs4i_history_laws *past,
+                                      const gs4i_integrator *integrator, const gs4i_batch *q,
+                                      const gs4i_batch_constants *l, gs4i_history_constants *past,
                                       const gs4i_stencils *s, gs4i_gradient C, gs4_real h,
                                       const gs4_real fall[3], gs4i_affine_forces *f, gs4i_lanes mu,
-                                      gs4i_seen *seen, gs4i_report *report, gs4i_warmth *warmth)
+                                      gs4i_seen *seen, gs4i_report *report, gs4i_heat_pass *heat)
 {
-    const gs4_real dt = rule->dt;
+    const gs4_real dt = integrator->dt;
     gs4i_symmetric sigma;
     gs4i_lanes bound, k, middle[3], none;
     gs4i_gradient Q;
     int b, i, j;
     gs4i_liquid_stress(l, q->v[3], C, sigma, mu);
     if (p->elastic_reals)
-        gs4i_add_elastic(p, at, n, rule, l, &past->elastic, C, sigma, seen, report);
+        gs4i_add_elastic(p, at, n, integrator, l, &past->elastic, C, sigma, seen, report);
     if (p->deformation_reals)
-        gs4i_add_solid(p, at, n, rule, l, &past->solid, C, q->v[3], sigma, seen, report);
-    if (warmth) gs4i_send_warmth(l, q->x[3], q->v[3], C, sigma, p->with_flux, warmth);
+        gs4i_add_solid(p, at, n, integrator, l, &past->solid, C, q->v[3], sigma, seen, report);
+    if (heat) gs4i_send_heat_pass(l, q->x[3], q->v[3], C, sigma, p->with_flux, heat);
     gs4i_affine_bound(C, dt, bound);
     GS4I_BATCH_LOOP(b) {
         bound[b] *= q->x[3][b] * h;
@@ -10082,29 +10148,29 @@ GS4I_INLINE void gs4i_affine_momentum(const gs4i_particles *p, size_t at, int n,
 }
 
 /* Symplectic Euler, there: one affine scatter with stress (MLS-MPM). */
-static void gs4i_scatter_affinely(const gs4i_pass *pass, int index, gs4i_warmth *warmth)
+static void gs4i_scatter_affinely(const gs4i_pass *pass, int index, gs4i_heat_pass *heat)
 {
     gs4_sim *sim = pass->sim;
     const gs4i_particles p = sim->particles;
     const int o = pass->blocks[index];
-    const gs4i_reach reach = { 0, 0 };
-    const gs4_real dt = sim->rule.dt, h = sim->grid.h;
+    const gs4i_prediction prediction = { 0, 0 };
+    const gs4_real dt = sim->integrator.dt, h = sim->grid.h;
     const gs4i_frame frame = gs4i_tile_frame(&sim->grid, sim->grid.occupied_block[o]);
     const gs4_real fall[3] = { dt * sim->desc.gravity.x, dt * sim->desc.gravity.y,
                                dt * sim->desc.gravity.z };
     gs4i_report *report = &sim->reports[o];
-    gs4i_batch_laws laws;
-    gs4i_history_laws past;
+    gs4i_batch_constants constants;
+    gs4i_history_constants past;
     gs4i_seen seen;
     gs4_real tile[GS4I_TILE_REALS];
-    gs4i_ghost *ghosts = gs4i_ghosts_of(sim, o);
+    gs4i_image_particle *image_particles = gs4i_image_particles_of(sim, o);
     int row = 0;
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
     uint64_t rows = 0;
     gs4i_report_clear(report);
     memset(tile, 0, sizeof tile);
-    if (warmth) gs4i_clear_warmth(sim, warmth);
-    memset(&laws, 0, sizeof laws);
+    if (heat) gs4i_clear_heat_pass(sim, heat);
+    memset(&constants, 0, sizeof constants);
     memset(&past, 0, sizeof past);
     gs4i_see_nothing(&seen);
     for (; i < end; i += GS4I_BATCH, row += 2) {
@@ -10116,32 +10182,32 @@ static void gs4i_scatter_affinely(const gs4i_pass *pass, int index, gs4i_warmth 
         gs4i_lanes mu;
         int b;
         gs4i_tile_prefetch(&sim->grid, o, row, sim->grid.momentum);
-        gs4i_stage_batch(&p, i, n, reach, &frame, &q, &s);
+        gs4i_stage_batch(&p, i, n, prediction, &frame, &q, &s);
         gs4i_load_affine(&p, i, n, C);
-        gs4i_take_laws(sim->laws, sim->frozen, &p, i, n, &laws);
-        if (warmth) gs4i_begin_warmth(&p, i, n, 0, &laws, warmth);
-        gs4i_affine_momentum(&p, i, n, &sim->rule, &q, &laws, &past, &s, C, h, fall, &f, mu, &seen,
-                             report, warmth);
-        gs4i_see_liquids(&seen, &laws, q.v[3], mu);
+        gs4i_load_constants(sim->constants, sim->solid_phase, &p, i, n, &constants);
+        if (heat) gs4i_begin_heat_pass(&p, i, n, 0, &constants, heat);
+        gs4i_affine_momentum(&p, i, n, &sim->integrator, &q, &constants, &past, &s, C, h, fall, &f,
+                             mu, &seen, report, heat);
+        gs4i_see_liquids(&seen, &constants, q.v[3], mu);
         gs4i_check_liquids(report, q.v[3], mu, p.id + i, n);
         for (b = 0; b < n; b++) {
             if (s.base[b] < 0) {
-                report->strayed++;
+                report->left_tile++;
                 continue;
             }
             rows |= gs4i_touched_rows(s.base[b]);
             gs4i_scatter_affine(tile, &s, b, &f);
         }
-        if (ghosts) {
-            gs4i_reflect_affine(ghosts, n, &s, &f, h);
-            ghosts += n;
+        if (image_particles) {
+            gs4i_reflect_affine(image_particles, n, &s, &f, h);
+            image_particles += n;
         }
-        if (warmth) gs4i_scatter_warmth(sim, warmth, &s, n);
+        if (heat) gs4i_scatter_heat(sim, heat, &s, n);
     }
     gs4i_report_liquids(report, &seen);
     report->rows = rows;
     gs4i_tile_add(&sim->grid, o, rows, tile, sim->grid.momentum);
-    if (warmth) gs4i_add_warmth(sim, o, warmth);
+    if (heat) gs4i_add_heat(sim, o, heat);
 }
 
 static void gs4i_scatter_euler(int index, void *context)
@@ -10150,8 +10216,8 @@ static void gs4i_scatter_euler(int index, void *context)
 }
 static void gs4i_scatter_euler_and_heat(int index, void *context)
 {
-    gs4i_warmth warmth;
-    gs4i_scatter_affinely((const gs4i_pass *)context, index, &warmth);
+    gs4i_heat_pass heat;
+    gs4i_scatter_affinely((const gs4i_pass *)context, index, &heat);
 }
 
 /* v = sum w v_i, C = sum v_i (x) grad w, J += dt J tr C, x += dt v. */
@@ -10171,33 +10237,33 @@ GS4I_INLINE void gs4i_advect_batch(gs4_real dt, const gs4i_gathered *u, int n, g
 }
 
 /* Symplectic Euler, and back. */
-static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, gs4i_warmth *warmth)
+static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, gs4i_heat_pass *heat)
 {
     gs4_sim *sim = pass->sim;
     const int o = pass->blocks[index],
               next = pass->blocks[index + 1 < pass->count ? index + 1 : index];
-    const gs4i_reach reach = { 0, 0 };
+    const gs4i_prediction prediction = { 0, 0 };
     const gs4i_particles p = sim->particles;
     gs4i_grid *grid = &sim->grid;
     gs4i_report *report = &sim->reports[o];
     const gs4i_frame frame = gs4i_tile_frame(grid, grid->occupied_block[o]);
-    gs4i_batch_laws laws;
-    gs4i_history_laws past;
+    gs4i_batch_constants constants;
+    gs4i_history_constants past;
     gs4i_seen seen;
     gs4_real nodes[GS4I_TILE_REALS];
     int edge = gs4i_at_edge(grid, o), c;
-    const gs4i_ghost *ghosts = gs4i_ghosts_of(sim, o);
+    const gs4i_image_particle *image_particles = gs4i_image_particles_of(sim, o);
     gs4i_gathered u;
     gs4i_stored out;
     int row = 0;
     size_t i = (size_t)grid->first[o], end = (size_t)grid->first[o + 1];
-    if (!commit && gs4i_is_calm(pass, index)) return;
+    if (!commit && gs4i_is_safe(pass, index)) return;
     for (c = 0; c < 27; c++) edge |= grid->jump_of[grid->neighbour[27 * (size_t)o + (size_t)c]];
     gs4i_tile_load(grid, o, report->rows, grid->momentum, nodes);
     gs4i_see_nothing(&seen);
-    memset(&laws, 0, sizeof laws);
+    memset(&constants, 0, sizeof constants);
     memset(&past, 0, sizeof past);
-    if (warmth) gs4i_load_warmth(sim, o, warmth);
+    if (heat) gs4i_load_heat_tiles(sim, o, heat);
     for (; i < end; i += GS4I_BATCH, row += 2) {
         const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
         gs4i_batch q;
@@ -10205,22 +10271,23 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, gs4i
         gs4i_gradient C;
         int b;
         gs4i_tile_prefetch(grid, next, row, grid->momentum);
-        gs4i_stage_batch(&p, i, n, reach, &frame, &q, &s);
+        gs4i_stage_batch(&p, i, n, prediction, &frame, &q, &s);
         for (b = 0; b < n; b++) {
             gs4i_row w, d;
             gs4i_x_weights(&s, b, &w, &d);
             gs4i_gather_local(nodes + 4 * s.base[b], &s, b, &w, &d, &u);
         }
-        if (ghosts) {
-            gs4i_make_odd(ghosts, n, &u);
-            ghosts += n;
+        if (image_particles) {
+            gs4i_make_odd(image_particles, n, &u);
+            image_particles += n;
         }
-        gs4i_advect_batch(sim->rule.dt, &u, n, &q, C);
-        if (p.elastic_reals || p.deformation_reals || warmth)
-            gs4i_advance_history(sim, i, n, &laws, &past, warmth, C, NULL, q.v[3], report, commit);
-        if (warmth && commit) gs4i_gather_heat(sim, i, n, &s, &laws, C, warmth);
+        gs4i_advect_batch(sim->integrator.dt, &u, n, &q, C);
+        if (p.elastic_reals || p.deformation_reals || heat)
+            gs4i_advance_history(sim, i, n, &constants, &past, heat, C, NULL, q.v[3], report,
+                                 commit);
+        if (heat && commit) gs4i_gather_heat(sim, i, n, &s, &constants, C, heat);
         if (!commit) {
-            gs4i_judge(&q, C, p.position + 4 * i, n, grid->h, p.id + i, report);
+            gs4i_validate_batch(&q, C, p.position + 4 * i, n, grid->h, p.id + i, report);
             continue;
         }
         gs4i_pack_batch(&q, 0, &out);
@@ -10238,19 +10305,19 @@ static void gs4i_gather_euler_task(int index, void *context)
 {
     gs4i_gather_euler((const gs4i_pass *)context, index, 1, NULL);
 }
-static void gs4i_rehearse_euler_task(int index, void *context)
+static void gs4i_trial_euler_task(int index, void *context)
 {
     gs4i_gather_euler((const gs4i_pass *)context, index, 0, NULL);
 }
 static void gs4i_gather_euler_with_heat_task(int index, void *context)
 {
-    gs4i_warmth warmth;
-    gs4i_gather_euler((const gs4i_pass *)context, index, 1, &warmth);
+    gs4i_heat_pass heat;
+    gs4i_gather_euler((const gs4i_pass *)context, index, 1, &heat);
 }
-static void gs4i_rehearse_euler_with_heat_task(int index, void *context)
+static void gs4i_trial_euler_with_heat_task(int index, void *context)
 {
-    gs4i_warmth warmth;
-    gs4i_gather_euler((const gs4i_pass *)context, index, 0, &warmth);
+    gs4i_heat_pass heat;
+    gs4i_gather_euler((const gs4i_pass *)context, index, 0, &heat);
 }
 
 /* Run a scattering kernel over all occupied blocks. */
@@ -10304,15 +10371,15 @@ static void gs4i_fold_heat(const gs4_sim *sim)
     for (wall = 0; wall < 6; wall++) {
         const int odd = sim->desc.wall_is_isothermal[wall];
         const gs4_real twice = 2 * sim->desc.wall_temperature[wall];
-        for (i = 0; i < b->image_count[wall]; i++) {
-            const gs4_real *from = k->content + 4 * (size_t)b->images[wall][i].image;
-            gs4_real *to = k->content + 4 * (size_t)b->images[wall][i].mirror;
+        for (i = 0; i < b->mirror_count[wall]; i++) {
+            const gs4_real *from = k->heat_nodes + 4 * (size_t)b->mirrors[wall][i].mirror;
+            gs4_real *to = k->heat_nodes + 4 * (size_t)b->mirrors[wall][i].inner;
             to[1] += odd ? twice * from[0] - from[1] : from[1];
             for (a = 0; a < 4; a++)
                 if (a != 1) to[a] += from[a];
-            if (k->source) {
-                from = k->source + 4 * (size_t)b->images[wall][i].image;
-                to = k->source + 4 * (size_t)b->images[wall][i].mirror;
+            if (k->heat_sources) {
+                from = k->heat_sources + 4 * (size_t)b->mirrors[wall][i].mirror;
+                to = k->heat_sources + 4 * (size_t)b->mirrors[wall][i].inner;
                 to[0] += odd ? -from[0] : from[0];
                 to[1] += from[1];
             }
@@ -10331,15 +10398,16 @@ static void gs4i_fill_heat(const gs4_sim *sim)
                        twice = sim->desc.wall_is_isothermal[wall]
                                    ? 2 * sim->desc.wall_temperature[wall]
                                    : 0;
-        for (i = 0; i < b->image_count[wall]; i++) {
-            const size_t from = 4 * (size_t)b->images[wall][i].mirror,
-                         to = 4 * (size_t)b->images[wall][i].image;
-            k->content[to] = sign * k->content[from];
-            k->content[to + 1] = k->content[from + 1];
-            k->content[to + 2] = twice * k->content[from + 1] + sign * k->content[from + 2];
+        for (i = 0; i < b->mirror_count[wall]; i++) {
+            const size_t from = 4 * (size_t)b->mirrors[wall][i].inner,
+                         to = 4 * (size_t)b->mirrors[wall][i].mirror;
+            k->heat_nodes[to] = sign * k->heat_nodes[from];
+            k->heat_nodes[to + 1] = k->heat_nodes[from + 1];
+            k->heat_nodes[to + 2] =
+                twice * k->heat_nodes[from + 1] + sign * k->heat_nodes[from + 2];
             for (a = 0; a < 3 && sim->particles.with_flux; a++)
-                k->source[to + (size_t)a] = twice + sign * k->source[from + (size_t)a];
-            if (sim->particles.with_flux) k->source[to + 3] = k->source[from + 3];
+                k->heat_sources[to + (size_t)a] = twice + sign * k->heat_sources[from + (size_t)a];
+            if (sim->particles.with_flux) k->heat_sources[to + 3] = k->heat_sources[from + 3];
         }
     }
 }
@@ -10440,7 +10508,7 @@ static void gs4i_heat_nodes(int index, void *context)
         gs4i_block_coordinates(g, g->block[s], block);
         for (i = 0; i < GS4I_BLOCK_NODES; i++) {
             const size_t node = 4 * ((size_t)s * GS4I_BLOCK_NODES + (size_t)i);
-            const gs4_real *q = k->content + node;
+            const gs4_real *q = k->heat_nodes + node;
             size_t cell;
             if (!gs4i_heat_cell_of(k, block, i, at, &cell)) continue;
             if (!(g->momentum[node + 3] > pass->lightest) || !(q[0] > 0) || !(q[3] > 0)) continue;
@@ -10450,14 +10518,15 @@ static void gs4i_heat_nodes(int index, void *context)
             k->field[GS4I_HEAT_K][cell] = q[3] / q[2];
             k->field[GS4I_HEAT_FILL][cell] = q[3] * inv_cell;
             k->field[GS4I_HEAT_MIX][cell] =
-                gs4i_min((k->source ? k->source[node + 1]
-                                    : GS4I_MIXING * q[3] * q[3] / q[2] * g->inv_h * g->inv_h)
+                gs4i_min((k->heat_sources ? k->heat_sources[node + 1]
+                                          : GS4I_MIXING * q[3] * q[3] / q[2] * g->inv_h * g->inv_h)
                              / q[0],
-                         sim->warm.mixing)
+                         sim->heat_integrator.mixing)
                 * q[0] * inv_cell;
             k->field[GS4I_HEAT_HOLDS][cell] = k->field[GS4I_HEAT_DIAGONAL][cell] = q[0] * inv_cell;
             k->field[GS4I_HEAT_RHS][cell] =
-                k->source ? k->source[node] * inv_cell * sim->warm.s : GS4I_C(0);
+                k->heat_sources ? k->heat_sources[node] * inv_cell * sim->heat_integrator.s
+                                : GS4I_C(0);
         }
     }
 }
@@ -10467,11 +10536,13 @@ static void gs4i_heat_nodes(int index, void *context)
 static int gs4i_is_isothermal_at(const gs4_sim *sim, gs4_vec3 p, gs4_real *T)
 {
     int b;
-    for (b = 0; b < sim->boundary.body_count; b++) {
-        const gs4i_body *body = &sim->boundary.bodies[b];
-        if (body->is_mouth || !(gs4i_body_distance(body, p) < GS4I_C(0.5) * sim->grid.h)) continue;
-        *T = body->is.temperature;
-        return body->is.is_isothermal;
+    for (b = 0; b < sim->boundary.collider_count; b++) {
+        const gs4i_collider *collider = &sim->boundary.colliders[b];
+        if (collider->is_emitter
+            || !(gs4i_collider_distance(collider, p) < GS4I_C(0.5) * sim->grid.h))
+            continue;
+        *T = collider->is.temperature;
+        return collider->is.is_isothermal;
     }
     *T = sim->desc.ambient_temperature;
     return sim->desc.air_is_isothermal;
@@ -10482,7 +10553,8 @@ static void gs4i_heat_faces(int z, void *context)
 {
     const gs4_sim *sim = ((const gs4i_node_pass *)context)->sim;
     const gs4i_conduction *k = &sim->conduction;
-    const gs4_real *K = k->field[GS4I_HEAT_K], *fill = k->field[GS4I_HEAT_FILL], s = sim->warm.s;
+    const gs4_real *K = k->field[GS4I_HEAT_K], *fill = k->field[GS4I_HEAT_FILL],
+                   s = sim->heat_integrator.s;
     int axis, x, y;
     for (axis = 0; axis < 3; axis++) {
         const int nx = k->size[0] + (axis == 0), ny = k->size[1] + (axis == 1), n = k->size[axis];
@@ -10549,13 +10621,13 @@ GS4I_INLINE gs4_real gs4i_fill_beyond(const gs4_sim *sim, const int at[3], int s
 /* Links of one cell to isothermal walls, air and bodies: their sum, 1/h^2, and that of their
  * temperatures. An area that is shown along several axes counts once: each by its share of the
  * normal. */
-static gs4_real gs4i_isothermal_links(const gs4_sim *sim, const int at[3], gs4_real *warmth)
+static gs4_real gs4i_isothermal_links(const gs4_sim *sim, const int at[3], gs4_real *heat)
 {
     const gs4i_conduction *k = &sim->conduction;
     const gs4_real fill = k->field[GS4I_HEAT_FILL][gs4i_heat_cell(k, at[0], at[1], at[2])];
     gs4_real shows[6], most = 0, all = 0, T = 0;
     int side, a;
-    *warmth = 0;
+    *heat = 0;
     for (side = 0; side < 6; side++) {
         const int next = at[side / 2] + k->low[side / 2] + (side & 1 ? 1 : -1);
         shows[side] = 0;
@@ -10563,7 +10635,7 @@ static gs4_real gs4i_isothermal_links(const gs4_sim *sim, const int at[3], gs4_r
             && sim->desc.walls[side] != GS4_WALL_OPEN) {
             if (sim->desc.wall_is_isothermal[side]) {
                 all += 2 * fill;
-                *warmth += 2 * fill * sim->desc.wall_temperature[side];
+                *heat += 2 * fill * sim->desc.wall_temperature[side];
             }
             /* not the noise of the inside */
         } else if (k->exposed && gs4i_fill_beyond(sim, at, side, 3) < GS4I_C(0.5))
@@ -10593,7 +10665,7 @@ static gs4_real gs4i_isothermal_links(const gs4_sim *sim, const int at[3], gs4_r
         link = shows[side] * (own / norm)
                / (GS4I_SURFACE_DEPTH - GS4I_C(0.5) * (1 - cube / (square * norm)));
         all += link;
-        *warmth += link * T;
+        *heat += link * T;
     }
     return all;
 }
@@ -10645,11 +10717,11 @@ static void gs4i_heat_flows(int z, void *context)
             if (k->kind[i] != GS4_CELL_LIQUID) continue;
             flow = gs4i_heat_flow(k, T, at, i);
             if (k->linked) {
-                gs4_real link, warmth;
-                link = gs4i_isothermal_links(sim, at, &warmth) * sim->warm.s
+                gs4_real link, heat;
+                link = gs4i_isothermal_links(sim, at, &heat) * sim->heat_integrator.s
                        * k->field[GS4I_HEAT_K][i];
                 k->field[GS4I_HEAT_DIAGONAL][i] += per_area * link;
-                flow += sim->warm.s * k->field[GS4I_HEAT_K][i] * warmth - link * T[i];
+                flow += sim->heat_integrator.s * k->field[GS4I_HEAT_K][i] * heat - link * T[i];
             }
             k->field[GS4I_HEAT_RHS][i] += per_area * flow;
         }
@@ -10705,9 +10777,10 @@ static void gs4i_heat_back(int index, void *context)
         gs4i_block_coordinates(g, g->block[s], block);
         for (i = 0; i < GS4I_BLOCK_NODES; i++) {
             const size_t node = 4 * ((size_t)s * GS4I_BLOCK_NODES + (size_t)i);
-            const gs4_real capacity = k->content[node] * g->inv_h * g->inv_h * g->inv_h;
-            gs4_real *q = k->content + node,
-                     *flux = sim->particles.with_flux ? k->source + node : NULL, x[3], t[3], sum;
+            const gs4_real capacity = k->heat_nodes[node] * g->inv_h * g->inv_h * g->inv_h;
+            gs4_real *q = k->heat_nodes + node,
+                     *flux = sim->particles.with_flux ? k->heat_sources + node : NULL, x[3], t[3],
+                     sum;
             size_t cell;
             memset(q, 0, 4 * sizeof *q);
             if (flux) memset(flux, 0, 4 * sizeof *flux);
@@ -10916,7 +10989,7 @@ static int gs4i_solve_by_sweeps(gs4_sim *sim, double tolerance, gs4_solve_stats 
     return 0;
 }
 
-static int gs4i_solve_heat(gs4_sim *sim)
+static int gs4i_solve_heat_system(gs4_sim *sim)
 {
     gs4i_conduction *k = &sim->conduction;
     const double tolerance = (double)sim->desc.solver_tolerance;
@@ -10965,8 +11038,8 @@ static int gs4i_solve_heat(gs4_sim *sim)
 static void gs4i_free_heat(gs4i_memory *m, gs4i_conduction *k)
 {
     const size_t node = GS4I_NODE_REALS * sizeof(gs4_real), slots = (size_t)k->slots;
-    gs4i_free(m, k->content, slots, node);
-    gs4i_free(m, k->source, slots, node);
+    gs4i_free(m, k->heat_nodes, slots, node);
+    gs4i_free(m, k->heat_sources, slots, node);
     gs4i_free(m, k->field[0], k->room, GS4I_HEAT_FIELDS * sizeof(gs4_real));
     gs4i_free(m, k->kind, k->room, 1);
     gs4i_free(m, k->outer, k->room, 4 * sizeof *k->outer);
@@ -10981,26 +11054,27 @@ static int gs4i_reserve_heat(gs4_sim *sim)
     gs4i_memory *m = &sim->memory;
     const size_t node = GS4I_NODE_REALS * sizeof(gs4_real), slots = (size_t)sim->grid.capacity;
     const int wants_source = sim->particles.with_flux || k->heats;
-    gs4_real *content, *source;
-    if (!sim->particles.with_heat || (k->slots >= sim->grid.active && (k->source || !wants_source)))
+    gs4_real *heat_nodes, *heat_sources;
+    if (!sim->particles.with_heat
+        || (k->slots >= sim->grid.active && (k->heat_sources || !wants_source)))
         return GS4_OK;
-    content = (gs4_real *)gs4i_alloc(m, slots, node);
-    source = wants_source ? (gs4_real *)gs4i_alloc(m, slots, node) : NULL;
-    if (!content || (wants_source && !source)) {
-        gs4i_free(m, content, slots, node);
-        gs4i_free(m, source, slots, node);
+    heat_nodes = (gs4_real *)gs4i_alloc(m, slots, node);
+    heat_sources = wants_source ? (gs4_real *)gs4i_alloc(m, slots, node) : NULL;
+    if (!heat_nodes || (wants_source && !heat_sources)) {
+        gs4i_free(m, heat_nodes, slots, node);
+        gs4i_free(m, heat_sources, slots, node);
         return GS4_ERROR_MEMORY;
     }
-    gs4i_free(m, k->content, (size_t)k->slots, node);
-    gs4i_free(m, k->source, (size_t)k->slots, node);
-    k->content = content;
-    k->source = source;
+    gs4i_free(m, k->heat_nodes, (size_t)k->slots, node);
+    gs4i_free(m, k->heat_sources, (size_t)k->slots, node);
+    k->heat_nodes = heat_nodes;
+    k->heat_sources = heat_sources;
     k->slots = sim->grid.capacity;
     return GS4_OK;
 }
 
 /* T~ on the nodes. Nothing that lasts is written. */
-static int gs4i_conduct(gs4_sim *sim, gs4i_node_pass *nodes)
+static int gs4i_solve_heat(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     gs4i_conduction *k = &sim->conduction;
     const double start = gs4i_now(sim);
@@ -11012,15 +11086,15 @@ static int gs4i_conduct(gs4_sim *sim, gs4i_node_pass *nodes)
     memset(k->kind, GS4_CELL_SOLID, cells);
     for (a = GS4I_HEAT_T; a <= GS4I_HEAT_X; a++) memset(k->field[a], 0, cells * sizeof(gs4_real));
     k->exposed = sim->desc.air_is_isothermal;
-    for (a = 0; a < sim->boundary.body_count; a++)
-        k->exposed |= sim->boundary.bodies[a].is.is_isothermal;
+    for (a = 0; a < sim->boundary.collider_count; a++)
+        k->exposed |= sim->boundary.colliders[a].is.is_isothermal;
     k->linked = k->exposed;
     for (a = 0; a < 6; a++) k->linked |= sim->desc.wall_is_isothermal[a];
     gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_heat_nodes, nodes);
     gs4i_parallel_for(&sim->tasks, k->size[2] + 1, gs4i_heat_faces, nodes);
     gs4i_close_faint_faces(k);
     gs4i_parallel_for(&sim->tasks, k->size[2], gs4i_heat_flows, nodes);
-    result = gs4i_solve_heat(sim);
+    result = gs4i_solve_heat_system(sim);
     if (result != GS4_OK) return result;
     gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_heat_back, nodes);
     gs4i_fill_heat(sim);
@@ -11062,7 +11136,7 @@ static int gs4i_fail_bad(gs4_sim *sim, const gs4i_report *r)
 #define GS4I_SOUND_EIGENVALUE GS4I_C(3.0)
 #define GS4I_VISCOUS_EIGENVALUE GS4I_C(2.5)
 /* so many times as large with sharpened gradients */
-#define GS4I_SHARPER GS4I_C(2.3)
+#define GS4I_DECONVOLVED_EIGENVALUES GS4I_C(2.3)
 /* lone particles with their affine field: sum |grad w|^2 / w */
 #define GS4I_EULER_SOUND_EIGENVALUE GS4I_C(12.0)
 #define GS4I_EULER_VISCOUS_EIGENVALUE GS4I_C(16.0)
@@ -11074,7 +11148,7 @@ static gs4i_report gs4i_with_both_phases(const gs4_sim *sim, gs4i_report r)
     int i;
     memset(none, 0, sizeof none);
     for (i = 0; i < sim->material_count && sim->particles.count; i++) {
-        const gs4i_law *l = &sim->laws[i], *solid = &sim->frozen[i];
+        const gs4i_material_constants *l = &sim->constants[i], *solid = &sim->solid_phase[i];
         gs4_real mu;
         if (!l->is.can_melt) continue;
         mu = l->local * gs4i_viscosity_of(l, l->melting, none, 0);
@@ -11104,7 +11178,7 @@ static gs4_real gs4i_stable_dt(const gs4_sim *sim, const gs4i_report *seen)
     /* of sound and of elasticity */
     const double wave =
         sqrt((double)r->max_sound * (double)r->max_sound + (double)r->max_stiffness);
-    const double sharper = sim->desc.sharp_gradients ? (double)GS4I_SHARPER : 1;
+    const double sharper = sim->desc.sharp_gradients ? (double)GS4I_DECONVOLVED_EIGENVALUES : 1;
     const double w =
         sqrt(sharper * (double)(euler ? GS4I_EULER_SOUND_EIGENVALUE : GS4I_SOUND_EIGENVALUE)) * wave
         / h;
@@ -11120,8 +11194,8 @@ static gs4_real gs4i_stable_dt(const gs4_sim *sim, const gs4i_report *seen)
     if ((double)r->max_gradient * dt > 1) dt = 1 / (double)r->max_gradient;
     /* so that no particle needs more substeps than there may be */
     for (i = 0; i < sim->material_count; i++)
-        if ((double)sim->laws[i].inv_lambda * dt > 1000)
-            dt = 1000 / (double)sim->laws[i].inv_lambda;
+        if ((double)sim->constants[i].inv_lambda * dt > 1000)
+            dt = 1000 / (double)sim->constants[i].inv_lambda;
     if (dt > (double)GS4I_HUGE) dt = (double)GS4I_HUGE;
     return GS4I_C(dt);
 }
@@ -11131,14 +11205,14 @@ static gs4_real gs4i_stable_dt(const gs4_sim *sim, const gs4i_report *seen)
 static void gs4i_look_at_particles(const gs4_sim *sim, gs4i_report *r)
 {
     const gs4i_particles *p = &sim->particles;
-    const gs4i_reach reach = { 0, 0 };
-    gs4i_batch_laws laws;
-    gs4i_history_laws past;
+    const gs4i_prediction prediction = { 0, 0 };
+    gs4i_batch_constants constants;
+    gs4i_history_constants past;
     gs4i_seen seen;
     int i, c;
     gs4i_report_clear(r);
     gs4i_see_nothing(&seen);
-    memset(&laws, 0, sizeof laws);
+    memset(&constants, 0, sizeof constants);
     memset(&past, 0, sizeof past);
     for (i = 0; i < p->count; i += GS4I_BATCH) {
         const int n = p->count - i < GS4I_BATCH ? p->count - i : GS4I_BATCH;
@@ -11146,37 +11220,37 @@ static void gs4i_look_at_particles(const gs4_sim *sim, gs4i_report *r)
         gs4i_gradient L;
         gs4i_symmetric sigma;
         gs4i_lanes mu;
-        gs4i_load_batch(p, (size_t)i, n, reach, &q);
+        gs4i_load_batch(p, (size_t)i, n, prediction, &q);
         if (!p->with_rates)
             gs4i_load_affine(p, (size_t)i, n, L);
         else
             memset(L, 0, sizeof L);
-        gs4i_take_laws(sim->laws, sim->frozen, p, (size_t)i, n, &laws);
+        gs4i_load_constants(sim->constants, sim->solid_phase, p, (size_t)i, n, &constants);
         if (p->with_heat) {
             gs4i_lanes own[4];
             gs4i_to_lanes(p->heat + 4 * (size_t)i, n, own);
-            memcpy(laws.temperature, own[0], sizeof own[0]);
+            memcpy(constants.temperature, own[0], sizeof own[0]);
         }
-        gs4i_liquid_stress(&laws, q.v[3], L, sigma, mu);
-        gs4i_see_liquids(&seen, &laws, q.v[3], mu);
+        gs4i_liquid_stress(&constants, q.v[3], L, sigma, mu);
+        gs4i_see_liquids(&seen, &constants, q.v[3], mu);
         gs4i_see_motion(&seen, q.v, L);
         if (p->elastic_reals) {
             gs4i_elastic e;
             gs4i_lanes G, stiffness;
             gs4i_load_elastic(p->elastic + (size_t)p->elastic_reals * (size_t)i, p->elastic_reals,
                               n, &e);
-            gs4i_take_elastic_laws(&laws, &past.elastic);
+            gs4i_load_elastic_constants(&constants, &past.elastic);
             gs4i_moduli(&past.elastic, L, G);
             gs4i_see_elastic(G, e.s, stiffness);
-            gs4i_see_stiffness(p, (size_t)i, n, &laws, stiffness, &seen, r);
+            gs4i_see_stiffness(p, (size_t)i, n, &constants, stiffness, &seen, r);
         }
-        if (p->deformation_reals && gs4i_take_solid_laws(&laws, &past.solid)) {
+        if (p->deformation_reals && gs4i_load_solid_constants(&constants, &past.solid)) {
             gs4i_deformation e;
             gs4i_lanes stiffness;
             gs4i_load_deformation(p->deformation + (size_t)p->deformation_reals * (size_t)i,
                                   p->deformation_reals, n, &e);
             gs4i_solid_stress(&past.solid, e.F, q.v[3], sigma, stiffness);
-            gs4i_see_stiffness(p, (size_t)i, n, &laws, stiffness, &seen, r);
+            gs4i_see_stiffness(p, (size_t)i, n, &constants, stiffness, &seen, r);
         }
     }
     gs4i_report_liquids(r, &seen);
@@ -11184,70 +11258,72 @@ static void gs4i_look_at_particles(const gs4_sim *sim, gs4i_report *r)
     r->max_speed = GS4I_SQRT(r->max_speed);
     r->max_gradient = GS4I_SQRT(r->max_gradient);
     /* what bodies and mouths will do to their nodes */
-    for (c = 0; c < sim->boundary.body_count; c++) {
-        const gs4i_body *b = &sim->boundary.bodies[c];
+    for (c = 0; c < sim->boundary.collider_count; c++) {
+        const gs4i_collider *b = &sim->boundary.colliders[c];
         r->max_speed =
             gs4i_max(r->max_speed, gs4i_max(gs4i_length(b->is.velocity), gs4i_length(b->flow)));
     }
 }
 
 /* The member of the family (r, s), or its first step. */
-static void gs4i_family(gs4i_rule *k, gs4_real r, gs4_real s, int afresh)
+static void gs4i_family(gs4i_integrator *k, gs4_real r, gs4_real s, int restart)
 {
-    k->alpha_m = afresh ? GS4I_C(1) : (3 + r + s - r * s) / (2 * (1 + r) * (1 + s));
-    k->alpha_f = afresh ? GS4I_C(0.5) : 1 / (1 + r);
-    k->gamma = afresh ? GS4I_C(1) : 1 / (1 + s);
+    k->alpha_m = restart ? GS4I_C(1) : (3 + r + s - r * s) / (2 * (1 + r) * (1 + s));
+    k->alpha_f = restart ? GS4I_C(0.5) : 1 / (1 + r);
+    k->gamma = restart ? GS4I_C(1) : 1 / (1 + s);
 }
 
 /* Temperatures mix as velocities fade, but no faster than a step can follow; 2 s is at least dt. */
-static gs4_real gs4i_mixing(const gs4i_rule *k)
+static gs4_real gs4i_mixing(const gs4i_integrator *k)
 {
     const gs4_real most = GS4I_C(0.5) / k->s;
-    return k->fading > 0 ? most : gs4i_min(k->decay, most);
+    return k->decayed_at_once > 0 ? most : gs4i_min(k->decay, most);
 }
 
-static gs4i_rule gs4i_make_rule(const gs4_sim *sim, gs4_real dt)
+static gs4i_integrator gs4i_make_integrator(const gs4_sim *sim, gs4_real dt)
 {
     const gs4_real r = sim->desc.rho_inf, s = sim->desc.rho_inf_spurious;
     gs4_real most, y;
-    gs4i_rule k;
+    gs4i_integrator k;
     int i;
     k.dt = dt;
-    k.afresh = sim->afresh;
-    gs4i_family(&k, r, s, k.afresh);
-    k.reach.ahead = sim->particles.with_rates ? k.alpha_f * dt : GS4I_C(0);
-    k.reach.shift = k.afresh ? GS4I_C(0) : sim->shift;
+    k.restart = sim->restart;
+    gs4i_family(&k, r, s, k.restart);
+    k.prediction.ahead = sim->particles.with_rates ? k.alpha_f * dt : GS4I_C(0);
+    k.prediction.shift = k.restart ? GS4I_C(0) : sim->shift;
     k.next_shift = (k.gamma - GS4I_C(0.5)) * dt;
     /* of heat: backward Euler */
     if (!sim->particles.with_rates) k.alpha_m = k.alpha_f = k.gamma = 1;
     k.s = k.alpha_f * k.gamma * dt / k.alpha_m;
-    k.before = sim->particles.with_rates ? k.reach.ahead - k.s : GS4I_C(0);
+    k.before = sim->particles.with_rates ? k.prediction.ahead - k.s : GS4I_C(0);
     k.decay = sim->desc.flip_decay_time > 0 && gs4i_finite(sim->desc.flip_decay_time)
                   /* faster makes no difference */
                   ? 1 / gs4i_max(sim->desc.flip_decay_time, GS4I_C(1e-6) * dt)
                   : GS4I_C(0);
     k.damped = 1 / (1 + k.s * k.decay);
-    k.fading = 0;
+    k.decayed_at_once = 0;
     if (k.decay * dt > 1) {
-        k.fading = 1 - k.damped;
+        k.decayed_at_once = 1 - k.damped;
         k.decay = 0;
         k.damped = 1;
     }
     most = GS4I_C(3.2) * (1 - r * s) / ((3 + r + s - r * s) * dt);
     y = most / gs4i_max(most + k.decay, GS4I_TINY); /* 1 / (1 + x) */
-    k.fade = k.decay * y / (1 - y + y * y);
+    k.stable_decay = k.decay * y / (1 - y + y * y);
     k.inv_area = sim->grid.inv_h * sim->grid.inv_h;
     k.mixing = sim->particles.with_rates ? gs4i_mixing(&k) : GS4I_C(0.5) / k.s;
     k.inv_alpha_m = 1 / k.alpha_m;
     k.fast_decay = 0;
-    k.inv_full = 0;
-    k.inv_fullest = GS4I_HUGE;
+    k.inv_node_mass = 0;
+    k.inv_densest_node_mass = GS4I_HUGE;
     for (i = 0; i < sim->material_count; i++) {
-        k.fast_decay = gs4i_max(k.fast_decay, sim->laws[i].sound_speed / sim->grid.h);
-        k.inv_full = gs4i_max(k.inv_full,
-                              sim->laws[i].inv_density / (sim->grid.h * sim->grid.h * sim->grid.h));
-        k.inv_fullest = gs4i_min(k.inv_fullest, sim->laws[i].inv_density
-                                                    / (sim->grid.h * sim->grid.h * sim->grid.h));
+        k.fast_decay = gs4i_max(k.fast_decay, sim->constants[i].sound_speed / sim->grid.h);
+        k.inv_node_mass =
+            gs4i_max(k.inv_node_mass,
+                     sim->constants[i].inv_density / (sim->grid.h * sim->grid.h * sim->grid.h));
+        k.inv_densest_node_mass =
+            gs4i_min(k.inv_densest_node_mass,
+                     sim->constants[i].inv_density / (sim->grid.h * sim->grid.h * sim->grid.h));
     }
     return k;
 }
@@ -11255,15 +11331,15 @@ static gs4i_rule gs4i_make_rule(const gs4_sim *sim, gs4_real dt)
 /* The same for heat, which has steps far beyond its own limit: there a rate is what a step as
  * long as the last one has left to do, and where dt has grown by more than twice, rates start
  * afresh. */
-static gs4i_rule gs4i_make_warm_rule(const gs4_sim *sim)
+static gs4i_integrator gs4i_make_heat_integrator(const gs4_sim *sim)
 {
-    gs4i_rule k = sim->rule;
+    gs4i_integrator k = sim->integrator;
     const gs4_real grown = sim->last_dt > 0 && sim->last_dt < (double)k.dt
                                ? GS4I_C(sim->last_dt / (double)k.dt)
                                : GS4I_C(1);
     if (sim->particles.with_rates && grown < GS4I_C(0.5)) {
         gs4i_family(&k, 0, 0, 1);
-        k.reach.ahead = k.before = 0;
+        k.prediction.ahead = k.before = 0;
         k.s = k.alpha_f * k.gamma * k.dt / k.alpha_m;
         k.inv_alpha_m = 1 / k.alpha_m;
         k.mixing = gs4i_mixing(&k);
@@ -11282,9 +11358,9 @@ static void gs4i_clear_nodes(int index, void *context)
     memset(g->momentum + (size_t)begin * GS4I_NODE_REALS, 0, bytes);
     memset(g->force + (size_t)begin * GS4I_NODE_REALS, 0, bytes);
     if (sim->particles.with_heat)
-        memset(sim->conduction.content + (size_t)begin * GS4I_NODE_REALS, 0, bytes);
-    if (sim->conduction.source)
-        memset(sim->conduction.source + (size_t)begin * GS4I_NODE_REALS, 0, bytes);
+        memset(sim->conduction.heat_nodes + (size_t)begin * GS4I_NODE_REALS, 0, bytes);
+    if (sim->conduction.heat_sources)
+        memset(sim->conduction.heat_sources + (size_t)begin * GS4I_NODE_REALS, 0, bytes);
 }
 
 static void gs4i_clear_jumps(int index, void *context)
@@ -11317,22 +11393,25 @@ static void gs4i_hold_nodes(const gs4_sim *sim, int slot, gs4_real *velocity,
     gs4_real none[3], before[3];
     int b, i, c;
     if (!sim->grid.jump_of[slot]) return;
-    for (b = 0; b < sim->boundary.body_count; b++) {
-        const gs4i_body *body = &sim->boundary.bodies[b];
-        if (body->asleep || !gs4i_body_is_near(body, &sim->grid, slot)) continue;
+    for (b = 0; b < sim->boundary.collider_count; b++) {
+        const gs4i_collider *collider = &sim->boundary.colliders[b];
+        if (collider->asleep || !gs4i_collider_is_near(collider, &sim->grid, slot)) continue;
         for (i = 0; i < GS4I_BLOCK_NODES; i++) {
             gs4_real *v = velocity + 4 * i;
             if (!(v[3] > 0)) continue; /* no particle sees it */
             none[0] = none[1] = none[2] = 0;
-            if (gs4i_is_sticky(body)
+            if (gs4i_is_sticky(collider)
                 && *gs4i_contact_at(&sim->grid, (uint32_t)(64 * slot + i)) & GS4I_IMAGED) {
-                if (jump && gs4i_body_distance(body, gs4i_node_position(&sim->grid, slot, i)) < 0)
+                if (jump
+                    && gs4i_collider_distance(collider, gs4i_node_position(&sim->grid, slot, i))
+                           < 0)
                     jump[4 * i + 3] = 1;
                 continue;
             }
             for (c = 0; c < 3; c++) before[c] = v[c];
-            if (!gs4i_body_hold(body, gs4i_node_position(&sim->grid, slot, i), sim->grid.h,
-                                sim->rule.dt, v, acceleration ? acceleration + 4 * i : none))
+            if (!gs4i_collider_hold(collider, gs4i_node_position(&sim->grid, slot, i), sim->grid.h,
+                                    sim->integrator.dt, v,
+                                    acceleration ? acceleration + 4 * i : none))
                 continue;
             for (c = 0; c < 3 && jump; c++) jump[4 * i + c] += v[c] - before[c];
         }
@@ -11362,11 +11441,11 @@ static void gs4i_node_velocities(int index, void *context)
 
 /* What a node remembered before this step. A node that was empty takes ag_i = acc_i; where rates
  * start afresh ag_i = 0, as the particles' are. */
-GS4I_INLINE void gs4i_remembered(const gs4i_rule *rule, const gs4_real *ag, const gs4i_quad *acc,
-                                 gs4i_quad *before)
+GS4I_INLINE void gs4i_remembered_before(const gs4i_integrator *integrator, const gs4_real *ag,
+                                        const gs4i_quad *acc, gs4i_quad *before)
 {
     const gs4i_quad zero = { GS4I_LANES(0, 0, 0, 0) };
-    if (rule->afresh)
+    if (integrator->restart)
         *before = zero;
     else if ((int)ag[3] & 1)
         GS4I_LOAD(*before, ag);
@@ -11378,10 +11457,10 @@ GS4I_INLINE void gs4i_remembered(const gs4i_rule *rule, const gs4_real *ag, cons
  * than 10 % to 1 at 43 %: the acceleration of a nearly empty node is large, jumps when a
  * particle comes or goes, and would spoil the order in time (measured: order 1.2 to 1.6 of the
  * velocity without this, 1.9 to 2.0 with it). */
-GS4I_INLINE gs4_real gs4i_node_share(const gs4i_rule *rule, gs4_real filled)
+GS4I_INLINE gs4_real gs4i_node_weight(const gs4i_integrator *integrator, gs4_real filled)
 {
     const gs4_real t = (filled - GS4I_C(0.1)) * 3;
-    return rule->afresh || t >= 1 ? GS4I_C(1) : t <= 0 ? GS4I_C(0) : t * t * (3 - 2 * t);
+    return integrator->restart || t >= 1 ? GS4I_C(1) : t <= 0 ? GS4I_C(0) : t * t * (3 - 2 * t);
 }
 
 /* S6: acc_i = f_i / m_i; u_i = v_i + s (acc_i - ag_i). Then bodies. */
@@ -11389,22 +11468,23 @@ static void gs4i_node_accelerations(int index, void *context)
 {
     const gs4i_node_pass *pass = (const gs4i_node_pass *)context;
     const gs4i_grid *g = &pass->sim->grid;
-    const gs4i_rule *rule = &pass->sim->rule;
+    const gs4i_integrator *integrator = &pass->sim->integrator;
     int s, i;
     for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
         gs4_real *q = g->momentum + (size_t)s * GS4I_NODE_REALS,
                  *f = g->force + (size_t)s * GS4I_NODE_REALS;
-        const gs4_real *ag = g->memory + (size_t)s * GS4I_NODE_REALS;
+        const gs4_real *ag = g->remembered + (size_t)s * GS4I_NODE_REALS;
         for (i = 0; i < 4 * GS4I_BLOCK_NODES; i += 4) {
             const gs4_real inverse = q[i + 3] > pass->lightest ? 1 / q[i + 3] : GS4I_C(0);
-            const gs4_real share = rule->s * gs4i_node_share(rule, q[i + 3] * rule->inv_full);
+            const gs4_real share =
+                integrator->s * gs4i_node_weight(integrator, q[i + 3] * integrator->inv_node_mass);
             const gs4i_quad some = { GS4I_LANES(share, share, share, 0) };
             gs4i_quad acc, before, u;
             GS4I_LOAD(acc, f + i);
             GS4I_LOAD(u, q + i);
             GS4I_SPLAT_MUL(acc, inverse, acc);
             GS4I_STORE(f + i, acc);
-            gs4i_remembered(rule, ag + i, &acc, &before);
+            gs4i_remembered_before(integrator, ag + i, &acc, &before);
             GS4I_DIFFERENCE(acc, acc, before);
             GS4I_MAD(u, some, acc);
             GS4I_STORE(q + i, u);
@@ -11415,24 +11495,24 @@ static void gs4i_node_accelerations(int index, void *context)
 
 /* ag_i += (acc_i - ag_i) / alpha_m, once the step is certain: it belongs to the state. Images in
  * contact have none. */
-static void gs4i_node_memories(int index, void *context)
+static void gs4i_remember_accelerations(int index, void *context)
 {
     const gs4i_node_pass *pass = (const gs4i_node_pass *)context;
     const gs4i_grid *g = &pass->sim->grid;
-    const gs4i_rule *rule = &pass->sim->rule;
+    const gs4i_integrator *integrator = &pass->sim->integrator;
     int s, i;
     for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
         const gs4_real *q = g->momentum + (size_t)s * GS4I_NODE_REALS,
                        *f = g->force + (size_t)s * GS4I_NODE_REALS;
-        gs4_real *ag = g->memory + (size_t)s * GS4I_NODE_REALS;
+        gs4_real *ag = g->remembered + (size_t)s * GS4I_NODE_REALS;
         for (i = 0; i < 4 * GS4I_BLOCK_NODES; i += 4) {
             const int flags = g->jump_of[s] ? *gs4i_contact_at(g, (uint32_t)(64 * s + i / 4)) : 0;
             const int there = q[i + 3] > pass->lightest && !(flags & 7);
             gs4i_quad acc, before;
             GS4I_LOAD(acc, f + i);
-            gs4i_remembered(rule, ag + i, &acc, &before);
+            gs4i_remembered_before(integrator, ag + i, &acc, &before);
             GS4I_DIFFERENCE(acc, acc, before);
-            GS4I_SPLAT_MAD(before, rule->inv_alpha_m, acc);
+            GS4I_SPLAT_MAD(before, integrator->inv_alpha_m, acc);
             GS4I_SPLAT_MUL(before, GS4I_C(there), before);
             GS4I_STORE(ag + i, before);
             ag[i + 3] = GS4I_C(there + (flags & 8 ? 2 : 0));
@@ -11440,7 +11520,7 @@ static void gs4i_node_memories(int index, void *context)
     }
 }
 
-/* Mean velocity of the nodes of each block, and max_i q_i |u_i - mean|_1 with q of gs4i_is_calm;
+/* Mean velocity of the nodes of each block, and max_i q_i |u_i - mean|_1 with q of gs4i_is_safe;
  * -1 where there is no material. */
 static void gs4i_node_spreads(int index, void *context)
 {
@@ -11479,25 +11559,27 @@ static void gs4i_node_spreads(int index, void *context)
     }
 }
 
-static void gs4i_find_fullness(int index, void *context)
+static void gs4i_find_fill_fractions(int index, void *context)
 {
     const gs4_sim *sim = ((const gs4i_node_pass *)context)->sim;
     const gs4i_grid *g = &sim->grid;
     const size_t end = (size_t)GS4I_BLOCK_NODES * (size_t)gs4i_group_end(g, index);
     size_t i = (size_t)GS4I_BLOCK_NODES * (size_t)(index * GS4I_GROUP);
-    for (; i < end; i++) g->full[i] = gs4i_fullness(g->momentum[4 * i + 3] * sim->rule.inv_fullest);
+    for (; i < end; i++)
+        g->fill_fraction[i] = gs4i_deconvolution_weight(g->momentum[4 * i + 3]
+                                                        * sim->integrator.inv_densest_node_mass);
 }
 
-static void gs4i_sharpen_velocities(int index, void *context)
+static void gs4i_deconvolve_velocities(int index, void *context)
 {
     const gs4i_grid *g = &((const gs4i_node_pass *)context)->sim->grid;
     int s;
     for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++)
-        gs4i_sharpen_block(g, s, g->momentum, 0);
+        gs4i_deconvolve_block(g, s, g->momentum, 0);
 }
 
 /* Forces of stress, and the weight of what is on the nodes. */
-static void gs4i_sharpen_forces(int index, void *context)
+static void gs4i_deconvolve_forces(int index, void *context)
 {
     const gs4_sim *sim = ((const gs4i_node_pass *)context)->sim;
     const gs4i_grid *g = &sim->grid;
@@ -11505,8 +11587,8 @@ static void gs4i_sharpen_forces(int index, void *context)
                                            sim->desc.gravity.z, 0) };
     int s, i;
     for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
-        gs4_real *f = g->sharp + (size_t)GS4I_NODE_REALS * (size_t)s;
-        gs4i_sharpen_block(g, s, g->force, 1);
+        gs4_real *f = g->deconvolved + (size_t)GS4I_NODE_REALS * (size_t)s;
+        gs4i_deconvolve_block(g, s, g->force, 1);
         for (i = 0; i < GS4I_NODE_REALS; i += 4) {
             gs4i_quad sum;
             GS4I_LOAD(sum, f + i);
@@ -11528,7 +11610,8 @@ static void gs4i_sharpen_forces(int index, void *context)
 static int gs4i_after_occupy(gs4_sim *sim)
 {
     gs4i_memory *m = &sim->memory;
-    if (gs4i_list_images(m, &sim->boundary, &sim->grid) != GS4_OK) return gs4i_fail_memory(sim);
+    if (gs4i_list_mirror_nodes(m, &sim->boundary, &sim->grid) != GS4_OK)
+        return gs4i_fail_memory(sim);
     if (sim->grid.occupied_capacity > sim->report_capacity) {
         gs4i_report *r =
             (gs4i_report *)gs4i_alloc(m, (size_t)sim->grid.occupied_capacity, sizeof *r);
@@ -11544,12 +11627,13 @@ static int gs4i_after_occupy(gs4_sim *sim)
 static int gs4i_bin(gs4_sim *sim)
 {
     const double start = gs4i_now(sim);
-    if (gs4i_particles_sort(&sim->memory, &sim->tasks, &sim->particles, &sim->grid, sim->rule.reach)
+    if (gs4i_particles_sort(&sim->memory, &sim->tasks, &sim->particles, &sim->grid,
+                            sim->integrator.prediction)
         != GS4_OK)
         return gs4i_fail_memory(sim);
-    sim->unsorted = 1;
+    sim->needs_sort = 1;
     GS4I_TRY(gs4i_after_occupy(sim));
-    sim->unsorted = 0;
+    sim->needs_sort = 0;
     sim->seconds[GS4I_CLOCK_SORT] += gs4i_now(sim) - start;
     return GS4_OK;
 }
@@ -11561,13 +11645,13 @@ static int gs4i_rasterise(gs4_sim *sim, gs4i_node_pass *nodes)
     const int euler = sim->desc.integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER;
     int tries;
     for (tries = 0; tries < 2; tries++) {
-        if (sim->unsorted || tries) GS4I_TRY(gs4i_bin(sim));
+        if (sim->needs_sort || tries) GS4I_TRY(gs4i_bin(sim));
         gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_clear_nodes, nodes);
-        GS4I_TRY(gs4i_find_ghosts(sim));
+        GS4I_TRY(gs4i_find_image_particles(sim));
         gs4i_scatter(sim, !euler                     ? gs4i_scatter_momentum
                           : sim->particles.with_heat ? gs4i_scatter_euler_and_heat
                                                      : gs4i_scatter_euler);
-        if (!gs4i_all_reports(sim).strayed) return GS4_OK;
+        if (!gs4i_all_reports(sim).left_tile) return GS4_OK;
     }
     return gs4i_fail(sim, GS4_ERROR_UNSTABLE,
                      "particles would move more than a cell beyond the domain in one step; the "
@@ -11575,10 +11659,10 @@ static int gs4i_rasterise(gs4_sim *sim, gs4i_node_pass *nodes)
 }
 
 /* S v_i or S u_i, images included. */
-static void gs4i_sharpen(gs4_sim *sim, gs4i_node_pass *nodes)
+static void gs4i_deconvolve(gs4_sim *sim, gs4i_node_pass *nodes)
 {
-    gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_sharpen_velocities, nodes);
-    gs4i_fill_images(&sim->boundary, &sim->grid, sim->grid.sharp);
+    gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_deconvolve_velocities, nodes);
+    gs4i_fill_mirror_nodes(&sim->boundary, &sim->grid, sim->grid.deconvolved);
 }
 
 /* Velocities of the nodes, with walls and bodies; what contact took is left in the jumps. */
@@ -11586,18 +11670,18 @@ static void gs4i_set_velocities(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     const int groups = gs4i_groups(sim);
     gs4i_parallel_for(&sim->tasks, groups, gs4i_clear_jumps, nodes);
-    gs4i_scatter_ghosts(sim, gs4i_mark_ghosts);
-    gs4i_scatter_ghosts(sim, sim->particles.with_rates ? gs4i_scatter_ghost_momentum
-                                                       : gs4i_scatter_ghost_affine);
+    gs4i_scatter_image_particles(sim, gs4i_mark_image_nodes);
+    gs4i_scatter_image_particles(sim, sim->particles.with_rates ? gs4i_scatter_image_momentum
+                                                                : gs4i_scatter_image_affine);
     gs4i_fold_momentum(&sim->boundary, &sim->grid);
     gs4i_parallel_for(&sim->tasks, groups, gs4i_node_velocities, nodes);
-    gs4i_fill_images(&sim->boundary, &sim->grid, sim->grid.momentum);
-    if (sim->grid.with_sharp) {
-        gs4i_parallel_for(&sim->tasks, groups, gs4i_find_fullness, nodes);
-        gs4i_fill_fullness(&sim->boundary, &sim->grid);
-        gs4i_sharpen(sim, nodes);
+    gs4i_fill_mirror_nodes(&sim->boundary, &sim->grid, sim->grid.momentum);
+    if (sim->grid.with_deconvolution) {
+        gs4i_parallel_for(&sim->tasks, groups, gs4i_find_fill_fractions, nodes);
+        gs4i_fill_mirror_fractions(&sim->boundary, &sim->grid);
+        gs4i_deconvolve(sim, nodes);
     }
-    gs4i_gather_ghosts(sim, gs4i_gather_ghost_velocity);
+    gs4i_gather_image_particles(sim, gs4i_gather_image_velocity);
 }
 
 /* Forces on nodes, whole. */
@@ -11605,14 +11689,14 @@ static void gs4i_finish_forces(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     gs4i_grid *g = &sim->grid;
     gs4_real *force = g->force;
-    gs4i_scatter_ghosts(sim, gs4i_scatter_ghost_force);
+    gs4i_scatter_image_particles(sim, gs4i_scatter_image_force);
     gs4i_fold_force(&sim->boundary, g, 1);
-    if (!g->with_sharp) return;
-    gs4i_fill_images(&sim->boundary, g, g->force);
-    gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_sharpen_forces, nodes);
-    g->force = g->sharp;
-    g->sharp = force;
-    gs4i_weigh_images(&sim->boundary, g, sim->desc.gravity);
+    if (!g->with_deconvolution) return;
+    gs4i_fill_mirror_nodes(&sim->boundary, g, g->force);
+    gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_deconvolve_forces, nodes);
+    g->force = g->deconvolved;
+    g->deconvolved = force;
+    gs4i_weigh_mirror_nodes(&sim->boundary, g, sim->desc.gravity);
     gs4i_fold_force(&sim->boundary, g, 0);
 }
 
@@ -11623,19 +11707,20 @@ static int gs4i_check_stage(gs4_sim *sim)
     gs4i_report r = gs4i_all_reports(sim);
     if (r.bad) return gs4i_fail_bad(sim, &r);
     sim->stage_limit = gs4i_stable_dt(sim, &r);
-    if (sim->rule.dt > GS4I_C(1.25) * sim->stage_limit)
-        return gs4i_fail_value(
-            sim, GS4_ERROR_UNSTABLE, "viscosity or compression rose during the step: dt ",
-            (double)sim->rule.dt, " s is beyond the stability limit there; the step was not taken");
+    if (sim->integrator.dt > GS4I_C(1.25) * sim->stage_limit)
+        return gs4i_fail_value(sim, GS4_ERROR_UNSTABLE,
+                               "viscosity or compression rose during the step: dt ",
+                               (double)sim->integrator.dt,
+                               " s is beyond the stability limit there; the step was not taken");
     return GS4_OK;
 }
 
 /* Before anything is written to the particles: can the step be trusted? */
-static int gs4i_rehearse(gs4_sim *sim, gs4i_node_pass *nodes)
+static int gs4i_trial_pass(gs4_sim *sim, gs4i_node_pass *nodes)
 {
-    static const gs4_task_fn tasks[2][2] = { { gs4i_rehearse_task, gs4i_rehearse_with_heat_task },
-                                             { gs4i_rehearse_euler_task,
-                                               gs4i_rehearse_euler_with_heat_task } };
+    static const gs4_task_fn tasks[2][2] = { { gs4i_trial_task, gs4i_trial_with_heat_task },
+                                             { gs4i_trial_euler_task,
+                                               gs4i_trial_euler_with_heat_task } };
     gs4i_report r;
     gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_node_spreads, nodes);
     gs4i_gather(
@@ -11664,19 +11749,19 @@ static int gs4i_add_one(gs4_sim *sim, gs4_vec3 x, gs4_vec3 v, gs4_real mass, int
     p->velocity[4 * i + 3] = 1;
     if (p->with_rates) {
         memset(p->rate + 4 * i, 0, 4 * sizeof(gs4_real));
-        memset(p->lag + 4 * i, 0, 4 * sizeof(gs4i_half));
+        memset(p->position_residual + 4 * i, 0, 4 * sizeof(gs4i_half));
     }
     for (k = 0; k < 3 && p->affine[k]; k++) memset(p->affine[k] + 4 * i, 0, 4 * sizeof(gs4_real));
     if (p->elastic_reals)
         memset(p->elastic + (size_t)p->elastic_reals * i, 0,
                (size_t)p->elastic_reals * sizeof(gs4_real));
     if (p->deformation_reals) gs4i_undeform(p, i, 1);
-    if (p->with_heat) gs4i_begin_heat(p, i, &sim->laws[material], temperature);
+    if (p->with_heat) gs4i_begin_heat(p, i, &sim->constants[material], temperature);
     p->id[i] = sim->next_id++;
     p->material[i] = (uint8_t)material;
     p->count++;
     sim->min_mass = sim->min_mass > 0 ? gs4i_min(sim->min_mass, mass) : mass;
-    sim->unsorted = 1;
+    sim->needs_sort = 1;
     return 1;
 }
 
@@ -11697,20 +11782,20 @@ static gs4_real gs4i_jitter(uint32_t seed, uint64_t number, int axis)
 /* The lattice that flows through a mouth: points that are in it now and were not when last
  * looked at. With `sim` const in spirit when `emit` is 0: then only counts, where the mouth will
  * be in the time `ahead`. Lattice point n of axis a is at low + (n + 1/2) spacing + drift. */
-static int gs4i_mouth_points(gs4_sim *sim, gs4i_emitter *e, const double drift[3], double ahead,
-                             int emit)
+static int gs4i_emitter_points(gs4_sim *sim, gs4i_emitter *e, const double drift[3], double ahead,
+                               int emit)
 {
-    const gs4i_body *mouth = &sim->boundary.bodies[e->body];
-    gs4i_body placed = *mouth;
+    const gs4i_collider *emitter = &sim->boundary.colliders[e->collider];
+    gs4i_collider placed = *emitter;
     const double spacing = (double)e->is.fill.spacing;
-    const gs4_real mass = sim->laws[e->is.fill.material].density * e->is.fill.spacing
+    const gs4_real mass = sim->constants[e->is.fill.material].density * e->is.fill.spacing
                           * e->is.fill.spacing * e->is.fill.spacing;
     double low[3], high[3], origin[3], pivot[3], travelled[3];
     gs4_vec3 lo, hi;
     int64_t from[3], to[3], i, j, k;
     int a, n = 0;
-    if (ahead > 0) gs4i_body_move(&placed, ahead);
-    gs4i_to_double(mouth->is.pivot, pivot);
+    if (ahead > 0) gs4i_collider_move(&placed, ahead);
+    gs4i_to_double(emitter->is.pivot, pivot);
     gs4i_shape_bounds(&e->is.shape, &lo, &hi);
     gs4i_to_double(lo, low);
     gs4i_to_double(hi, high);
@@ -11745,8 +11830,8 @@ static int gs4i_mouth_points(gs4_sim *sim, gs4i_emitter *e, const double drift[3
                 }
                 now = gs4i_vec3(GS4I_C(p[0]), GS4I_C(p[1]), GS4I_C(p[2]));
                 then = gs4i_vec3(GS4I_C(before[0]), GS4I_C(before[1]), GS4I_C(before[2]));
-                if (!(gs4i_shape_or_field(mouth, now) < 0)
-                    || (e->begun && gs4i_shape_or_field(mouth, then) < 0))
+                if (!(gs4i_shape_or_field(emitter, now) < 0)
+                    || (e->begun && gs4i_shape_or_field(emitter, then) < 0))
                     continue;
                 world = gs4i_vec3(GS4I_C(p[0] + travelled[0]), GS4I_C(p[1] + travelled[1]),
                                   GS4I_C(p[2] + travelled[2]));
@@ -11787,7 +11872,7 @@ static int gs4i_prepare_emitters(gs4_sim *sim, double dt)
     int e, n = 0, wanted;
     for (e = 0; e < sim->emitter_count; e++) {
         double drift[3];
-        sim->boundary.bodies[sim->emitters[e].body].asleep =
+        sim->boundary.colliders[sim->emitters[e].collider].asleep =
             !gs4i_emitter_is_on(&sim->emitters[e], sim->time);
         if (!gs4i_emitter_is_on(&sim->emitters[e], sim->time + dt)) continue;
         if (sim->emitters[e].begun)
@@ -11795,7 +11880,7 @@ static int gs4i_prepare_emitters(gs4_sim *sim, double dt)
         else
             memset(drift, 0, sizeof drift);
         if (gs4i_is_due(&sim->emitters[e], drift))
-            n += gs4i_mouth_points(sim, &sim->emitters[e], drift, dt, 0);
+            n += gs4i_emitter_points(sim, &sim->emitters[e], drift, dt, 0);
     }
     if (n == 0) return GS4_OK;
     wanted = sim->particles.count + n;
@@ -11824,22 +11909,22 @@ static void gs4i_emit(gs4_sim *sim, double dt)
             memset(drift, 0, sizeof drift);
         memcpy(m->drift, drift, sizeof drift);
         if (!gs4i_is_due(m, drift)) continue;
-        n = gs4i_mouth_points(sim, m, drift, 0, 1);
+        n = gs4i_emitter_points(sim, m, drift, 0, 1);
         if (n > sim->particles.count - before && sim->desc.log)
             sim->desc.log(1, "an emitter pauses: max_particles is reached", sim->desc.log_user);
         memcpy(m->looked, drift, sizeof drift);
         m->begun = 1;
         /* what is new counts for the next limit */
         {
-            const gs4i_law *law = &sim->laws[m->is.fill.material];
-            sim->worst.max_sound = gs4i_max(sim->worst.max_sound, law->sound_speed);
+            const gs4i_material_constants *mat = &sim->constants[m->is.fill.material];
+            sim->worst.max_sound = gs4i_max(sim->worst.max_sound, mat->sound_speed);
             sim->worst.max_viscosity =
-                gs4i_max(sim->worst.max_viscosity, law->viscosity * law->inv_density);
+                gs4i_max(sim->worst.max_viscosity, mat->viscosity * mat->inv_density);
             sim->worst.max_stiffness =
                 gs4i_max(sim->worst.max_stiffness,
-                         gs4i_max(2 * law->modulus, GS4I_SOLID_WAVES * law->shear_modulus)
-                             * law->inv_density);
-            if (law->varies) sim->unseen = 1;
+                         gs4i_max(2 * mat->modulus, GS4I_SOLID_WAVES * mat->shear_modulus)
+                             * mat->inv_density);
+            if (mat->varies) sim->limits_stale = 1;
         }
     }
 }
@@ -11862,13 +11947,13 @@ static void gs4i_drop_leavers(gs4_sim *sim)
         kept++;
     }
     p->count = (int)kept;
-    sim->unsorted = 1;
+    sim->needs_sort = 1;
 }
 
 /* S8: bodies move, mouths give, leavers go. */
 static void gs4i_finish(gs4_sim *sim)
 {
-    const double dt = (double)sim->rule.dt;
+    const double dt = (double)sim->integrator.dt;
     int b;
     if (sim->particles.count) {
         gs4i_report r = gs4i_all_reports(sim);
@@ -11879,17 +11964,17 @@ static void gs4i_finish(gs4_sim *sim)
         sim->bounded += (uint64_t)r.bounded;
         if (r.left) gs4i_drop_leavers(sim);
     }
-    for (b = 0; b < sim->boundary.body_count; b++) {
-        gs4i_body_move(&sim->boundary.bodies[b], dt);
-        sim->worst.max_speed = gs4i_max(sim->worst.max_speed,
-                                        gs4i_max(gs4i_length(sim->boundary.bodies[b].is.velocity),
-                                                 gs4i_length(sim->boundary.bodies[b].flow)));
+    for (b = 0; b < sim->boundary.collider_count; b++) {
+        gs4i_collider_move(&sim->boundary.colliders[b], dt);
+        sim->worst.max_speed = gs4i_max(
+            sim->worst.max_speed, gs4i_max(gs4i_length(sim->boundary.colliders[b].is.velocity),
+                                           gs4i_length(sim->boundary.colliders[b].flow)));
     }
     sim->time += dt;
     sim->last_dt = dt;
     sim->steps++;
-    sim->afresh = 0;
-    sim->shift = sim->rule.next_shift;
+    sim->restart = 0;
+    sim->shift = sim->integrator.next_shift;
     gs4i_emit(sim, dt);
 }
 
@@ -11897,18 +11982,18 @@ static void gs4i_finish(gs4_sim *sim)
  * surface than there is, hence again with what it saw (kinetic energy that a stiff cube keeps in
  * a quarter of a turn: 0.996 after three times, 0.9999 after ten). A step that is refused
  * forgets it again. */
-static void gs4i_forget_turning(gs4_sim *sim)
+static void gs4i_forget_spin(gs4_sim *sim)
 {
     int i;
     for (i = 0; i < sim->particles.count && sim->particles.deformation_reals; i++)
-        gs4i_set_turning(&sim->particles, (size_t)i, gs4i_vec3(0, 0, 0));
+        gs4i_set_spin(&sim->particles, (size_t)i, gs4i_vec3(0, 0, 0));
 }
 
-static int gs4i_find_turning(gs4_sim *sim, gs4i_node_pass *nodes)
+static int gs4i_find_spin(gs4_sim *sim, gs4i_node_pass *nodes)
 {
-    const gs4_real ahead = sim->rule.reach.ahead;
+    const gs4_real ahead = sim->integrator.prediction.ahead;
     int pass, result = GS4_OK;
-    sim->rule.reach.ahead = 0; /* as it is now, whatever dt is */
+    sim->integrator.prediction.ahead = 0; /* as it is now, whatever dt is */
     for (pass = 0; pass < 10 && result == GS4_OK; pass++) {
         result = gs4i_rasterise(sim, nodes);
         if (result == GS4_OK
@@ -11916,15 +12001,15 @@ static int gs4i_find_turning(gs4_sim *sim, gs4i_node_pass *nodes)
             result = gs4i_fail_memory(sim);
         if (result != GS4_OK) break;
         gs4i_set_velocities(sim, nodes);
-        gs4i_gather(sim, gs4i_see_turning_task);
+        gs4i_gather(sim, gs4i_find_spin_task);
     }
-    sim->rule.reach.ahead = ahead;
+    sim->integrator.prediction.ahead = ahead;
     return result;
 }
 
 /* One step of size dt. Particles are written by stage S7 alone, which is reached only when
  * nothing can fail any more. */
-static int gs4i_take_step(gs4_sim *sim, gs4_real dt)
+static int gs4i_make_step(gs4_sim *sim, gs4_real dt)
 {
     const int euler = sim->desc.integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER;
     const double start = gs4i_now(sim);
@@ -11934,14 +12019,14 @@ static int gs4i_take_step(gs4_sim *sim, gs4_real dt)
     nodes.sim = sim;
     nodes.lightest = gs4i_max(sim->min_mass * GS4I_EPSILON * GS4I_EPSILON, GS4I_TINY);
     sim->stage_limit = 0;
-    sim->rule = gs4i_make_rule(sim, dt);
-    sim->warm = gs4i_make_warm_rule(sim);
+    sim->integrator = gs4i_make_integrator(sim, dt);
+    sim->heat_integrator = gs4i_make_heat_integrator(sim);
     GS4I_TRY(gs4i_prepare_emitters(sim, (double)dt));
     if (sim->particles.count) {
         /* S1 */
-        if (sim->unsorted) GS4I_TRY(gs4i_bin(sim));
-        if (sim->unturned && sim->particles.deformation_reals && !euler)
-            GS4I_TRY(gs4i_find_turning(sim, &nodes));
+        if (sim->needs_sort) GS4I_TRY(gs4i_bin(sim));
+        if (sim->needs_spin && sim->particles.deformation_reals && !euler)
+            GS4I_TRY(gs4i_find_spin(sim, &nodes));
         /* S2, S3 */
         GS4I_TRY(gs4i_rasterise(sim, &nodes));
         if (gs4i_place_jumps(&sim->memory, &sim->boundary, &sim->grid) != GS4_OK)
@@ -11953,16 +12038,17 @@ static int gs4i_take_step(gs4_sim *sim, gs4_real dt)
             gs4i_finish_forces(sim, &nodes);
             /* S6 */
             gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_node_accelerations, &nodes);
-            gs4i_fill_images(&sim->boundary, &sim->grid, sim->grid.momentum);
-            if (sim->grid.with_sharp) gs4i_sharpen(sim, &nodes);
-            gs4i_fill_images(&sim->boundary, &sim->grid, sim->grid.force);
-            gs4i_gather_ghosts(sim, gs4i_gather_ghost_velocity);
-            gs4i_gather_ghosts(sim, gs4i_gather_ghost_acceleration);
+            gs4i_fill_mirror_nodes(&sim->boundary, &sim->grid, sim->grid.momentum);
+            if (sim->grid.with_deconvolution) gs4i_deconvolve(sim, &nodes);
+            gs4i_fill_mirror_nodes(&sim->boundary, &sim->grid, sim->grid.force);
+            gs4i_gather_image_particles(sim, gs4i_gather_image_velocity);
+            gs4i_gather_image_particles(sim, gs4i_gather_image_acceleration);
         }
         GS4I_TRY(gs4i_check_stage(sim));
-        if (heat) GS4I_TRY(gs4i_conduct(sim, &nodes));
-        GS4I_TRY(gs4i_rehearse(sim, &nodes));
-        if (!euler) gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_node_memories, &nodes);
+        if (heat) GS4I_TRY(gs4i_solve_heat(sim, &nodes));
+        GS4I_TRY(gs4i_trial_pass(sim, &nodes));
+        if (!euler)
+            gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_remember_accelerations, &nodes);
         gs4i_gather(sim, euler ? heat ? gs4i_gather_euler_with_heat_task : gs4i_gather_euler_task
                          /* S7 */
                          : heat ? gs4i_correct_with_heat_task
@@ -11970,15 +12056,15 @@ static int gs4i_take_step(gs4_sim *sim, gs4_real dt)
     }
     /* S8 */
     gs4i_finish(sim);
-    sim->unturned = 0;
+    sim->needs_spin = 0;
     sim->seconds[GS4I_CLOCK_TOTAL] += gs4i_now(sim) - start;
     return GS4_OK;
 }
 
 static int gs4i_step(gs4_sim *sim, gs4_real dt)
 {
-    const int result = gs4i_take_step(sim, dt);
-    if (result != GS4_OK && sim->unturned) gs4i_forget_turning(sim);
+    const int result = gs4i_make_step(sim, dt);
+    if (result != GS4_OK && sim->needs_spin) gs4i_forget_spin(sim);
     return result;
 }
 
@@ -12222,14 +12308,14 @@ typedef struct gs4i_head {
     char magic[8];
     uint32_t version, real_size, byte_order, head_size, material_size, body_size, emitter_size;
     int32_t cells[3], integrator, walls[6];
-    double cell_size, origin[3], gravity[3], rho[2], decay, warmth[7];
-    int32_t isothermal[7], sharp; /* walls, air */
+    double cell_size, origin[3], gravity[3], rho[2], decay, heat[7];
+    int32_t isothermal[7], deconvolved; /* walls, air */
     double time, last_dt;
     uint64_t steps;
     uint32_t next_id;
-    int32_t afresh, unsorted, unseen, unturned;
+    int32_t restart, needs_sort, limits_stale, needs_spin;
     double min_mass, fastest, shift;
-    int32_t particles, materials, bodies, emitters, active, occupied, elastic_reals,
+    int32_t particles, materials, colliders, emitters, active, occupied, elastic_reals,
         deformation_reals, with_heat, with_flux;
     uint64_t split, bounded;
     gs4i_report worst;
@@ -12245,13 +12331,13 @@ static void gs4i_head_of(const gs4_sim *sim, gs4i_head *h)
     h->real_size = sizeof(gs4_real);
     h->byte_order = 0x01020304u;
     h->head_size = sizeof *h;
-    h->material_size = sizeof(gs4i_law);
-    h->body_size = sizeof(gs4i_body);
+    h->material_size = sizeof(gs4i_material_constants);
+    h->body_size = sizeof(gs4i_collider);
     h->emitter_size = sizeof(gs4i_emitter);
     for (i = 0; i < 3; i++) h->cells[i] = d->cells[i];
     for (i = 0; i < 6; i++) h->walls[i] = (int32_t)d->walls[i];
     h->integrator = (int32_t)d->integrator;
-    h->sharp = d->sharp_gradients != 0;
+    h->deconvolved = d->sharp_gradients != 0;
     h->cell_size = (double)d->cell_size;
     h->origin[0] = (double)d->origin.x;
     h->origin[1] = (double)d->origin.y;
@@ -12263,25 +12349,25 @@ static void gs4i_head_of(const gs4_sim *sim, gs4i_head *h)
     h->rho[1] = (double)d->rho_inf_spurious;
     h->decay = (double)d->flip_decay_time;
     for (i = 0; i < 6; i++) {
-        h->warmth[i] = (double)d->wall_temperature[i];
+        h->heat[i] = (double)d->wall_temperature[i];
         h->isothermal[i] = d->wall_is_isothermal[i] != 0;
     }
-    h->warmth[6] = (double)d->ambient_temperature;
+    h->heat[6] = (double)d->ambient_temperature;
     h->isothermal[6] = d->air_is_isothermal != 0;
     h->time = sim->time;
     h->last_dt = sim->last_dt;
     h->steps = sim->steps;
     h->next_id = sim->next_id;
-    h->afresh = sim->afresh;
-    h->unsorted = sim->unsorted;
-    h->unseen = sim->unseen;
-    h->unturned = sim->unturned;
+    h->restart = sim->restart;
+    h->needs_sort = sim->needs_sort;
+    h->limits_stale = sim->limits_stale;
+    h->needs_spin = sim->needs_spin;
     h->min_mass = (double)sim->min_mass;
     h->fastest = (double)sim->fastest;
     h->shift = (double)sim->shift;
     h->particles = sim->particles.count;
     h->materials = sim->material_count;
-    h->bodies = sim->boundary.body_count;
+    h->colliders = sim->boundary.collider_count;
     h->emitters = sim->emitter_count;
     h->active = sim->grid.active;
     h->occupied = sim->grid.occupied;
@@ -12305,9 +12391,9 @@ static int gs4i_save(gs4_sim *sim, const char *path)
     gs4i_head_of(sim, &head);
     gs4i_particle_arrays(&sim->particles, a);
     gs4i_file_put(&f, &head, sizeof head);
-    gs4i_file_put(&f, sim->laws, (size_t)sim->material_count * sizeof *sim->laws);
-    gs4i_file_put(&f, sim->boundary.bodies,
-                  (size_t)sim->boundary.body_count * sizeof *sim->boundary.bodies);
+    gs4i_file_put(&f, sim->constants, (size_t)sim->material_count * sizeof *sim->constants);
+    gs4i_file_put(&f, sim->boundary.colliders,
+                  (size_t)sim->boundary.collider_count * sizeof *sim->boundary.colliders);
     gs4i_file_put(&f, sim->emitters, (size_t)sim->emitter_count * sizeof *sim->emitters);
     for (k = 0; k < GS4I_STATE_ARRAYS; k++)
         if (a[k].wanted) gs4i_file_put(&f, *a[k].data, (size_t)sim->particles.count * a[k].size);
@@ -12315,8 +12401,8 @@ static int gs4i_save(gs4_sim *sim, const char *path)
                   (size_t)sim->grid.occupied * sizeof *sim->grid.occupied_block);
     gs4i_file_put(&f, sim->grid.first, ((size_t)sim->grid.occupied + 1) * sizeof *sim->grid.first);
     gs4i_file_put(&f, sim->grid.block, (size_t)sim->grid.active * sizeof *sim->grid.block);
-    if (sim->grid.memory)
-        gs4i_file_put(&f, sim->grid.memory,
+    if (sim->grid.remembered)
+        gs4i_file_put(&f, sim->grid.remembered,
                       (size_t)sim->grid.active * GS4I_NODE_REALS * sizeof(gs4_real));
     hash = f.hash;
     gs4i_file_put(&f, &hash, sizeof hash);
@@ -12346,18 +12432,19 @@ static int gs4i_check_head(gs4_sim *sim, const gs4i_head *h)
                          "the checkpoint was made by another build (version, precision, byte order "
                          "or platform)");
     if (memcmp(h->cells, own.cells, sizeof h->cells) || memcmp(h->walls, own.walls, sizeof h->walls)
-        || h->integrator != own.integrator || h->sharp != own.sharp
+        || h->integrator != own.integrator || h->deconvolved != own.deconvolved
         || memcmp(&h->cell_size, &own.cell_size, sizeof h->cell_size)
         || memcmp(h->origin, own.origin, sizeof h->origin)
         || memcmp(h->gravity, own.gravity, sizeof h->gravity)
         || memcmp(h->rho, own.rho, sizeof h->rho) || memcmp(&h->decay, &own.decay, sizeof h->decay)
-        || memcmp(h->warmth, own.warmth, sizeof h->warmth)
+        || memcmp(h->heat, own.heat, sizeof h->heat)
         || memcmp(h->isothermal, own.isothermal, sizeof h->isothermal))
         return gs4i_fail(sim, GS4_ERROR_FORMAT,
                          "the checkpoint belongs to a simulation with another description");
-    if (h->materials != own.materials || h->bodies != own.bodies || h->emitters != own.emitters
-        || h->elastic_reals != own.elastic_reals || h->deformation_reals != own.deformation_reals
-        || h->with_heat != own.with_heat || h->with_flux != own.with_flux)
+    if (h->materials != own.materials || h->colliders != own.colliders
+        || h->emitters != own.emitters || h->elastic_reals != own.elastic_reals
+        || h->deformation_reals != own.deformation_reals || h->with_heat != own.with_heat
+        || h->with_flux != own.with_flux)
         return gs4i_fail(sim, GS4_ERROR_FORMAT,
                          "the checkpoint belongs to a scene with other materials, colliders or "
                          "emitters: add the same ones, in the same order, before gs4_load");
@@ -12400,8 +12487,8 @@ static size_t gs4i_piece_sizes(gs4_sim *sim, const gs4i_head *h, gs4i_pieces *p)
     store.elastic_reals = h->elastic_reals;
     store.deformation_reals = h->deformation_reals;
     gs4i_particle_arrays(&store, a);
-    p->size[GS4I_PIECE_LAWS] = (size_t)h->materials * sizeof(gs4i_law);
-    p->size[GS4I_PIECE_BODIES] = (size_t)h->bodies * sizeof(gs4i_body);
+    p->size[GS4I_PIECE_LAWS] = (size_t)h->materials * sizeof(gs4i_material_constants);
+    p->size[GS4I_PIECE_BODIES] = (size_t)h->colliders * sizeof(gs4i_collider);
     p->size[GS4I_PIECE_EMITTERS] = (size_t)h->emitters * sizeof(gs4i_emitter);
     p->size[GS4I_PIECE_OCCUPIED] = (size_t)h->occupied * 4;
     p->size[GS4I_PIECE_FIRST] = (size_t)h->occupied * 4 + 4;
@@ -12420,19 +12507,19 @@ static int gs4i_same_scene(const gs4_sim *sim, const gs4i_pieces *p)
 {
     int i;
     for (i = 0; i < sim->material_count; i++) {
-        gs4i_law there, here = sim->laws[i];
+        gs4i_material_constants there, here = sim->constants[i];
         memcpy(&there, p->at[GS4I_PIECE_LAWS] + (size_t)i * sizeof there, sizeof there);
         there.is.viscosity_fn = here.is.viscosity_fn;
         there.is.viscosity_user = here.is.viscosity_user;
         if (memcmp(&there.is, &here.is, sizeof here.is) != 0) return 0;
     }
-    for (i = 0; i < sim->boundary.body_count; i++) {
-        gs4i_body there, here = sim->boundary.bodies[i];
+    for (i = 0; i < sim->boundary.collider_count; i++) {
+        gs4i_collider there, here = sim->boundary.colliders[i];
         memcpy(&there, p->at[GS4I_PIECE_BODIES] + (size_t)i * sizeof there, sizeof there);
         gs4i_forget_pointers(&there.is.shape);
         gs4i_forget_pointers(&here.is.shape);
         if (memcmp(&there.is.shape, &here.is.shape, sizeof here.is.shape)
-            || there.is.contact != here.is.contact || there.is_mouth != here.is_mouth
+            || there.is.contact != here.is.contact || there.is_emitter != here.is_emitter
             || memcmp(&there.is.friction, &here.is.friction, sizeof here.is.friction)
             || memcmp(&there.is.temperature, &here.is.temperature, sizeof here.is.temperature)
             || there.is.is_isothermal != here.is.is_isothermal)
@@ -12441,7 +12528,8 @@ static int gs4i_same_scene(const gs4_sim *sim, const gs4i_pieces *p)
     for (i = 0; i < sim->emitter_count; i++) {
         gs4i_emitter there, here = sim->emitters[i];
         memcpy(&there, p->at[GS4I_PIECE_EMITTERS] + (size_t)i * sizeof there, sizeof there);
-        if (memcmp(&there.is.fill, &here.is.fill, sizeof here.is.fill) || there.body != here.body)
+        if (memcmp(&there.is.fill, &here.is.fill, sizeof here.is.fill)
+            || there.collider != here.collider)
             return 0;
     }
     return 1;
@@ -12453,17 +12541,17 @@ static void gs4i_restore_scene(gs4_sim *sim, const gs4i_pieces *p)
 {
     int i;
     for (i = 0; i < sim->material_count; i++) {
-        gs4i_law here = sim->laws[i], *l = &sim->laws[i];
+        gs4i_material_constants here = sim->constants[i], *l = &sim->constants[i];
         memcpy(l, p->at[GS4I_PIECE_LAWS] + (size_t)i * sizeof *l, sizeof *l);
         l->viscosity_fn = here.viscosity_fn;
         l->viscosity_user = here.viscosity_user;
         l->is.viscosity_fn = here.is.viscosity_fn;
         l->is.viscosity_user = here.is.viscosity_user;
-        sim->frozen[i] = *l;
-        gs4i_freeze_law(&sim->frozen[i]);
+        sim->solid_phase[i] = *l;
+        gs4i_set_solid_phase(&sim->solid_phase[i]);
     }
-    for (i = 0; i < sim->boundary.body_count; i++) {
-        gs4i_body here = sim->boundary.bodies[i], *b = &sim->boundary.bodies[i];
+    for (i = 0; i < sim->boundary.collider_count; i++) {
+        gs4i_collider here = sim->boundary.colliders[i], *b = &sim->boundary.colliders[i];
         memcpy(b, p->at[GS4I_PIECE_BODIES] + (size_t)i * sizeof *b, sizeof *b);
         b->is.shape = here.is.shape;
         b->field = here.field;
@@ -12484,9 +12572,9 @@ static int gs4i_blocks_are_sound(const gs4_sim *sim, const gs4i_head *h, const u
     int i, a, at[3];
     for (i = 0; i < h->active; i++)
         if (active[i] >= sim->grid.table_count || (i && active[i] <= active[i - 1])) return 0;
-    if (h->occupied == 0) return h->unsorted || h->particles == 0;
+    if (h->occupied == 0) return h->needs_sort || h->particles == 0;
     if (first[0] != 0
-        || (h->unsorted ? first[h->occupied] < 0 : first[h->occupied] != h->particles))
+        || (h->needs_sort ? first[h->occupied] < 0 : first[h->occupied] != h->particles))
         return 0;
     for (i = 0; i < h->occupied; i++) {
         if (first[i] > first[i + 1] || block[i] >= sim->grid.table_count
@@ -12522,7 +12610,7 @@ static int gs4i_rebuild(gs4_sim *next, const gs4i_head *h, const gs4i_pieces *p)
     g->active = h->active;
     g->occupied = h->occupied;
     for (k = 0; k < g->active; k++) g->table[g->block[k]] = k + 1;
-    if (g->memory) memcpy(g->memory, p->at[GS4I_PIECE_MEMORY], p->size[GS4I_PIECE_MEMORY]);
+    if (g->remembered) memcpy(g->remembered, p->at[GS4I_PIECE_MEMORY], p->size[GS4I_PIECE_MEMORY]);
     if (!gs4i_grid_is_complete(g)) return GS4_ERROR_FORMAT;
     gs4i_grid_link(g);
     if (gs4i_after_occupy(next) != GS4_OK) return GS4_ERROR_MEMORY;
@@ -12544,10 +12632,10 @@ static void gs4i_release_state(gs4_sim *sim)
     gs4i_particles_free(m, &sim->particles);
     gs4i_grid_free(m, &sim->grid);
     for (i = 0; i < 6; i++)
-        gs4i_free(m, sim->boundary.images[i], (size_t)sim->boundary.image_capacity[i],
-                  sizeof(gs4i_image));
+        gs4i_free(m, sim->boundary.mirrors[i], (size_t)sim->boundary.mirror_capacity[i],
+                  sizeof(gs4i_mirror_pair));
     gs4i_free(m, sim->reports, (size_t)sim->report_capacity, sizeof(gs4i_report));
-    gs4i_free_ghosts(m, &sim->ghosts);
+    gs4i_free_image_particles(m, &sim->image_particles);
     gs4i_free_heat(m, &sim->conduction);
 }
 
@@ -12559,7 +12647,7 @@ static int gs4i_restore(gs4_sim *sim, const gs4i_head *h, const gs4i_pieces *p)
     int i, result;
     memset(&next.particles, 0, sizeof next.particles);
     next.particles.with_rates = sim->particles.with_rates;
-    next.particles.with_fading = sim->particles.with_fading;
+    next.particles.with_subgrid = sim->particles.with_subgrid;
     next.particles.elastic_reals = h->elastic_reals;
     next.particles.deformation_reals = h->deformation_reals;
     next.particles.with_heat = sim->particles.with_heat;
@@ -12568,18 +12656,18 @@ static int gs4i_restore(gs4_sim *sim, const gs4i_head *h, const gs4i_pieces *p)
     memcpy(next.grid.cells, empty.cells, sizeof empty.cells);
     memcpy(next.grid.blocks, empty.blocks, sizeof empty.blocks);
     memcpy(next.grid.periodic, empty.periodic, sizeof empty.periodic);
-    next.grid.with_sharp = empty.with_sharp;
+    next.grid.with_deconvolution = empty.with_deconvolution;
     next.grid.h = empty.h;
     next.grid.inv_h = empty.inv_h;
     next.grid.origin = empty.origin;
     next.grid.table_count = empty.table_count;
     for (i = 0; i < 6; i++) {
-        next.boundary.images[i] = NULL;
-        next.boundary.image_count[i] = next.boundary.image_capacity[i] = 0;
+        next.boundary.mirrors[i] = NULL;
+        next.boundary.mirror_count[i] = next.boundary.mirror_capacity[i] = 0;
     }
     next.reports = NULL;
     next.report_capacity = 0;
-    memset(&next.ghosts, 0, sizeof next.ghosts);
+    memset(&next.image_particles, 0, sizeof next.image_particles);
     memset(&next.conduction, 0, sizeof next.conduction);
     next.conduction.heats = sim->conduction.heats;
     result = gs4i_rebuild(&next, h, p);
@@ -12605,10 +12693,10 @@ static int gs4i_restore(gs4_sim *sim, const gs4i_head *h, const gs4i_pieces *p)
     sim->split = h->split;
     sim->bounded = h->bounded;
     sim->next_id = h->next_id;
-    sim->afresh = h->afresh;
-    sim->unsorted = h->unsorted;
-    sim->unseen = h->unseen;
-    sim->unturned = h->unturned;
+    sim->restart = h->restart;
+    sim->needs_sort = h->needs_sort;
+    sim->limits_stale = h->limits_stale;
+    sim->needs_spin = h->needs_spin;
     sim->edited = 0;
     sim->min_mass = GS4I_C(h->min_mass);
     sim->fastest = GS4I_C(h->fastest);
@@ -13037,7 +13125,7 @@ static int gs4i_check_solid(gs4_sim *sim, const gs4_material *m)
  * must be a number. */
 static int gs4i_check_cross_wlf(gs4_sim *sim, const gs4_material *m, int at_ambient)
 {
-    gs4i_law l;
+    gs4i_material_constants l;
     int i;
     for (i = 0; i < 6; i++) {
         static const char *const names[6] = { "cross_wlf.a",  "cross_wlf.n",  "cross_wlf.d1",
@@ -13049,7 +13137,7 @@ static int gs4i_check_cross_wlf(gs4_sim *sim, const gs4_material *m, int at_ambi
     }
     memset(&l, 0, sizeof l);
     l.is = *m;
-    gs4i_set_law(&l, sim->desc.ambient_temperature);
+    gs4i_set_material_constants(&l, sim->desc.ambient_temperature);
     for (i = -6; i <= 6 && at_ambient; i += 2) {
         const gs4_real mu = gs4i_cross_wlf(&l.is, l.temperature, GS4I_C(pow(10, i)));
         if (!(mu >= 0 && mu < GS4I_HUGE))
@@ -13095,7 +13183,7 @@ static int gs4i_check_heat(gs4_sim *sim, const gs4_material *m)
             sim,
             "heat_capacity is 0; every material of a scene with heat needs one above 0, J/(kg K)");
     for (i = 0; i < sim->material_count && gs4i_has_heat(m); i++)
-        if (sim->laws[i].is.heat_capacity == 0)
+        if (sim->constants[i].is.heat_capacity == 0)
             return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "heat_capacity of material ", i,
                                    " is 0; with this material the scene has heat, and every "
                                    "material needs one above 0");
@@ -13194,7 +13282,7 @@ static int gs4i_check_fill(gs4_sim *sim, gs4_fill *f)
 /* Ten times the fastest that anything here moves, falls or flows down: compression goes as the
  * Mach number squared. Of solids also at least sqrt(10 G/rho): a bulk modulus of 10 shear
  * moduli, Poisson's ratio 0.45. */
-static void gs4i_set_laws(gs4_sim *sim)
+static void gs4i_set_constants(gs4_sim *sim)
 {
     const gs4_sim_desc *d = &sim->desc;
     const double size = (double)d->cell_size;
@@ -13206,7 +13294,7 @@ static void gs4i_set_laws(gs4_sim *sim)
     /* nothing moves so far: a cell a second is as good as any */
     if (speed <= 0) speed = size;
     for (i = 0; i < sim->material_count; i++) {
-        gs4i_law *l = &sim->laws[i];
+        gs4i_material_constants *l = &sim->constants[i];
         const gs4_material *m = &l->is;
         double c0 =
             m->sound_speed > 0 ? (double)m->sound_speed
@@ -13215,18 +13303,18 @@ static void gs4i_set_laws(gs4_sim *sim)
                 : fmax(10 * speed, sqrt(10 * (double)m->shear_modulus / (double)m->density));
         l->sound_speed = GS4I_C(c0);
         l->tait = GS4I_C((double)m->density * c0 * c0 / 7);
-        gs4i_set_law(l, d->ambient_temperature);
-        sim->frozen[i] = *l;
-        gs4i_freeze_law(&sim->frozen[i]);
+        gs4i_set_material_constants(l, d->ambient_temperature);
+        sim->solid_phase[i] = *l;
+        gs4i_set_solid_phase(&sim->solid_phase[i]);
     }
-    sim->unseen = 1;
+    sim->limits_stale = 1;
 }
 
 static void gs4i_note_speed(gs4_sim *sim, gs4_real speed)
 {
     if (speed > sim->fastest) {
         sim->fastest = speed;
-        gs4i_set_laws(sim);
+        gs4i_set_constants(sim);
     }
 }
 
@@ -13260,15 +13348,15 @@ static int gs4i_init(gs4_sim *sim)
         g->periodic[a] = d->walls[2 * a] == GS4_WALL_PERIODIC;
         g->table_count *= (size_t)g->blocks[a];
     }
-    g->with_sharp = d->sharp_gradients != 0;
+    g->with_deconvolution = d->sharp_gradients != 0;
     g->h = d->cell_size;
     g->inv_h = 1 / d->cell_size;
     g->origin = d->origin;
     sim->boundary.h = g->h;
     memcpy(sim->boundary.walls, d->walls, sizeof d->walls);
     sim->particles.with_rates = d->integrator == GS4_INTEGRATOR_GS4;
-    sim->particles.with_fading = sim->particles.with_rates && gs4i_finite(d->flip_decay_time);
-    sim->afresh = sim->unsorted = sim->unseen = 1;
+    sim->particles.with_subgrid = sim->particles.with_rates && gs4i_finite(d->flip_decay_time);
+    sim->restart = sim->needs_sort = sim->limits_stale = 1;
     sim->tasks.parallel_for = d->parallel_for;
     sim->tasks.user = d->parallel_user;
     g->table = (int32_t *)gs4i_alloc(&sim->memory, g->table_count, sizeof *g->table);
@@ -13336,12 +13424,14 @@ GS4_API void gs4_destroy(gs4_sim *sim)
     gs4i_pool_destroy(&sim->memory, sim->tasks.pool, sim->desc.threads - 1);
 #endif
     gs4i_release_state(sim);
-    for (i = 0; i < sim->boundary.body_count; i++)
-        gs4i_field_free(&sim->memory, &sim->boundary.bodies[i].field);
-    gs4i_free(&sim->memory, sim->boundary.bodies, (size_t)sim->boundary.body_capacity,
-              sizeof(gs4i_body));
-    gs4i_free(&sim->memory, sim->laws, (size_t)sim->material_capacity, sizeof(gs4i_law));
-    gs4i_free(&sim->memory, sim->frozen, (size_t)sim->frozen_capacity, sizeof(gs4i_law));
+    for (i = 0; i < sim->boundary.collider_count; i++)
+        gs4i_field_free(&sim->memory, &sim->boundary.colliders[i].field);
+    gs4i_free(&sim->memory, sim->boundary.colliders, (size_t)sim->boundary.collider_capacity,
+              sizeof(gs4i_collider));
+    gs4i_free(&sim->memory, sim->constants, (size_t)sim->material_capacity,
+              sizeof(gs4i_material_constants));
+    gs4i_free(&sim->memory, sim->solid_phase, (size_t)sim->solid_phase_capacity,
+              sizeof(gs4i_material_constants));
     gs4i_free(&sim->memory, sim->emitters, (size_t)sim->emitter_capacity, sizeof(gs4i_emitter));
     memory = sim->memory;
     gs4i_free(&memory, sim, 1, sizeof *sim);
@@ -13489,14 +13579,15 @@ static int gs4i_make_heat(gs4_sim *sim, const gs4_material *material)
         p->with_heat = 1;
     }
     for (i = 0; i < p->count && heat; i++)
-        gs4i_begin_heat(p, (size_t)i, &sim->laws[p->material[i]], sim->desc.ambient_temperature);
+        gs4i_begin_heat(p, (size_t)i, &sim->constants[p->material[i]],
+                        sim->desc.ambient_temperature);
     if (flux) {
         p->flux = made[1];
         p->flux_rate = made[2];
         p->with_flux = 1;
     }
     sim->conduction.heats |= material->viscous_heating != 0;
-    sim->unsorted = 1; /* nodes need room for it, too */
+    sim->needs_sort = 1; /* nodes need room for it, too */
     return GS4_OK;
 }
 
@@ -13581,14 +13672,14 @@ GS4_API int gs4_add_material(gs4_sim *sim, const gs4_material *material)
     GS4I_TRY(gs4i_check_material(sim, material));
     if (sim->material_count == 256)
         return gs4i_bad_argument(sim, "there are 256 materials already, which is all there can be");
-    GS4I_TRY(gs4i_grow(sim, (void **)&sim->laws, sim->material_count, &sim->material_capacity,
-                       sizeof *sim->laws));
-    GS4I_TRY(gs4i_grow(sim, (void **)&sim->frozen, sim->material_count, &sim->frozen_capacity,
-                       sizeof *sim->frozen));
+    GS4I_TRY(gs4i_grow(sim, (void **)&sim->constants, sim->material_count, &sim->material_capacity,
+                       sizeof *sim->constants));
+    GS4I_TRY(gs4i_grow(sim, (void **)&sim->solid_phase, sim->material_count,
+                       &sim->solid_phase_capacity, sizeof *sim->solid_phase));
     if (gs4i_make_history(sim, material) != GS4_OK) return gs4i_fail_memory(sim);
-    memset(&sim->laws[sim->material_count].is, 0, sizeof *material);
-    gs4i_copy_members(&sim->laws[sim->material_count++].is, material);
-    gs4i_set_laws(sim);
+    memset(&sim->constants[sim->material_count].is, 0, sizeof *material);
+    gs4i_copy_members(&sim->constants[sim->material_count++].is, material);
+    gs4i_set_constants(sim);
     return sim->material_count - 1;
 }
 
@@ -13619,9 +13710,9 @@ static void gs4i_fill_one(gs4_sim *sim, gs4_vec3 x, gs4_vec3 centre, const gs4_f
     if (!gs4i_add_one(sim, x, v, mass, f->material, f->temperature)) return;
     for (k = 0; k < 3 && sim->particles.affine[k]; k++)
         memcpy(sim->particles.affine[k] + 4 * i, C[k], sizeof C[k]);
-    if (sim->particles.deformation_reals && !sim->unturned)
-        gs4i_set_turning(&sim->particles, i,
-                         gs4i_law_of(sim, i)->shear_modulus > 0 ? w : gs4i_vec3(0, 0, 0));
+    if (sim->particles.deformation_reals && !sim->needs_spin)
+        gs4i_set_spin(&sim->particles, i,
+                      gs4i_constants_of(sim, i)->shear_modulus > 0 ? w : gs4i_vec3(0, 0, 0));
     gs4i_note_speed(sim, gs4i_length(v));
 }
 
@@ -13653,7 +13744,7 @@ static int gs4i_overlaps(gs4_sim *sim, const int low[3], const int n[3], const g
             if (a >= 0) continue;
             filled[2 * at + (size_t)pass] += pass ? volume
                                                   : p->position[4 * i + 3]
-                                                        * sim->laws[p->material[i]].inv_density
+                                                        * sim->constants[p->material[i]].inv_density
                                                         * p->velocity[4 * i + 3];
         }
     for (i = 0; i < cells; i++)
@@ -13665,7 +13756,7 @@ static int gs4i_overlaps(gs4_sim *sim, const int low[3], const int n[3], const g
 /* Points of the lattice low + (i + 1/2) spacing that are inside the shape and the domain: counts
  * them, and writes them where `out` is given; -1 when there are more than there is room for.
  * Lattices of all shapes are aligned with the cells. */
-static int64_t gs4i_lattice(const gs4_sim *sim, const gs4i_body *shape, const gs4_fill *f,
+static int64_t gs4i_lattice(const gs4_sim *sim, const gs4i_collider *shape, const gs4_fill *f,
                             const int64_t from[3], const int64_t to[3], gs4_real *out)
 {
     const double s = (double)f->spacing;
@@ -13730,7 +13821,8 @@ static int gs4i_clip_shape(const gs4_sim *sim, const gs4_shape *s, double spacin
 }
 
 /* A body for `shape` at rest, its distances sampled where it is a mesh. */
-static int gs4i_make_body(gs4_sim *sim, gs4i_body *b, const gs4_collider *is, double spacing)
+static int gs4i_make_collider(gs4_sim *sim, gs4i_collider *b, const gs4_collider *is,
+                              double spacing)
 {
     memset(b, 0, sizeof *b);
     b->is = *is;
@@ -13738,7 +13830,7 @@ static int gs4i_make_body(gs4_sim *sim, gs4i_body *b, const gs4_collider *is, do
     b->at[1] = (double)is->pivot.y;
     b->at[2] = (double)is->pivot.z;
     b->turn[0] = 1;
-    gs4i_body_orient(b);
+    gs4i_collider_orient(b);
     if (is->shape.kind == GS4_SHAPE_MESH
         && gs4i_field_create(&sim->memory, &b->field, &is->shape, spacing) != GS4_OK)
         return gs4i_fail_memory(sim);
@@ -13751,7 +13843,7 @@ static int64_t gs4i_collect_points(gs4_sim *sim, const gs4_shape *shape, const g
                                    gs4_real **points)
 {
     gs4_collider as_body;
-    gs4i_body body;
+    gs4i_collider collider;
     int64_t from[3], to[3], n;
     int low[3], cells[3], overlap;
     if (!gs4i_clip_shape(sim, shape, (double)f->spacing, from, to, low, cells))
@@ -13762,8 +13854,8 @@ static int64_t gs4i_collect_points(gs4_sim *sim, const gs4_shape *shape, const g
             "shape spans more than 1.6e10 particles; a larger spacing would do; nothing was added");
     memset(&as_body, 0, sizeof as_body);
     as_body.shape = *shape;
-    GS4I_TRY(gs4i_make_body(sim, &body, &as_body, (double)f->spacing));
-    n = gs4i_lattice(sim, &body, f, from, to, NULL);
+    GS4I_TRY(gs4i_make_collider(sim, &collider, &as_body, (double)f->spacing));
+    n = gs4i_lattice(sim, &collider, f, from, to, NULL);
     if (n < 0)
         n = gs4i_fail(sim, GS4_ERROR_MEMORY,
                       "shape holds more particles than there is room for (max_particles); a larger "
@@ -13774,7 +13866,7 @@ static int64_t gs4i_collect_points(gs4_sim *sim, const gs4_shape *shape, const g
     else if (!(*points = (gs4_real *)gs4i_alloc(&sim->memory, (size_t)n, 3 * sizeof **points)))
         n = gs4i_fail_memory(sim);
     else {
-        gs4i_lattice(sim, &body, f, from, to, *points);
+        gs4i_lattice(sim, &collider, f, from, to, *points);
         overlap =
             gs4i_overlaps(sim, low, cells, *points, (int)n, f->spacing * f->spacing * f->spacing);
         if (overlap) {
@@ -13785,7 +13877,7 @@ static int64_t gs4i_collect_points(gs4_sim *sim, const gs4_shape *shape, const g
                         sim, "shape overlaps material that is there already: nothing was added");
         }
     }
-    gs4i_field_free(&sim->memory, &body.field);
+    gs4i_field_free(&sim->memory, &collider.field);
     return n;
 }
 
@@ -13821,7 +13913,7 @@ static int gs4i_check_edit(gs4_sim *sim)
                 " outside of the grid or with a number that is not finite; edit it again");
     }
     for (i = 0; i < p->count && p->with_heat; i++)
-        gs4i_settle_phase(p, (size_t)i, &sim->laws[p->material[i]]);
+        gs4i_settle_phase(p, (size_t)i, &sim->constants[p->material[i]]);
     gs4i_note_speed(sim, gs4i_fastest(p));
     sim->edited = 0;
     return GS4_OK;
@@ -13845,7 +13937,7 @@ GS4_API int gs4_add_particles(gs4_sim *sim, gs4_shape shape, const gs4_fill *fil
     centre = gs4i_scale(gs4i_add(lo, hi), GS4I_C(0.5));
     n = gs4i_collect_points(sim, &shape, &f, &points);
     if (n < 0) return (int)n;
-    mass = sim->laws[f.material].density * f.spacing * f.spacing * f.spacing;
+    mass = sim->constants[f.material].density * f.spacing * f.spacing * f.spacing;
     result = mass > GS4I_TINY / GS4I_EPSILON
                  ? gs4i_make_room(sim, n)
                  : gs4i_bad_argument(sim, "a particle would be lighter than gs4_real can tell from "
@@ -13855,7 +13947,7 @@ GS4_API int gs4_add_particles(gs4_sim *sim, gs4_shape shape, const gs4_fill *fil
                       &f, mass);
     gs4i_free(&sim->memory, points, (size_t)n, 3 * sizeof *points);
     if (result != GS4_OK) return result;
-    sim->afresh = sim->unsorted = sim->unseen = 1;
+    sim->restart = sim->needs_sort = sim->limits_stale = 1;
     return (int)n;
 }
 
@@ -13886,7 +13978,7 @@ GS4_API int gs4_add_points(gs4_sim *sim, const gs4_real *xyz, int count, gs4_rea
                                    " lies outside of the grid: nothing was added");
         centre = gs4i_add(centre, gs4i_scale(gs4i_vec3(x[0], x[1], x[2]), 1 / GS4I_C(count)));
     }
-    mass = sim->laws[f.material].density * volume_each;
+    mass = sim->constants[f.material].density * volume_each;
     if (!(mass > GS4I_TINY / GS4I_EPSILON))
         return gs4i_bad_argument(sim, "a particle would be lighter than gs4_real can tell from "
                                       "nothing; use other units, or define GS4_DOUBLE");
@@ -13895,7 +13987,7 @@ GS4_API int gs4_add_points(gs4_sim *sim, const gs4_real *xyz, int count, gs4_rea
         gs4i_fill_one(sim,
                       gs4i_vec3(xyz[3 * (size_t)i], xyz[3 * (size_t)i + 1], xyz[3 * (size_t)i + 2]),
                       centre, &f, mass);
-    if (count) sim->afresh = sim->unsorted = sim->unseen = 1;
+    if (count) sim->restart = sim->needs_sort = sim->limits_stale = 1;
     return count;
 }
 
@@ -13920,29 +14012,29 @@ GS4_API int gs4_add_collider(gs4_sim *sim, const gs4_collider *collider)
     if (!collider) return gs4i_bad_argument(sim, "collider is NULL");
     c = *collider;
     GS4I_TRY(gs4i_check_collider(sim, &c));
-    GS4I_TRY(gs4i_grow(sim, (void **)&sim->boundary.bodies, sim->boundary.body_count,
-                       &sim->boundary.body_capacity, sizeof *sim->boundary.bodies));
-    GS4I_TRY(gs4i_make_body(sim, &sim->boundary.bodies[sim->boundary.body_count], &c,
-                            0.5 * (double)sim->grid.h));
+    GS4I_TRY(gs4i_grow(sim, (void **)&sim->boundary.colliders, sim->boundary.collider_count,
+                       &sim->boundary.collider_capacity, sizeof *sim->boundary.colliders));
+    GS4I_TRY(gs4i_make_collider(sim, &sim->boundary.colliders[sim->boundary.collider_count], &c,
+                                0.5 * (double)sim->grid.h));
     gs4i_note_speed(sim, gs4i_length(c.velocity));
-    sim->unseen = 1;
-    return sim->boundary.body_count++;
+    sim->limits_stale = 1;
+    return sim->boundary.collider_count++;
 }
 
 GS4_API int gs4_move_collider(gs4_sim *sim, int collider, gs4_vec3 velocity,
                               gs4_vec3 angular_velocity)
 {
     if (!sim) return GS4_ERROR_ARGUMENT;
-    GS4I_TRY(gs4i_check_id(sim, "collider", collider, sim->boundary.body_count));
-    if (sim->boundary.bodies[collider].is_mouth)
+    GS4I_TRY(gs4i_check_id(sim, "collider", collider, sim->boundary.collider_count));
+    if (sim->boundary.colliders[collider].is_emitter)
         return gs4i_bad_argument(sim,
                                  "that id belongs to the mouth of an emitter, not to a collider");
     GS4I_TRY(gs4i_check3(sim, "velocity", velocity));
     GS4I_TRY(gs4i_check3(sim, "angular_velocity", angular_velocity));
-    sim->boundary.bodies[collider].is.velocity = velocity;
-    sim->boundary.bodies[collider].is.angular_velocity = angular_velocity;
+    sim->boundary.colliders[collider].is.velocity = velocity;
+    sim->boundary.colliders[collider].is.angular_velocity = angular_velocity;
     gs4i_note_speed(sim, gs4i_length(velocity));
-    sim->unseen = 1;
+    sim->limits_stale = 1;
     return GS4_OK;
 }
 
@@ -13965,8 +14057,8 @@ static int gs4i_check_emitter(gs4_sim *sim, gs4_emitter *e)
 GS4_API int gs4_add_emitter(gs4_sim *sim, const gs4_emitter *emitter)
 {
     gs4_emitter e;
-    gs4_collider mouth;
-    gs4i_body *body;
+    gs4_collider held;
+    gs4i_collider *collider;
     int64_t from[3], to[3];
     int low[3], n[3];
     if (!sim) return GS4_ERROR_ARGUMENT;
@@ -13975,24 +14067,24 @@ GS4_API int gs4_add_emitter(gs4_sim *sim, const gs4_emitter *emitter)
     GS4I_TRY(gs4i_check_emitter(sim, &e));
     if (!gs4i_clip_shape(sim, &e.shape, (double)e.fill.spacing, from, to, low, n))
         return gs4i_bad_argument(sim, "shape lies outside of the grid");
-    memset(&mouth, 0, sizeof mouth);
-    mouth.shape = e.shape;
-    mouth.velocity = e.travel;
-    mouth.temperature = e.fill.temperature;
+    memset(&held, 0, sizeof held);
+    held.shape = e.shape;
+    held.velocity = e.travel;
+    held.temperature = e.fill.temperature;
     GS4I_TRY(gs4i_grow(sim, (void **)&sim->emitters, sim->emitter_count, &sim->emitter_capacity,
                        sizeof *sim->emitters));
-    GS4I_TRY(gs4i_grow(sim, (void **)&sim->boundary.bodies, sim->boundary.body_count,
-                       &sim->boundary.body_capacity, sizeof *sim->boundary.bodies));
-    body = &sim->boundary.bodies[sim->boundary.body_count];
-    GS4I_TRY(gs4i_make_body(sim, body, &mouth, (double)e.fill.spacing));
-    body->is_mouth = 1;
-    body->asleep = 1;
-    body->flow = e.fill.velocity;
+    GS4I_TRY(gs4i_grow(sim, (void **)&sim->boundary.colliders, sim->boundary.collider_count,
+                       &sim->boundary.collider_capacity, sizeof *sim->boundary.colliders));
+    collider = &sim->boundary.colliders[sim->boundary.collider_count];
+    GS4I_TRY(gs4i_make_collider(sim, collider, &held, (double)e.fill.spacing));
+    collider->is_emitter = 1;
+    collider->asleep = 1;
+    collider->flow = e.fill.velocity;
     memset(&sim->emitters[sim->emitter_count], 0, sizeof *sim->emitters);
     sim->emitters[sim->emitter_count].is = e;
-    sim->emitters[sim->emitter_count].body = sim->boundary.body_count++;
+    sim->emitters[sim->emitter_count].collider = sim->boundary.collider_count++;
     gs4i_note_speed(sim, gs4i_max(gs4i_length(e.fill.velocity), gs4i_length(e.travel)));
-    sim->unseen = 1;
+    sim->limits_stale = 1;
     return sim->emitter_count++;
 }
 
@@ -14002,9 +14094,9 @@ GS4_API int gs4_move_emitter(gs4_sim *sim, int emitter, gs4_vec3 travel)
     GS4I_TRY(gs4i_check_id(sim, "emitter", emitter, sim->emitter_count));
     GS4I_TRY(gs4i_check3(sim, "travel", travel));
     sim->emitters[emitter].is.travel = travel;
-    sim->boundary.bodies[sim->emitters[emitter].body].is.velocity = travel;
+    sim->boundary.colliders[sim->emitters[emitter].collider].is.velocity = travel;
     gs4i_note_speed(sim, gs4i_length(travel));
-    sim->unseen = 1;
+    sim->limits_stale = 1;
     return GS4_OK;
 }
 
@@ -14013,7 +14105,7 @@ GS4_API int gs4_move_emitter(gs4_sim *sim, int emitter, gs4_vec3 travel)
 static gs4_real gs4i_limit_now(const gs4_sim *sim)
 {
     gs4i_report r = sim->worst;
-    if (sim->unseen) gs4i_look_at_particles(sim, &r);
+    if (sim->limits_stale) gs4i_look_at_particles(sim, &r);
     return gs4i_stable_dt(sim, &r);
 }
 
@@ -14031,9 +14123,9 @@ static int gs4i_try_step(gs4_sim *sim, gs4_real dt)
 {
     gs4_real limit;
     GS4I_TRY(gs4i_check_edit(sim));
-    if (sim->unseen) {
+    if (sim->limits_stale) {
         gs4i_look_at_particles(sim, &sim->worst);
-        sim->unseen = 0;
+        sim->limits_stale = 0;
     }
     limit = gs4i_limit_now(sim);
     if (dt > limit * (1 + 8 * GS4I_EPSILON)) {
@@ -14064,7 +14156,7 @@ GS4_API int gs4_step(gs4_sim *sim, gs4_real dt)
  * thicken have little to say at rest. */
 static double gs4i_less(const gs4_sim *sim)
 {
-    const double part = (double)sim->stage_limit / (double)sim->rule.dt;
+    const double part = (double)sim->stage_limit / (double)sim->integrator.dt;
     return part > 0 && part < 0.5 ? part : 0.5;
 }
 
@@ -14151,10 +14243,10 @@ GS4_API gs4_edit gs4_edit_particles(gs4_sim *sim, gs4_field field)
         gs4i_bad_argument(
             sim, "only position, velocity and, in a scene with heat, temperature can be edited");
     if (e.data && field == GS4_FIELD_VELOCITY) {
-        sim->unturned = 1;
-        gs4i_forget_turning(sim);
+        sim->needs_spin = 1;
+        gs4i_forget_spin(sim);
     }
-    if (e.data) sim->edited = sim->afresh = sim->unsorted = sim->unseen = 1;
+    if (e.data) sim->edited = sim->restart = sim->needs_sort = sim->limits_stale = 1;
     return e;
 }
 
@@ -14199,15 +14291,15 @@ GS4_API gs4_stats gs4_get_stats(gs4_sim *sim)
         }
         s.kinetic_energy += 0.5 * m * v2;
         if (sim->particles.heat) {
-            const gs4i_law *law = &sim->laws[sim->particles.material[i]];
+            const gs4i_material_constants *mat = &sim->constants[sim->particles.material[i]];
             const double T = (double)sim->particles.heat[4 * i],
                          fraction = (double)sim->particles.heat[4 * i + 1];
-            s.thermal_energy += m * (double)law->capacity
-                                * (T + (law->latent > 0 ? fraction * (double)law->latent : 0));
+            s.thermal_energy += m * (double)mat->capacity
+                                * (T + (mat->latent > 0 ? fraction * (double)mat->latent : 0));
             if (i == 0 || T < s.min_temperature) s.min_temperature = T;
             if (i == 0 || T > s.max_temperature) s.max_temperature = T;
         }
-        s.volume += m * J / (double)sim->laws[sim->particles.material[i]].density;
+        s.volume += m * J / (double)sim->constants[sim->particles.material[i]].density;
         if (sqrt(v2) > s.max_speed) s.max_speed = sqrt(v2);
         if (i == 0 || J < s.min_volume_ratio) s.min_volume_ratio = J;
         if (i == 0 || J > s.max_volume_ratio) s.max_volume_ratio = J;
@@ -14237,7 +14329,7 @@ GS4_API uint64_t gs4_state_hash(const gs4_sim *sim)
             h = gs4i_hash_bytes(h, p->affine[k] + 4 * i, 3 * sizeof(gs4_real));
         if (p->with_rates) {
             h = gs4i_hash_bytes(h, p->rate + 4 * i, 4 * sizeof(gs4_real));
-            h = gs4i_hash_bytes(h, p->lag + 4 * i, 3 * sizeof(gs4i_half));
+            h = gs4i_hash_bytes(h, p->position_residual + 4 * i, 3 * sizeof(gs4i_half));
         }
         if (p->elastic_reals)
             h = gs4i_hash_bytes(h, p->elastic + (size_t)p->elastic_reals * i,
@@ -14253,18 +14345,18 @@ GS4_API uint64_t gs4_state_hash(const gs4_sim *sim)
         }
         sum += h;
     }
-    for (s = 0; sim->grid.memory && s < sim->grid.active; s++)
+    for (s = 0; sim->grid.remembered && s < sim->grid.active; s++)
         for (n = 0; n < GS4I_BLOCK_NODES; n++) {
-            const gs4_real *ag = sim->grid.memory + (size_t)s * GS4I_NODE_REALS + 4 * n;
+            const gs4_real *ag = sim->grid.remembered + (size_t)s * GS4I_NODE_REALS + 4 * n;
             if (ag[3] > 0)
                 sum += gs4i_hash_bytes(gs4i_mix(64 * (uint64_t)sim->grid.block[s] + n), ag,
                                        4 * sizeof(gs4_real));
         }
-    for (s = 0; s < sim->boundary.body_count; s++) {
-        sum += gs4i_hash_bytes((uint64_t)s + 1, sim->boundary.bodies[s].at,
-                               sizeof sim->boundary.bodies[s].at);
-        sum += gs4i_hash_bytes((uint64_t)s + 2, sim->boundary.bodies[s].turn,
-                               sizeof sim->boundary.bodies[s].turn);
+    for (s = 0; s < sim->boundary.collider_count; s++) {
+        sum += gs4i_hash_bytes((uint64_t)s + 1, sim->boundary.colliders[s].at,
+                               sizeof sim->boundary.colliders[s].at);
+        sum += gs4i_hash_bytes((uint64_t)s + 2, sim->boundary.colliders[s].turn,
+                               sizeof sim->boundary.colliders[s].turn);
     }
     return gs4i_hash_bytes(sum ^ (uint64_t)p->count, &sim->time, sizeof sim->time)
            ^ gs4i_mix(sim->steps);
@@ -14309,10 +14401,10 @@ static int gs4i_say(const gs4_sim *fake, int result)
 
 /* A batch whose particles are all this point. */
 typedef struct gs4i_point_batch {
-    gs4i_batch_laws laws;
-    gs4i_history_laws past;
+    gs4i_batch_constants constants;
+    gs4i_history_constants past;
     gs4i_gradient L;
-    gs4i_law law;
+    gs4i_material_constants mat;
     gs4i_elastic e;
     gs4i_deformation d;
     gs4i_lanes J; /* of solids, and det F */
@@ -14320,7 +14412,7 @@ typedef struct gs4i_point_batch {
 
 /* F of a solid point: zero means identity. Its determinant must be above 0 by more than
  * rounding. */
-static int gs4i_take_point_deformation(gs4_sim *fake, const gs4_real given[9], gs4i_point_batch *q)
+static int gs4i_load_point_deformation(gs4_sim *fake, const gs4_real given[9], gs4i_point_batch *q)
 {
     double F[3][3], U[3][3], s[3], V[3][3];
     int i, n, zero = 1;
@@ -14360,35 +14452,35 @@ static int gs4i_make_point_batch(gs4_sim *fake, const gs4_material *material,
         GS4I_TRY(gs4i_check(fake, "stress", point->stress[i], GS4I_FINITE));
         GS4I_TRY(gs4i_check(fake, "stress_rate", point->stress_rate[i], GS4I_FINITE));
     }
-    q->law.is = *material;
-    gs4i_set_law(&q->law, point->temperature);
+    q->mat.is = *material;
+    gs4i_set_material_constants(&q->mat, point->temperature);
     if (material->can_melt && !(point->temperature > material->melting_temperature))
-        gs4i_freeze_law(&q->law);
+        gs4i_set_solid_phase(&q->mat);
     for (n = 0; n < GS4I_BATCH; n++) {
-        q->laws.of[n] = &q->law;
-        GS4I_NTH(q->laws.temperature, n) = q->law.temperature;
+        q->constants.of[n] = &q->mat;
+        GS4I_NTH(q->constants.temperature, n) = q->mat.temperature;
         for (i = 0; i < 9; i++) GS4I_NTH(q->L[i / 3][i % 3], n) = L[i];
         for (i = 0; i < 6; i++) {
             GS4I_NTH(q->e.s[i], n) = point->stress[i];
             GS4I_NTH(q->e.rate[i], n) = point->stress_rate[i];
         }
     }
-    if (q->law.varies) {
-        const gs4_real mu = gs4i_viscosity_of(&q->law, point->temperature, q->L, 0);
+    if (q->mat.varies) {
+        const gs4_real mu = gs4i_viscosity_of(&q->mat, point->temperature, q->L, 0);
         if (!(mu >= 0 && mu < GS4I_HUGE))
             return gs4i_fail_value(
                 fake, GS4_ERROR_ARGUMENT, "the viscosity at this temperature and shear rate is ",
                 (double)mu, "; it must be 0 or a finite number above that is not absurdly large");
     }
-    gs4i_take_elastic_laws(&q->laws, &q->past.elastic);
-    return gs4i_take_solid_laws(&q->laws, &q->past.solid)
-               ? gs4i_take_point_deformation(fake, point->deformation, q)
+    gs4i_load_elastic_constants(&q->constants, &q->past.elastic);
+    return gs4i_load_solid_constants(&q->constants, &q->past.solid)
+               ? gs4i_load_point_deformation(fake, point->deformation, q)
                : GS4_OK;
 }
 
 /* F of a point in a flow that is steady over the step: no rates are needed, and the same for
  * every member of the family. */
-static int gs4i_step_solid_point(gs4_sim *fake, gs4i_point_batch *q, gs4i_rule *rule,
+static int gs4i_step_solid_point(gs4_sim *fake, gs4i_point_batch *q, gs4i_integrator *integrator,
                                  gs4_point *point)
 {
     gs4i_solid_count count = { 0, 0, 0 };
@@ -14396,9 +14488,9 @@ static int gs4i_step_solid_point(gs4_sim *fake, gs4i_point_batch *q, gs4i_rule *
                        + (double)GS4I_NTH(q->L[2][2], 0);
     int i;
     for (i = 0; i < GS4I_BATCH; i++)
-        GS4I_NTH(q->J, i) = GS4I_C((double)GS4I_NTH(q->J, i) * exp(div * (double)rule->dt));
-    gs4i_family(rule, 0, 0, 1);
-    gs4i_correct_solid(&q->past.solid, &q->d, rule, q->L, q->J, 1, &count);
+        GS4I_NTH(q->J, i) = GS4I_C((double)GS4I_NTH(q->J, i) * exp(div * (double)integrator->dt));
+    gs4i_family(integrator, 0, 0, 1);
+    gs4i_correct_solid(&q->past.solid, &q->d, integrator, q->L, q->J, 1, &count);
     for (i = 0; i < 9; i++)
         count.failed |= !(gs4i_abs(GS4I_NTH(q->d.F[i / 3][i % 3], 0)) < GS4I_HUGE);
     if (count.failed)
@@ -14415,9 +14507,9 @@ GS4_API int gs4_point_step(const gs4_material *material, gs4_point *point,
 {
     gs4_sim fake;
     gs4i_point_batch q;
-    gs4i_rule rule;
+    gs4i_integrator integrator;
     gs4i_elastic_count count = { 0, 0, 0 };
-    int i, afresh = 1, r = gs4i_make_point_batch(&fake, material, point, velocity_gradient, &q);
+    int i, restart = 1, r = gs4i_make_point_batch(&fake, material, point, velocity_gradient, &q);
     if (r == GS4_OK) r = gs4i_check(&fake, "dt", dt, GS4I_POSITIVE);
     if (r == GS4_OK) r = gs4i_check(&fake, "rho_inf", rho_inf, GS4I_FRACTION);
     if (r == GS4_OK) r = gs4i_check(&fake, "rho_inf_spurious", rho_inf_spurious, GS4I_FRACTION);
@@ -14425,15 +14517,15 @@ GS4_API int gs4_point_step(const gs4_material *material, gs4_point *point,
         r = gs4i_fail_value(&fake, GS4_ERROR_ARGUMENT, "rho_inf_spurious is ",
                             (double)rho_inf_spurious, ", which is more than rho_inf");
     if (r != GS4_OK) return gs4i_say(&fake, r);
-    memset(&rule, 0, sizeof rule);
-    rule.dt = dt;
-    if (q.law.shear_modulus > 0)
-        return gs4i_say(&fake, gs4i_step_solid_point(&fake, &q, &rule, point));
-    if (!(q.law.inv_lambda > 0)) return GS4_OK;
-    for (i = 0; i < 6; i++) afresh &= point->stress_rate[i] == 0;
-    gs4i_family(&rule, rho_inf, rho_inf_spurious, afresh);
-    rule.afresh = afresh;
-    gs4i_correct_elastic(&q.past.elastic, &q.e, &rule, q.L, 1, &count);
+    memset(&integrator, 0, sizeof integrator);
+    integrator.dt = dt;
+    if (q.mat.shear_modulus > 0)
+        return gs4i_say(&fake, gs4i_step_solid_point(&fake, &q, &integrator, point));
+    if (!(q.mat.inv_lambda > 0)) return GS4_OK;
+    for (i = 0; i < 6; i++) restart &= point->stress_rate[i] == 0;
+    gs4i_family(&integrator, rho_inf, rho_inf_spurious, restart);
+    integrator.restart = restart;
+    gs4i_correct_elastic(&q.past.elastic, &q.e, &integrator, q.L, 1, &count);
     for (i = 0; i < 6; i++)
         count.failed |= !(gs4i_abs(GS4I_NTH(q.e.s[i], 0)) < GS4I_HUGE
                           && gs4i_abs(GS4I_NTH(q.e.rate[i], 0)) < GS4I_HUGE);
@@ -14460,14 +14552,14 @@ GS4_API int gs4_point_stress(const gs4_material *material, const gs4_point *poin
     gs4_real mu;
     if (r == GS4_OK && !cauchy) r = gs4i_bad_argument(&fake, "cauchy is NULL");
     if (r != GS4_OK) return gs4i_say(&fake, r);
-    mu = q.law.local * gs4i_viscosity_of(&q.law, q.law.temperature, q.L, 0);
+    mu = q.mat.local * gs4i_viscosity_of(&q.mat, q.mat.temperature, q.L, 0);
     memset(solid, 0, sizeof solid);
-    if (q.law.shear_modulus > 0) gs4i_solid_stress(&q.past.solid, q.d.F, q.J, solid, stiffness);
+    if (q.mat.shear_modulus > 0) gs4i_solid_stress(&q.past.solid, q.d.F, q.J, solid, stiffness);
     for (i = 0; i < 3; i++)
         for (j = i; j < 3; j++)
             cauchy[gs4i_place[i][j]] =
                 mu * (velocity_gradient[3 * i + j] + velocity_gradient[3 * j + i])
-                + (q.law.inv_lambda > 0 ? point->stress[gs4i_place[i][j]] : 0)
+                + (q.mat.inv_lambda > 0 ? point->stress[gs4i_place[i][j]] : 0)
                 + GS4I_NTH(solid[gs4i_place[i][j]], 0);
     return GS4_OK;
 }
@@ -14703,7 +14795,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_MIXING
 #undef GS4I_MOST_STRETCH
 #undef GS4I_MOST_STRAIN
-#undef GS4I_SHARPER
+#undef GS4I_DECONVOLVED_EIGENVALUES
 #undef GS4I_SMALL_STEP
 #undef GS4I_SOLID_WAVES
 #undef GS4I_MUL
@@ -14736,8 +14828,8 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_SPREAD
 #undef GS4I_SQRT
 #undef GS4I_STICKY_REACH
-#undef GS4I_GHOST_NODES
-#undef GS4I_GHOST_REACH
+#undef GS4I_IMAGE_NODES
+#undef GS4I_IMAGE_REACH
 #undef GS4I_BLOCK_REACH
 #undef GS4I_STORE
 #undef GS4I_STRIP

@@ -20,9 +20,9 @@ enum {
     FINEST = 4096
 };
 typedef struct setting {
-    gs4i_law law;
-    gs4i_batch_laws laws;
-    gs4i_elastic_laws elastic_laws;
+    gs4i_material_constants law;
+    gs4i_batch_constants laws;
+    gs4i_elastic_constants elastic_laws;
     gs4i_gradient L;
     gs4i_split split;
     double gradient;
@@ -39,12 +39,12 @@ static void set_up(setting *s, double Wi)
     s->law.is.stretch_time = 1 / 1.11109095526612;
     s->law.is.arms = 16;
     s->law.is.anisotropy = 0.01;
-    gs4i_set_law(&s->law, 0);
+    gs4i_set_material_constants(&s->law, 0);
     for (n = 0; n < GS4I_BATCH; n++) {
         s->laws.of[n] = &s->law;
         NTH(s->L[0][1], n) = Wi;
     }
-    gs4i_take_elastic_laws(&s->laws, &s->elastic_laws);
+    gs4i_load_elastic_constants(&s->laws, &s->elastic_laws);
     s->split.inv_lambda = 1;
     s->split.stretch = 2 * 1.11109095526612;
     s->split.nu = 2.0 / 16;
@@ -63,11 +63,11 @@ static double run(setting *s, int integrator, double time, int steps, double str
     int i;
     memset(&e, 0, sizeof e);
     for (i = 0; i < steps; i++) {
-        gs4i_rule rule = { 0 };
+        gs4i_integrator rule = { 0 };
         if (integrator == RULE) {
             gs4i_family(&rule, 0, 0, i == 0);
             rule.dt = dt;
-            rule.afresh = i == 0;
+            rule.restart = i == 0;
             gs4i_correct_elastic(&s->elastic_laws, &e, &rule, s->L, GS4I_BATCH, &count);
         } else if (integrator == FIXED) {
             gs4i_exponential(s->split.L, dt, E);

@@ -1219,7 +1219,7 @@ static double heat_scale(const gs4_sim *sim)
     for (i = 0; i < T.count; i++)
         most = fmax(most, fabs((double)T.data[(size_t)i * (size_t)T.stride]));
     for (i = 0; i < T.count; i++) {
-        const gs4_material *is = &sim->laws[gs4_particle_materials(sim)[i]].is;
+        const gs4_material *is = &sim->constants[gs4_particle_materials(sim)[i]].is;
         sum += (double)m.data[(size_t)i * (size_t)m.stride]
                * ((double)is->heat_capacity * most + (double)is->latent_heat);
     }
@@ -1233,7 +1233,7 @@ static double heat_number(const gs4_sim *sim)
     double most = 0;
     int i;
     for (i = 0; i < sim->material_count; i++) {
-        const gs4_material *is = &sim->laws[i].is;
+        const gs4_material *is = &sim->constants[i].is;
         most = fmax(most, (double)is->conductivity * sim->last_dt
                               / ((double)is->density * (double)is->heat_capacity)
                               * (double)sim->grid.inv_h * (double)sim->grid.inv_h);

@@ -1251,13 +1251,13 @@ static void gs4i_shape_bounds(const gs4_shape *s, gs4_vec3 *low, gs4_vec3 *high)
 #define GS4I_GRAPHS 24
 /* of the geometric mean of the strongest links of both ends: less does not join them */
 #define GS4I_STRONG 0.36f
-#define GS4I_DIRECT 200  /* unknowns that are solved by Cholesky */
+#define GS4I_DENSE 200   /* unknowns that are solved by Cholesky */
 #define GS4I_IS_LIQUID 2 /* bits of a kind: unknown; lets flow through */
 #define GS4I_IS_OPEN 1
 
 /* One level on a grid. Rows, and planes at both ends, are guarded by zeros: row j of plane k
  * begins at gs4i_row_of(g, j, k). */
-typedef struct gs4i_masked {
+typedef struct gs4i_level {
     int n[3], width;             /* cells; cells of one colour in a row */
     size_t stride, plane, count; /* from row to row, from plane to plane, in all */
     int32_t *span;               /* per row: first and last strip with liquid, in cells */
@@ -1266,52 +1266,53 @@ typedef struct gs4i_masked {
     /* coefficient of the face towards +x +y +z, and what float leaves of it; NULL: all equal */
     float *w[3][2], *w_low[3][2];
     /* h^2 d; level 1: with the faces to the air; level 0 where w: -1 without unknown */
-    float *mass[2], *mass_low[2];
+    float *diagonal[2], *diagonal_low[2];
     /* where w is NULL: faces that conduct; 0 where there is no unknown */
     float *degree[2];
     double *r[2]; /* residual */
-} gs4i_masked;
+} gs4i_level;
 
 typedef struct gs4i_graph {
     /* nodes, red ones first; whether nodes of one colour are neighbours */
     int n, reds, mixed;
     int32_t *start, *to;
     float *w; /* edges of node i: start[i] to start[i + 1] */
-    float *inverse, *diagonal, *air, *mass, *b, *x;
+    /* center: a_ii = air + diagonal + sum of w; inverse: 1 / a_ii, 0 where that is 0 */
+    float *inverse, *center, *air, *diagonal, *b, *x;
     int32_t *parent; /* in the next graph; -1: a node without edges */
     uint64_t *block; /* its place, 21 bits an axis */
     gs4i_scratch nodes, edges;
 } gs4i_graph;
 
 /* a run of liquid cells in a row */
-typedef struct gs4i_cells {
+typedef struct gs4i_run {
     int32_t row, begin, end, pocket;
     double sum;
-} gs4i_cells;
+} gs4i_run;
 
 typedef struct gs4i_solver {
     gs4i_memory *memory;
     const gs4i_tasks *tasks;
-    gs4i_masked level[2];
+    gs4i_level level[2];
     double *x[2];
-    float *p[2];        /* solution, direction */
-    float *residual;    /* of red cells of level 1 */
-    int32_t *parent[2]; /* of cells of level 1 in graph 0, -1: none */
+    float *p[2];         /* solution, direction */
+    float *red_residual; /* of level 1 */
+    int32_t *parent[2];  /* of cells of level 1 in graph 0, -1: none */
     uint8_t *kind;
     size_t kind_row, kind_plane; /* bits, one cell of zeros around */
     gs4i_graph graph[GS4I_GRAPHS];
     int graphs;
-    double *matrix; /* lower triangle of the last graph's */
-    gs4i_cells *runs;
+    double *factor; /* lower triangle of the last graph's */
+    gs4i_run *runs;
     int run_count; /* of closed pockets: neither air nor diagonal */
     int pockets;
     double *pocket; /* per pocket: sum, number of cells */
     int slabs[2], cut[2][GS4I_SLABS + 1];
     int32_t *span[2];
-    int uniform, massive;
+    int uniform, has_diagonal;
     int64_t unknowns;
-    double unit, mass_unit;  /* coefficients and diagonal are scaled by these, */
-    double rhs_unit, x_unit; /* and right-hand side and x, so that all are about 1 */
+    double unit, diagonal_unit; /* coefficients and diagonal are scaled by these, */
+    double rhs_unit, x_unit;    /* and right-hand side and x, so that all are about 1 */
     double alpha;
     float beta;
     double *sums, *given; /* one and three per plane, added in order */
@@ -1322,7 +1323,7 @@ typedef struct gs4i_solver {
     double fault_value; /* what was wrong, in words */
 } gs4i_solver;
 
-GS4I_INLINE size_t gs4i_row_of(const gs4i_masked *g, int j, int k)
+GS4I_INLINE size_t gs4i_row_of(const gs4i_level *g, int j, int k)
 {
     return ((size_t)(k + 1) * (size_t)(g->n[1] + 1) + (size_t)(j + 1)) * g->stride;
 }
@@ -1356,7 +1357,7 @@ static double gs4i_sum_lanes(const double *v)
     return ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
 }
 
-static void gs4i_start_row(float *GS4I_RESTRICT z, const double *GS4I_RESTRICT r,
+static void gs4i_scale_row(float *GS4I_RESTRICT z, const double *GS4I_RESTRICT r,
                            const float *GS4I_RESTRICT inverse, int n)
 {
     int m, l;
@@ -1386,39 +1387,40 @@ static void gs4i_smooth_weighted(float *GS4I_RESTRICT z, GS4I_NEIGHBOURS(float),
                * inverse[l];
 }
 
-static void gs4i_residual_uniform(float *GS4I_RESTRICT out, const float *GS4I_RESTRICT z,
-                                  GS4I_NEIGHBOURS(float), const double *GS4I_RESTRICT r,
-                                  const float *GS4I_RESTRICT degree,
-                                  const float *GS4I_RESTRICT mass, int n)
+static void gs4i_red_residual_uniform(float *GS4I_RESTRICT out, const float *GS4I_RESTRICT z,
+                                      GS4I_NEIGHBOURS(float), const double *GS4I_RESTRICT r,
+                                      const float *GS4I_RESTRICT degree,
+                                      const float *GS4I_RESTRICT diagonal, int n)
 {
     int m, l;
     GS4I_STRIPS(m, l, n) {
         const float around = (left[l] + right[l]) + (south[l] + north[l]) + (below[l] + above[l]);
-        out[l] = (float)(degree[l] > 0) * (((float)r[l] - (degree[l] + mass[l]) * z[l]) + around);
+        out[l] =
+            (float)(degree[l] > 0) * (((float)r[l] - (degree[l] + diagonal[l]) * z[l]) + around);
     }
 }
 
-static void gs4i_residual_weighted(float *GS4I_RESTRICT out, const float *GS4I_RESTRICT z,
-                                   GS4I_NEIGHBOURS(float), GS4I_FACES,
-                                   const double *GS4I_RESTRICT r, const float *GS4I_RESTRICT mass,
-                                   int n)
+static void gs4i_red_residual_weighted(float *GS4I_RESTRICT out, const float *GS4I_RESTRICT z,
+                                       GS4I_NEIGHBOURS(float), GS4I_FACES,
+                                       const double *GS4I_RESTRICT r,
+                                       const float *GS4I_RESTRICT diagonal, int n)
 {
     int m, l;
     GS4I_STRIPS(m, l, n) {
         const float c = z[l], flow = (wl[l] * (c - left[l]) + wr[l] * (c - right[l]))
                                      + (ws[l] * (c - south[l]) + wn[l] * (c - north[l]))
                                      + (wb[l] * (c - below[l]) + wa[l] * (c - above[l]));
-        out[l] = (float)(mass[l] >= 0) * ((float)r[l] - (mass[l] * c + flow));
+        out[l] = (float)(diagonal[l] >= 0) * ((float)r[l] - (diagonal[l] * c + flow));
     }
 }
 
 /* The matrix times v in double. In the double build faces are two floats. Without a diagonal
- * `massive` is 0 where this is inlined. */
-#define GS4I_TIMES_UNIFORM(q, v)                                                       \
-    const double c = (double)(v)[l], around = ((double)left[l] + (double)right[l])     \
-                                              + ((double)south[l] + (double)north[l])  \
-                                              + ((double)below[l] + (double)above[l]); \
-    const double q = (massive ? ((double)mass[l] + (double)mass_low[l]) * c : 0)       \
+ * `has_diagonal` is 0 where this is inlined. */
+#define GS4I_TIMES_UNIFORM(q, v)                                                              \
+    const double c = (double)(v)[l], around = ((double)left[l] + (double)right[l])            \
+                                              + ((double)south[l] + (double)north[l])         \
+                                              + ((double)below[l] + (double)above[l]);        \
+    const double q = (has_diagonal ? ((double)diagonal[l] + (double)diagonal_low[l]) * c : 0) \
                      + (double)(degree[l] > 0) * ((double)degree[l] * c - around)
 #ifdef GS4_DOUBLE
 #define GS4I_LOW_FACES                                                                             \
@@ -1440,18 +1442,20 @@ static void gs4i_residual_weighted(float *GS4I_RESTRICT out, const float *GS4I_R
                            + GS4I_FACE(wn[l], ln[l]) * (c - (double)north[l]))  \
                         + (GS4I_FACE(wb[l], lb[l]) * (c - (double)below[l])     \
                            + GS4I_FACE(wa[l], la[l]) * (c - (double)above[l])); \
-    const double q = (double)(mass[l] >= 0) * (((double)mass[l] + (double)mass_low[l]) * c + flow)
-#define GS4I_UNIFORM_MATRIX                                             \
-    const float *GS4I_RESTRICT degree, const float *GS4I_RESTRICT mass, \
-        const float *GS4I_RESTRICT mass_low, const int massive
-#define GS4I_WEIGHTED_MATRIX \
-    GS4I_FACES GS4I_LOW_FACES, const float *GS4I_RESTRICT mass, const float *GS4I_RESTRICT mass_low
+    const double q =                                                            \
+        (double)(diagonal[l] >= 0) * (((double)diagonal[l] + (double)diagonal_low[l]) * c + flow)
+#define GS4I_UNIFORM_MATRIX                                                 \
+    const float *GS4I_RESTRICT degree, const float *GS4I_RESTRICT diagonal, \
+        const float *GS4I_RESTRICT diagonal_low, const int has_diagonal
+#define GS4I_WEIGHTED_MATRIX                                        \
+    GS4I_FACES GS4I_LOW_FACES, const float *GS4I_RESTRICT diagonal, \
+        const float *GS4I_RESTRICT diagonal_low
 
 /* p.Ap, from differences in float: it sets the length of a step alone. Faces that do not conduct
  * have p = 0 behind them. */
-static double gs4i_curvature_uniform(const float *GS4I_RESTRICT p, GS4I_NEIGHBOURS(float),
-                                     const float *GS4I_RESTRICT degree,
-                                     const float *GS4I_RESTRICT mass, int n)
+static double gs4i_p_dot_ap_uniform(const float *GS4I_RESTRICT p, GS4I_NEIGHBOURS(float),
+                                    const float *GS4I_RESTRICT degree,
+                                    const float *GS4I_RESTRICT diagonal, int n)
 {
     double sum[GS4I_STRIP] = { 0 };
     int m, l;
@@ -1459,13 +1463,13 @@ static double gs4i_curvature_uniform(const float *GS4I_RESTRICT p, GS4I_NEIGHBOU
         const float c = p[l], flow = ((c - left[l]) + (c - right[l]))
                                      + ((c - south[l]) + (c - north[l]))
                                      + ((c - below[l]) + (c - above[l]));
-        sum[l - m] += (double)c * (double)(flow + (mass[l] - (6 - degree[l])) * c);
+        sum[l - m] += (double)c * (double)(flow + (diagonal[l] - (6 - degree[l])) * c);
     }
     return gs4i_sum_lanes(sum);
 }
 
-static double gs4i_curvature_weighted(const float *GS4I_RESTRICT p, GS4I_NEIGHBOURS(float),
-                                      GS4I_FACES, const float *GS4I_RESTRICT mass, int n)
+static double gs4i_p_dot_ap_weighted(const float *GS4I_RESTRICT p, GS4I_NEIGHBOURS(float),
+                                     GS4I_FACES, const float *GS4I_RESTRICT diagonal, int n)
 {
     double sum[GS4I_STRIP] = { 0 };
     int m, l;
@@ -1473,7 +1477,7 @@ static double gs4i_curvature_weighted(const float *GS4I_RESTRICT p, GS4I_NEIGHBO
         const float c = p[l], flow = (wl[l] * (c - left[l]) + wr[l] * (c - right[l]))
                                      + (ws[l] * (c - south[l]) + wn[l] * (c - north[l]))
                                      + (wb[l] * (c - below[l]) + wa[l] * (c - above[l]));
-        sum[l - m] += (double)c * (double)(mass[l] * c + flow);
+        sum[l - m] += (double)c * (double)(diagonal[l] * c + flow);
     }
     return gs4i_sum_lanes(sum);
 }
@@ -1512,8 +1516,8 @@ static double gs4i_update_weighted(double *GS4I_RESTRICT x, double *GS4I_RESTRIC
 }
 
 /* r -= Ax; gives r.r */
-static double gs4i_defect_uniform(double *GS4I_RESTRICT r, const double *GS4I_RESTRICT x,
-                                  GS4I_NEIGHBOURS(double), GS4I_UNIFORM_MATRIX, int n)
+static double gs4i_residual_uniform(double *GS4I_RESTRICT r, const double *GS4I_RESTRICT x,
+                                    GS4I_NEIGHBOURS(double), GS4I_UNIFORM_MATRIX, int n)
 {
     double sum[GS4I_STRIP] = { 0 };
     int m, l;
@@ -1525,8 +1529,8 @@ static double gs4i_defect_uniform(double *GS4I_RESTRICT r, const double *GS4I_RE
     return gs4i_sum_lanes(sum);
 }
 
-static double gs4i_defect_weighted(double *GS4I_RESTRICT r, const double *GS4I_RESTRICT x,
-                                   GS4I_NEIGHBOURS(double), GS4I_WEIGHTED_MATRIX, int n)
+static double gs4i_residual_weighted(double *GS4I_RESTRICT r, const double *GS4I_RESTRICT x,
+                                     GS4I_NEIGHBOURS(double), GS4I_WEIGHTED_MATRIX, int n)
 {
     double sum[GS4I_STRIP] = { 0 };
     int m, l;
@@ -1554,15 +1558,16 @@ static double gs4i_square_row(const double *GS4I_RESTRICT r, int n)
     return gs4i_sum_lanes(sum);
 }
 
-static void gs4i_direct_row(float *GS4I_RESTRICT p, const float *GS4I_RESTRICT z, float beta, int n)
+static void gs4i_update_direction(float *GS4I_RESTRICT p, const float *GS4I_RESTRICT z, float beta,
+                                  int n)
 {
     int m, l;
     GS4I_STRIPS(m, l, n) p[l] = z[l] + beta * p[l];
 }
 
-/* --- stages: a plane of a level --------------------------------------------------------------- */
+/* --- passes: a plane of a level --------------------------------------------------------------- */
 
-/* What all stages know of a row: where its liquid is. */
+/* What all passes know of a row: where its liquid is. */
 #define GS4I_EACH_ROW(g, k, j, at, n)                                                    \
     for (j = 0; j < (g)->n[1]; j++)                                                      \
         if (at = gs4i_row_of(g, j, k)                                                    \
@@ -1571,19 +1576,19 @@ static void gs4i_direct_row(float *GS4I_RESTRICT p, const float *GS4I_RESTRICT z
                 - (g)->span[2 * ((size_t)(k) * (size_t)(g)->n[1] + (size_t)j)],          \
             n > 0)
 
-typedef void (*gs4i_stage_fn)(gs4i_solver *s, int level, int k);
+typedef void (*gs4i_pass_fn)(gs4i_solver *s, int level, int k);
 
-static void gs4i_stage_start(gs4i_solver *s, int level, int k)
+static void gs4i_pass_first_red(gs4i_solver *s, int level, int k)
 {
-    const gs4i_masked *g = &s->level[level];
+    const gs4i_level *g = &s->level[level];
     size_t at;
     int j, n;
-    GS4I_EACH_ROW(g, k, j, at, n) gs4i_start_row(g->z[0] + at, g->r[0] + at, g->inverse[0] + at, n);
+    GS4I_EACH_ROW(g, k, j, at, n) gs4i_scale_row(g->z[0] + at, g->r[0] + at, g->inverse[0] + at, n);
 }
 
 static void gs4i_smooth(gs4i_solver *s, int level, int c, int k)
 {
-    const gs4i_masked *g = &s->level[level];
+    const gs4i_level *g = &s->level[level];
     size_t at;
     int j, n;
     GS4I_EACH_ROW(g, k, j, at, n) {
@@ -1598,28 +1603,30 @@ static void gs4i_smooth(gs4i_solver *s, int level, int c, int k)
     }
 }
 
-static void gs4i_stage_red(gs4i_solver *s, int level, int k) { gs4i_smooth(s, level, 0, k); }
-static void gs4i_stage_black(gs4i_solver *s, int level, int k) { gs4i_smooth(s, level, 1, k); }
+static void gs4i_pass_red(gs4i_solver *s, int level, int k) { gs4i_smooth(s, level, 0, k); }
+static void gs4i_pass_black(gs4i_solver *s, int level, int k) { gs4i_smooth(s, level, 1, k); }
 
 /* Of red cells; that of black ones is zero after their sweep. */
-static void gs4i_residual_row(const gs4i_solver *s, const gs4i_masked *g, float *out, size_t at,
-                              int j, int k, int n)
+static void gs4i_red_residual_row(const gs4i_solver *s, const gs4i_level *g, float *out, size_t at,
+                                  int j, int k, int n)
 {
     const int t = (j + k) & 1;
     if (g->degree[0])
-        gs4i_residual_uniform(out, g->z[0] + at, GS4I_AROUND(g->z[1], at, t, g), g->r[0] + at,
-                              g->degree[0] + at, g->mass[0] ? g->mass[0] + at : s->zeros, n);
+        gs4i_red_residual_uniform(out, g->z[0] + at, GS4I_AROUND(g->z[1], at, t, g), g->r[0] + at,
+                                  g->degree[0] + at,
+                                  g->diagonal[0] ? g->diagonal[0] + at : s->zeros, n);
     else
-        gs4i_residual_weighted(out, g->z[0] + at, GS4I_AROUND(g->z[1], at, t, g),
-                               GS4I_FACES_OF(g->w, 0, at, t, g), g->r[0] + at, g->mass[0] + at, n);
+        gs4i_red_residual_weighted(out, g->z[0] + at, GS4I_AROUND(g->z[1], at, t, g),
+                                   GS4I_FACES_OF(g->w, 0, at, t, g), g->r[0] + at,
+                                   g->diagonal[0] + at, n);
 }
 
-static void gs4i_stage_residual(gs4i_solver *s, int level, int k)
+static void gs4i_pass_red_residual(gs4i_solver *s, int level, int k)
 {
-    const gs4i_masked *g = &s->level[level];
+    const gs4i_level *g = &s->level[level];
     size_t at;
     int j, n;
-    GS4I_EACH_ROW(g, k, j, at, n) gs4i_residual_row(s, g, s->residual + at, at, j, k, n);
+    GS4I_EACH_ROW(g, k, j, at, n) gs4i_red_residual_row(s, g, s->red_residual + at, at, j, k, n);
 }
 
 /* Adds cell m of a fine row to coarse cell m, in two colours. */
@@ -1634,9 +1641,9 @@ static void gs4i_add_parents(double *GS4I_RESTRICT even, double *GS4I_RESTRICT o
 }
 
 /* A plane of level 1 once both planes below are done. */
-static void gs4i_stage_restrict(gs4i_solver *s, int level, int k)
+static void gs4i_pass_restrict(gs4i_solver *s, int level, int k)
 {
-    const gs4i_masked *g = &s->level[level], *h = &s->level[level + 1];
+    const gs4i_level *g = &s->level[level], *h = &s->level[level + 1];
     float out[16 * GS4I_STRIP];
     const int above = k / 2;
     int j, f, i, n;
@@ -1653,7 +1660,7 @@ static void gs4i_stage_restrict(gs4i_solver *s, int level, int k)
             if (fj >= g->n[1] || fk >= g->n[2]) continue;
             for (i = span[0]; i < span[1]; i += n) {
                 n = span[1] - i < 16 * GS4I_STRIP ? span[1] - i : 16 * GS4I_STRIP;
-                gs4i_residual_row(s, g, out, gs4i_row_of(g, fj, fk) + (size_t)i, fj, fk, n);
+                gs4i_red_residual_row(s, g, out, gs4i_row_of(g, fj, fk) + (size_t)i, fj, fk, n);
                 gs4i_add_parents(h->r[even] + to + i / 2, h->r[!even] + to + i / 2, out, n);
             }
         }
@@ -1672,9 +1679,9 @@ static void gs4i_add_children(float *GS4I_RESTRICT z, const float *GS4I_RESTRICT
 }
 
 /* To red cells; black ones follow from them. */
-static void gs4i_stage_prolong(gs4i_solver *s, int level, int k)
+static void gs4i_pass_prolong(gs4i_solver *s, int level, int k)
 {
-    const gs4i_masked *g = &s->level[level], *h = &s->level[level + 1];
+    const gs4i_level *g = &s->level[level], *h = &s->level[level + 1];
     size_t at;
     int j, n;
     GS4I_EACH_ROW(g, k, j, at, n) {
@@ -1685,9 +1692,9 @@ static void gs4i_stage_prolong(gs4i_solver *s, int level, int k)
     }
 }
 
-static void gs4i_stage_collect(gs4i_solver *s, int level, int k)
+static void gs4i_pass_prolong_graph(gs4i_solver *s, int level, int k)
 {
-    const gs4i_masked *g = &s->level[level];
+    const gs4i_level *g = &s->level[level];
     size_t at;
     int j, n, m;
     GS4I_EACH_ROW(g, k, j, at, n)
@@ -1697,9 +1704,9 @@ static void gs4i_stage_collect(gs4i_solver *s, int level, int k)
         }
 }
 
-static void gs4i_stage_dot(gs4i_solver *s, int level, int k)
+static void gs4i_pass_dot(gs4i_solver *s, int level, int k)
 {
-    const gs4i_masked *g = &s->level[level];
+    const gs4i_level *g = &s->level[level];
     double sum = 0;
     size_t at;
     int j, n, c;
@@ -1708,26 +1715,26 @@ static void gs4i_stage_dot(gs4i_solver *s, int level, int k)
     s->sums[k] = sum;
 }
 
-static void gs4i_stage_direct(gs4i_solver *s, int level, int k)
+static void gs4i_pass_direction(gs4i_solver *s, int level, int k)
 {
-    const gs4i_masked *g = &s->level[level];
+    const gs4i_level *g = &s->level[level];
     size_t at;
     int j, n, c;
     GS4I_EACH_ROW(g, k, j, at, n)
-        for (c = 0; c < 2; c++) gs4i_direct_row(s->p[c] + at, g->z[c] + at, s->beta, n);
+        for (c = 0; c < 2; c++) gs4i_update_direction(s->p[c] + at, g->z[c] + at, s->beta, n);
 }
 
-#define GS4I_MASS(s, g, c, at)                       \
-    (g)->mass[c] ? (g)->mass[c] + (at) : (s)->zeros, \
-        (g)->mass_low[c] ? (g)->mass_low[c] + (at) : (s)->zeros
-#define GS4I_UNIFORM(s, g, c, at) (g)->degree[c] + (at), GS4I_MASS(s, g, c, at)
+#define GS4I_DIAGONALS(s, g, c, at)                          \
+    (g)->diagonal[c] ? (g)->diagonal[c] + (at) : (s)->zeros, \
+        (g)->diagonal_low[c] ? (g)->diagonal_low[c] + (at) : (s)->zeros
+#define GS4I_UNIFORM(s, g, c, at) (g)->degree[c] + (at), GS4I_DIAGONALS(s, g, c, at)
 #define GS4I_WEIGHTS(s, g, c, at, t)   \
     GS4I_FACES_OF((g)->w, c, at, t, g) \
-    GS4I_LOW_FACES_OF((g)->w_low, c, at, t, g), GS4I_MASS(s, g, c, at)
+    GS4I_LOW_FACES_OF((g)->w_low, c, at, t, g), GS4I_DIAGONALS(s, g, c, at)
 
-static void gs4i_stage_curvature(gs4i_solver *s, int level, int k)
+static void gs4i_pass_p_dot_ap(gs4i_solver *s, int level, int k)
 {
-    const gs4i_masked *g = &s->level[level];
+    const gs4i_level *g = &s->level[level];
     double sum = 0;
     size_t at;
     int j, n, c;
@@ -1735,27 +1742,27 @@ static void gs4i_stage_curvature(gs4i_solver *s, int level, int k)
         for (c = 0; c < 2; c++) {
             const int t = (c + j + k) & 1;
             if (g->degree[0])
-                sum += gs4i_curvature_uniform(s->p[c] + at, GS4I_AROUND(s->p[!c], at, t, g),
-                                              g->degree[c] + at,
-                                              g->mass[c] ? g->mass[c] + at : s->zeros, n);
+                sum += gs4i_p_dot_ap_uniform(s->p[c] + at, GS4I_AROUND(s->p[!c], at, t, g),
+                                             g->degree[c] + at,
+                                             g->diagonal[c] ? g->diagonal[c] + at : s->zeros, n);
             else
-                sum +=
-                    gs4i_curvature_weighted(s->p[c] + at, GS4I_AROUND(s->p[!c], at, t, g),
-                                            GS4I_FACES_OF(g->w, c, at, t, g), g->mass[c] + at, n);
+                sum += gs4i_p_dot_ap_weighted(s->p[c] + at, GS4I_AROUND(s->p[!c], at, t, g),
+                                              GS4I_FACES_OF(g->w, c, at, t, g), g->diagonal[c] + at,
+                                              n);
         }
     s->sums[k] = sum;
 }
 
-static void gs4i_stage_update(gs4i_solver *s, int level, int k)
+static void gs4i_pass_update(gs4i_solver *s, int level, int k)
 {
-    const gs4i_masked *g = &s->level[level];
+    const gs4i_level *g = &s->level[level];
     double sum = 0;
     size_t at;
     int j, n, c;
     GS4I_EACH_ROW(g, k, j, at, n)
         for (c = 0; c < 2; c++) {
             const int t = (c + j + k) & 1;
-            if (g->degree[0] && g->mass[0])
+            if (g->degree[0] && g->diagonal[0])
                 sum += gs4i_update_uniform(s->x[c] + at, g->r[c] + at, s->alpha, s->p[c] + at,
                                            GS4I_AROUND(s->p[!c], at, t, g),
                                            GS4I_UNIFORM(s, g, c, at), 1, n);
@@ -1771,9 +1778,9 @@ static void gs4i_stage_update(gs4i_solver *s, int level, int k)
     s->sums[k] = sum;
 }
 
-static void gs4i_stage_defect(gs4i_solver *s, int level, int k)
+static void gs4i_pass_residual(gs4i_solver *s, int level, int k)
 {
-    const gs4i_masked *g = &s->level[level];
+    const gs4i_level *g = &s->level[level];
     double sum = 0;
     size_t at;
     int j, n, c;
@@ -1781,20 +1788,20 @@ static void gs4i_stage_defect(gs4i_solver *s, int level, int k)
         for (c = 0; c < 2; c++) {
             const int t = (c + j + k) & 1;
             if (g->degree[0])
-                sum +=
-                    gs4i_defect_uniform(g->r[c] + at, s->x[c] + at, GS4I_AROUND(s->x[!c], at, t, g),
-                                        GS4I_UNIFORM(s, g, c, at), 1, n);
+                sum += gs4i_residual_uniform(g->r[c] + at, s->x[c] + at,
+                                             GS4I_AROUND(s->x[!c], at, t, g),
+                                             GS4I_UNIFORM(s, g, c, at), 1, n);
             else
-                sum += gs4i_defect_weighted(g->r[c] + at, s->x[c] + at,
-                                            GS4I_AROUND(s->x[!c], at, t, g),
-                                            GS4I_WEIGHTS(s, g, c, at, t), n);
+                sum += gs4i_residual_weighted(g->r[c] + at, s->x[c] + at,
+                                              GS4I_AROUND(s->x[!c], at, t, g),
+                                              GS4I_WEIGHTS(s, g, c, at, t), n);
         }
     s->sums[k] = sum;
 }
 
-static void gs4i_stage_size(gs4i_solver *s, int level, int k)
+static void gs4i_pass_norm(gs4i_solver *s, int level, int k)
 {
-    const gs4i_masked *g = &s->level[level];
+    const gs4i_level *g = &s->level[level];
     double sum = 0;
     size_t at;
     int j, n, c;
@@ -1803,77 +1810,77 @@ static void gs4i_stage_size(gs4i_solver *s, int level, int k)
     s->sums[k] = sum;
 }
 
-static void gs4i_stage_jacobi(gs4i_solver *s, int level, int k)
+static void gs4i_pass_jacobi(gs4i_solver *s, int level, int k)
 {
-    const gs4i_masked *g = &s->level[level];
+    const gs4i_level *g = &s->level[level];
     size_t at;
     int j, n, c;
     GS4I_EACH_ROW(g, k, j, at, n)
-        for (c = 0; c < 2; c++) gs4i_start_row(g->z[c] + at, g->r[c] + at, g->inverse[c] + at, n);
+        for (c = 0; c < 2; c++) gs4i_scale_row(g->z[c] + at, g->r[c] + at, g->inverse[c] + at, n);
 }
 
-/* --- sweeps: stages one behind the other through the planes ------------------------------------ *
+/* --- wavefronts: passes one behind the other through the planes -------------------------------- *
  *
- * Stage q needs stage q - 1 in planes k - 1, k, k + 1; the first needs nothing that a stage
- * writes. So one pass does stage q in plane step - q while that is in the cache. With slabs each
+ * Pass q needs pass q - 1 in planes k - 1, k, k + 1; the first needs nothing that a pass writes.
+ * So pass q does plane step - q while that is in the cache. With slabs there are two rounds: each
  * task does first what needs nothing of another slab, then what is left at the cuts:
  *
- *     stage 0   |--------------------||--------------------|
- *     stage 1   |-------------------\  /-------------------|        first pass \ cut / first pass
- *     stage 2   |------------------\ || /------------------|        second pass: between \ and /
+ *     pass 0   |--------------------||--------------------|
+ *     pass 1   |-------------------\  /-------------------|        first round: \ cut /
+ *     pass 2   |------------------\ || /------------------|        second: between \ and /
  *
- * Every cell sees the same numbers whatever the slabs. The stage that restricts takes planes by
+ * Every cell sees the same numbers whatever the slabs. The pass that restricts takes planes by
  * two. */
 
-typedef struct gs4i_sweep {
+typedef struct gs4i_wavefront {
     gs4i_solver *s;
     int level;
-    const gs4i_stage_fn *stage;
+    const gs4i_pass_fn *pass;
     int count;
-} gs4i_sweep;
+} gs4i_wavefront;
 
-GS4I_INLINE int gs4i_even(const gs4i_sweep *w, int q, int k, int up)
+GS4I_INLINE int gs4i_even_plane(const gs4i_wavefront *w, int q, int k, int up)
 {
-    return w->stage[q] != gs4i_stage_restrict ? k : up ? (k + 1) & ~1 : k & ~1;
+    return w->pass[q] != gs4i_pass_restrict ? k : up ? (k + 1) & ~1 : k & ~1;
 }
 
-static void gs4i_sweep_slab(int index, void *context)
+static void gs4i_wavefront_slab(int index, void *context)
 {
-    const gs4i_sweep *w = (const gs4i_sweep *)context;
+    const gs4i_wavefront *w = (const gs4i_wavefront *)context;
     const int a = w->s->cut[w->level][index], b = w->s->cut[w->level][index + 1],
               first = index == 0, last = index == w->s->slabs[w->level] - 1;
     int step, q;
     for (step = a; step < b + w->count; step++)
         for (q = 0; q < w->count; q++) {
             const int k = step - q;
-            if (k >= (first ? a : gs4i_even(w, q, a + q, 1))
-                && k < (last ? b : gs4i_even(w, q, b - q, 0)))
-                w->stage[q](w->s, w->level, k);
+            if (k >= (first ? a : gs4i_even_plane(w, q, a + q, 1))
+                && k < (last ? b : gs4i_even_plane(w, q, b - q, 0)))
+                w->pass[q](w->s, w->level, k);
         }
 }
 
-static void gs4i_sweep_cut(int index, void *context)
+static void gs4i_wavefront_cut(int index, void *context)
 {
-    const gs4i_sweep *w = (const gs4i_sweep *)context;
+    const gs4i_wavefront *w = (const gs4i_wavefront *)context;
     const int cut = w->s->cut[w->level][index + 1];
     int q, k;
     for (q = 1; q < w->count; q++)
-        for (k = gs4i_even(w, q, cut - q, 0); k < gs4i_even(w, q, cut + q, 1); k++)
-            w->stage[q](w->s, w->level, k);
+        for (k = gs4i_even_plane(w, q, cut - q, 0); k < gs4i_even_plane(w, q, cut + q, 1); k++)
+            w->pass[q](w->s, w->level, k);
 }
 
-static void gs4i_sweep_run(gs4i_solver *s, int level, const gs4i_stage_fn *stage, int count)
+static void gs4i_wavefront_run(gs4i_solver *s, int level, const gs4i_pass_fn *pass, int count)
 {
-    gs4i_sweep w;
+    gs4i_wavefront w;
     w.s = s;
     w.level = level;
-    w.stage = stage;
+    w.pass = pass;
     w.count = count;
-    gs4i_parallel_for(s->tasks, s->slabs[level], gs4i_sweep_slab, &w);
-    if (count > 1) gs4i_parallel_for(s->tasks, s->slabs[level] - 1, gs4i_sweep_cut, &w);
+    gs4i_parallel_for(s->tasks, s->slabs[level], gs4i_wavefront_slab, &w);
+    if (count > 1) gs4i_parallel_for(s->tasks, s->slabs[level] - 1, gs4i_wavefront_cut, &w);
 }
 
-static double gs4i_total(const gs4i_solver *s)
+static double gs4i_sum_planes(const gs4i_solver *s)
 {
     double sum = 0;
     int k;
@@ -1912,7 +1919,7 @@ static void gs4i_graph_restrict(const gs4i_graph *g, gs4i_graph *up)
     int i, e;
     memset(up->b, 0, (size_t)up->n * sizeof(float));
     for (i = 0; i < (g->mixed ? g->n : g->reds); i++) {
-        float sum = g->b[i] - g->diagonal[i] * g->x[i];
+        float sum = g->b[i] - g->center[i] * g->x[i];
         if (g->parent[i] < 0) continue;
         for (e = g->start[i]; e < g->start[i + 1]; e++) sum += g->w[e] * g->x[g->to[e]];
         up->b[g->parent[i]] += sum;
@@ -1926,20 +1933,20 @@ static void gs4i_graph_prolong(gs4i_graph *g, const gs4i_graph *up)
         if (g->parent[i] >= 0) g->x[i] += up->x[g->parent[i]];
 }
 
-/* L L^T x = b; rows whose pivot was skipped have a zero on the diagonal of L. */
-static void gs4i_graph_direct(gs4i_graph *g, const double *L)
+/* F F^T x = b with the Cholesky factor F; a row whose pivot was skipped has 0 on its diagonal. */
+static void gs4i_graph_solve(gs4i_graph *g, const double *factor)
 {
     const int n = g->n;
-    double y[GS4I_DIRECT];
+    double y[GS4I_DENSE];
     int i, j;
     for (i = 0; i < n; i++) {
-        const double *row = L + (size_t)i * (size_t)n;
+        const double *row = factor + (size_t)i * (size_t)n;
         double sum = (double)g->b[i];
         for (j = 0; j < i; j++) sum -= row[j] * y[j];
         y[i] = row[i] > 0 ? sum / row[i] : 0;
     }
     for (i = n - 1; i >= 0; i--) {
-        const double *row = L + (size_t)i * (size_t)n;
+        const double *row = factor + (size_t)i * (size_t)n;
         y[i] = row[i] > 0 ? y[i] / row[i] : 0;
         for (j = 0; j < i; j++) y[j] -= row[j] * y[i];
         g->x[i] = (float)y[i];
@@ -1956,7 +1963,7 @@ static void gs4i_graph_cycles(gs4i_solver *s)
         gs4i_graph_forward(g, q ? 3 : 2);
         gs4i_graph_restrict(g, &s->graph[q + 1]);
     }
-    gs4i_graph_direct(&s->graph[q], s->matrix);
+    gs4i_graph_solve(&s->graph[q], s->factor);
     while (--q >= 0) {
         gs4i_graph *g = &s->graph[q];
         gs4i_graph_prolong(g, &s->graph[q + 1]);
@@ -1965,40 +1972,40 @@ static void gs4i_graph_cycles(gs4i_solver *s)
 }
 
 /* Of a plane of blocks: no group reaches into another. */
-static void gs4i_restrict_groups(int K, void *context)
+static void gs4i_restrict_to_graph(int bk, void *context)
 {
     gs4i_solver *s = (gs4i_solver *)context;
-    const gs4i_masked *g = &s->level[1];
+    const gs4i_level *g = &s->level[1];
     float *b = s->graph[0].b;
     size_t at;
     int j, k, n, m;
-    for (k = 2 * K; k < 2 * K + 2 && k < g->n[2]; k++)
+    for (k = 2 * bk; k < 2 * bk + 2 && k < g->n[2]; k++)
         GS4I_EACH_ROW(g, k, j, at, n)
             for (m = 0; m < n; m++) {
                 const int32_t parent = s->parent[0][at + (size_t)m];
-                if (parent >= 0) b[parent] += s->residual[at + (size_t)m];
+                if (parent >= 0) b[parent] += s->red_residual[at + (size_t)m];
             }
 }
 
 /* z = (about the inverse of A) r, symmetric and positive; gives r.z */
 static double gs4i_cycle(gs4i_solver *s)
 {
-    static const gs4i_stage_fn down[] = { gs4i_stage_start, gs4i_stage_black, gs4i_stage_red,
-                                          gs4i_stage_black, gs4i_stage_restrict };
-    static const gs4i_stage_fn down1[] = { gs4i_stage_start, gs4i_stage_black, gs4i_stage_red,
-                                           gs4i_stage_black, gs4i_stage_residual };
-    static const gs4i_stage_fn up1[] = { gs4i_stage_collect, gs4i_stage_black, gs4i_stage_red,
-                                         gs4i_stage_black, gs4i_stage_red };
-    static const gs4i_stage_fn up[] = { gs4i_stage_prolong, gs4i_stage_black, gs4i_stage_red,
-                                        gs4i_stage_black,   gs4i_stage_red,   gs4i_stage_dot };
-    gs4i_sweep_run(s, 0, down, 5);
-    gs4i_sweep_run(s, 1, down1, 5);
+    static const gs4i_pass_fn down[] = { gs4i_pass_first_red, gs4i_pass_black, gs4i_pass_red,
+                                         gs4i_pass_black, gs4i_pass_restrict };
+    static const gs4i_pass_fn down1[] = { gs4i_pass_first_red, gs4i_pass_black, gs4i_pass_red,
+                                          gs4i_pass_black, gs4i_pass_red_residual };
+    static const gs4i_pass_fn up1[] = { gs4i_pass_prolong_graph, gs4i_pass_black, gs4i_pass_red,
+                                        gs4i_pass_black, gs4i_pass_red };
+    static const gs4i_pass_fn up[] = { gs4i_pass_prolong, gs4i_pass_black, gs4i_pass_red,
+                                       gs4i_pass_black,   gs4i_pass_red,   gs4i_pass_dot };
+    gs4i_wavefront_run(s, 0, down, 5);
+    gs4i_wavefront_run(s, 1, down1, 5);
     memset(s->graph[0].b, 0, (size_t)s->graph[0].n * sizeof(float));
-    gs4i_parallel_for(s->tasks, (s->level[1].n[2] + 1) / 2, gs4i_restrict_groups, s);
+    gs4i_parallel_for(s->tasks, (s->level[1].n[2] + 1) / 2, gs4i_restrict_to_graph, s);
     gs4i_graph_cycles(s);
-    gs4i_sweep_run(s, 1, up1, 5);
-    gs4i_sweep_run(s, 0, up, 6);
-    return gs4i_total(s);
+    gs4i_wavefront_run(s, 1, up1, 5);
+    gs4i_wavefront_run(s, 0, up, 6);
+    return gs4i_sum_planes(s);
 }
 
 /* --- setup: memory ---------------------------------------------------------------------------- */
@@ -2064,7 +2071,7 @@ static void gs4i_carve_two(char *base, size_t *used, size_t count, float **two)
     for (c = 0; c < 2; c++) two[c] = (float *)gs4i_carve(base, used, count, sizeof(float));
 }
 
-static void gs4i_shape_level(gs4i_masked *g, const int n[3])
+static void gs4i_shape_level(gs4i_level *g, const int n[3])
 {
     memset(g, 0, sizeof *g);
     memcpy(g->n, n, sizeof g->n);
@@ -2080,7 +2087,7 @@ static size_t gs4i_lay_out(gs4i_solver *s, char *base)
     size_t used = 0;
     int l, c, a;
     for (l = 0; l < 2; l++) {
-        gs4i_masked *g = &s->level[l];
+        gs4i_level *g = &s->level[l];
         gs4i_carve_two(base, &used, g->count, g->z);
         gs4i_carve_two(base, &used, g->count, g->inverse);
         for (c = 0; c < 2; c++)
@@ -2091,24 +2098,25 @@ static size_t gs4i_lay_out(gs4i_solver *s, char *base)
             for (a = 0; a < 3; a++) gs4i_carve_two(base, &used, g->count, g->w[a]);
         if (l == 0 && !s->uniform && sizeof(gs4_real) == 8)
             for (a = 0; a < 3; a++) gs4i_carve_two(base, &used, g->count, g->w_low[a]);
-        if (l == 1 || !s->uniform || s->massive) gs4i_carve_two(base, &used, g->count, g->mass);
-        if (l == 0 && s->massive) gs4i_carve_two(base, &used, g->count, g->mass_low);
+        if (l == 1 || !s->uniform || s->has_diagonal)
+            gs4i_carve_two(base, &used, g->count, g->diagonal);
+        if (l == 0 && s->has_diagonal) gs4i_carve_two(base, &used, g->count, g->diagonal_low);
     }
     gs4i_carve_two(base, &used, s->level[0].count, s->p);
     for (c = 0; c < 2; c++)
         s->x[c] = (double *)gs4i_carve(base, &used, s->level[0].count, sizeof(double));
-    s->residual = (float *)gs4i_carve(base, &used, s->level[1].count, sizeof(float));
+    s->red_residual = (float *)gs4i_carve(base, &used, s->level[1].count, sizeof(float));
     s->parent[0] = (int32_t *)gs4i_carve(base, &used, s->level[1].count, sizeof(int32_t));
     /* of black cells while setting up alone */
-    s->parent[1] = (int32_t *)(void *)s->residual;
+    s->parent[1] = (int32_t *)(void *)s->red_residual;
     return used;
 }
 
 /* Arrays of both levels; what a setup does not write is zero. */
 static int gs4i_reserve_levels(gs4i_solver *s)
 {
-    gs4i_masked *g = s->level;
-    const int shape[5] = { g->n[0], g->n[1], g->n[2], s->uniform, s->massive },
+    gs4i_level *g = s->level;
+    const int shape[5] = { g->n[0], g->n[1], g->n[2], s->uniform, s->has_diagonal },
               fresh = memcmp(shape, s->shape, sizeof shape) != 0;
     int n[3], a, c;
     for (a = 0; a < 3; a++) n[a] = (g->n[a] + 1) / 2;
@@ -2121,7 +2129,7 @@ static int gs4i_reserve_levels(gs4i_solver *s)
         gs4i_clear(s, g[0].z[c], g[0].count * sizeof(float));
         gs4i_clear(s, s->p[c], g[0].count * sizeof(float));
         gs4i_clear(s, g[1].z[c], g[1].count * sizeof(float));
-        gs4i_clear(s, g[1].mass[c], g[1].count * sizeof(float));
+        gs4i_clear(s, g[1].diagonal[c], g[1].count * sizeof(float));
         for (a = 0; a < 3; a++) gs4i_clear(s, g[1].w[a][c], g[1].count * sizeof(float));
     }
     return GS4_OK;
@@ -2136,7 +2144,7 @@ typedef uint32_t gs4i_bits;
 #endif
 
 typedef struct gs4i_range {
-    double low, high, least /* above 0 */, mass;
+    double low, high, least /* above 0 */, diagonal;
     int64_t unknowns;
     const char *fault;
     double value;
@@ -2144,7 +2152,7 @@ typedef struct gs4i_range {
 typedef struct gs4i_setup {
     gs4i_solver *s;
     const gs4_poisson_desc *d;
-    gs4i_range *seen;
+    gs4i_range *range;
     int32_t *counts;
 } gs4i_setup;
 
@@ -2155,12 +2163,12 @@ GS4I_INLINE const uint8_t *gs4i_kinds_of(const gs4i_solver *s, int j, int k)
     return s->kind + (size_t)(k + 1) * s->kind_plane + (size_t)(j + 1) * s->kind_row + 1;
 }
 
-static void gs4i_take_kinds(int k, void *context)
+static void gs4i_read_kinds(int k, void *context)
 {
     const gs4i_setup *u = (const gs4i_setup *)context;
     static const uint8_t bits[3] = { GS4I_IS_OPEN, GS4I_IS_OPEN | GS4I_IS_LIQUID, 0 };
     const int *n = u->d->cells;
-    gs4i_range *seen = &u->seen[k];
+    gs4i_range *range = &u->range[k];
     int64_t unknowns = 0;
     int i, j;
     for (j = 0; j < n[1]; j++) {
@@ -2168,15 +2176,15 @@ static void gs4i_take_kinds(int k, void *context)
         uint8_t *to = u->s->kind + (gs4i_kinds_of(u->s, j, k) - u->s->kind);
         for (i = 0; i < n[0]; i++) {
             if (from[i] > GS4_CELL_SOLID) {
-                seen->fault = "kind[] holds ";
-                seen->value = from[i];
+                range->fault = "kind[] holds ";
+                range->value = from[i];
                 return;
             }
             to[i] = bits[from[i]];
             unknowns += from[i] == GS4_CELL_LIQUID;
         }
     }
-    seen->unknowns = unknowns;
+    range->unknowns = unknowns;
 }
 
 /* Least, least above 0 and most of the coefficients of faces that conduct, as bits: a sign, or
@@ -2204,42 +2212,42 @@ static void gs4i_range_of_bits(const gs4_real *GS4I_RESTRICT face,
     range[2] = high;
 }
 
-static void gs4i_see_coefficients(gs4i_range *seen, const gs4_real *face, const uint8_t *kind,
-                                  const uint8_t *other, int n)
+static void gs4i_range_of_faces(gs4i_range *range, const gs4_real *face, const uint8_t *kind,
+                                const uint8_t *other, int n)
 {
-    gs4i_bits range[3] = { ~(gs4i_bits)0, ~(gs4i_bits)0, 0 };
+    gs4i_bits bits[3] = { ~(gs4i_bits)0, ~(gs4i_bits)0, 0 };
     gs4_real low, least, high;
     int i;
-    gs4i_range_of_bits(face, kind, other, n, range);
-    memcpy(&high, &range[2], sizeof high);
+    gs4i_range_of_bits(face, kind, other, n, bits);
+    memcpy(&high, &bits[2], sizeof high);
     if (!(high >= 0 && high < GS4I_HUGE)) {
         for (i = 0; GS4I_CONDUCTS(kind[i], other[i]) == 0 || (face[i] >= 0 && face[i] < GS4I_HUGE);
              i++) {
         }
-        seen->fault = "coefficient[] holds ";
-        seen->value = (double)face[i];
+        range->fault = "coefficient[] holds ";
+        range->value = (double)face[i];
         return;
     }
-    if ((double)high > seen->high) seen->high = (double)high;
-    if (~range[0]) {
-        memcpy(&low, &range[0], sizeof low);
-        if ((double)low < seen->low) seen->low = (double)low;
+    if ((double)high > range->high) range->high = (double)high;
+    if (~bits[0]) {
+        memcpy(&low, &bits[0], sizeof low);
+        if ((double)low < range->low) range->low = (double)low;
     }
-    if (~range[1]) {
-        range[1]++;
-        memcpy(&least, &range[1], sizeof least);
-        if ((double)least < seen->least) seen->least = (double)least;
+    if (~bits[1]) {
+        bits[1]++;
+        memcpy(&least, &bits[1], sizeof least);
+        if ((double)least < range->least) range->least = (double)least;
     }
 }
 
 /* Range of all coefficients and diagonals that matter; of faces those towards + */
-static void gs4i_see_plane(int k, void *context)
+static void gs4i_range_of_plane(int k, void *context)
 {
     const gs4i_setup *u = (const gs4i_setup *)context;
     const gs4_poisson_desc *d = u->d;
     const size_t nx = (size_t)d->cells[0], ny = (size_t)d->cells[1];
     const size_t step[3] = { 1, u->s->kind_row, u->s->kind_plane };
-    gs4i_range *seen = &u->seen[k];
+    gs4i_range *range = &u->range[k];
     size_t i, j;
     int a;
     for (j = 0; j < ny; j++) {
@@ -2249,18 +2257,18 @@ static void gs4i_see_plane(int k, void *context)
         const uint8_t *kind = gs4i_kinds_of(u->s, (int)j, k);
         for (a = 0; a < 3; a++) {
             if (!d->coefficient[a]) continue;
-            gs4i_see_coefficients(seen, d->coefficient[a] + face[a], kind, kind + step[a], (int)nx);
-            if (seen->fault) return;
+            gs4i_range_of_faces(range, d->coefficient[a] + face[a], kind, kind + step[a], (int)nx);
+            if (range->fault) return;
         }
         for (i = 0; i < nx && d->diagonal; i++)
             if (kind[i] & GS4I_IS_LIQUID) {
                 const double m = (double)d->diagonal[row * nx + i];
                 if (!(m >= 0 && m < (double)GS4I_HUGE)) {
-                    seen->fault = "diagonal[] holds ";
-                    seen->value = m;
+                    range->fault = "diagonal[] holds ";
+                    range->value = m;
                     return;
                 }
-                if (m > seen->mass) seen->mass = m;
+                if (m > range->diagonal) range->diagonal = m;
             }
     }
 }
@@ -2275,7 +2283,7 @@ static int gs4i_fault(gs4i_solver *s, const char *what, double value, const char
 
 /* Scales, and whether one coefficient serves all faces: it does for most uses, and takes half
  * the memory. */
-static int gs4i_choose_units(gs4i_solver *s, const gs4_poisson_desc *d, const gs4i_range *seen)
+static int gs4i_choose_units(gs4i_solver *s, const gs4_poisson_desc *d, const gs4i_range *range)
 {
     const double h2 = (double)d->cell_size * (double)d->cell_size;
     gs4i_range all;
@@ -2286,43 +2294,43 @@ static int gs4i_choose_units(gs4i_solver *s, const gs4_poisson_desc *d, const gs
         all.low = all.high = all.least = 1;
     s->unknowns = 0;
     for (k = 0; k < d->cells[2]; k++) {
-        if (seen[k].fault)
-            return gs4i_fault(s, seen[k].fault, seen[k].value,
+        if (range[k].fault)
+            return gs4i_fault(s, range[k].fault, range[k].value,
                               "; it must be 0 or a finite number above that is not absurdly large");
-        if (seen[k].low < all.low) all.low = seen[k].low;
-        if (seen[k].high > all.high) all.high = seen[k].high;
-        if (seen[k].least < all.least) all.least = seen[k].least;
-        if (seen[k].mass > all.mass) all.mass = seen[k].mass;
-        s->unknowns += seen[k].unknowns;
+        if (range[k].low < all.low) all.low = range[k].low;
+        if (range[k].high > all.high) all.high = range[k].high;
+        if (range[k].least < all.least) all.least = range[k].least;
+        if (range[k].diagonal > all.diagonal) all.diagonal = range[k].diagonal;
+        s->unknowns += range[k].unknowns;
     }
-    all.mass *= h2;
-    s->massive = all.mass > 0;
-    s->uniform = all.high > 0 && all.low == all.high && all.mass < 1e9 * all.high;
+    all.diagonal *= h2;
+    s->has_diagonal = all.diagonal > 0;
+    s->uniform = all.high > 0 && all.low == all.high && all.diagonal < 1e9 * all.high;
     if (all.high > 0 && all.least < 1e-30 * all.high)
         return gs4i_fault(s, "the smallest coefficient above 0, over the largest, is ",
                           all.least / all.high,
                           "; it must be at least 1e-30, use 0 for what does not conduct");
-    frexp(all.high > all.mass ? all.high : all.mass, &exponent);
+    frexp(all.high > all.diagonal ? all.high : all.diagonal, &exponent);
     s->unit = s->uniform ? 1 / all.high : ldexp(1, -exponent);
-    s->mass_unit = h2 * s->unit;
+    s->diagonal_unit = h2 * s->unit;
     return GS4_OK;
 }
 
 /* Kinds, ranges, units, memory. */
-static int gs4i_take(gs4i_setup *u)
+static int gs4i_read_problem(gs4i_setup *u)
 {
     gs4i_solver *s = u->s;
     const int *n = u->d->cells;
     size_t used = 0, rows;
     char *base = NULL;
-    int k, l, pass;
+    int k, l, laid;
     gs4i_shape_level(&s->level[0], n);
     s->kind_row = (size_t)n[0] + 2;
     s->kind_plane = s->kind_row * (size_t)(n[1] + 2);
     if (gs4i_reserve(s, &s->kinds, s->kind_plane * (size_t)(n[2] + 2), 1) != GS4_OK)
         return GS4_ERROR_MEMORY;
     s->kind = (uint8_t *)s->kinds.data;
-    for (pass = 0; pass < 2; pass++) {
+    for (laid = 0; laid < 2; laid++) {
         used = 0;
         for (l = 0; l < 2; l++) {
             rows = (size_t)(l ? (n[1] + 1) / 2 : n[1]) * (size_t)(l ? (n[2] + 1) / 2 : n[2]);
@@ -2331,18 +2339,19 @@ static int gs4i_take(gs4i_setup *u)
         s->sums = (double *)gs4i_carve(base, &used, (size_t)n[2], sizeof(double));
         s->given = (double *)gs4i_carve(base, &used, 3 * (size_t)n[2], sizeof(double));
         s->zeros = (float *)gs4i_carve(base, &used, s->level[0].stride, sizeof(float));
-        u->seen = (gs4i_range *)gs4i_carve(base, &used, (size_t)n[2], sizeof(gs4i_range));
+        u->range = (gs4i_range *)gs4i_carve(base, &used, (size_t)n[2], sizeof(gs4i_range));
         u->counts = (int32_t *)gs4i_carve(base, &used, (size_t)n[2] + 2, sizeof(int32_t));
-        if (!pass && gs4i_reserve(s, &s->planes, used, 1) != GS4_OK) return GS4_ERROR_MEMORY;
+        if (!laid && gs4i_reserve(s, &s->planes, used, 1) != GS4_OK) return GS4_ERROR_MEMORY;
         base = (char *)s->planes.data;
     }
-    for (k = 0; k < n[2]; k++) u->seen[k].low = u->seen[k].least = DBL_MAX;
-    gs4i_parallel_for(s->tasks, n[2], gs4i_take_kinds, u);
+    for (k = 0; k < n[2]; k++) u->range[k].low = u->range[k].least = DBL_MAX;
+    gs4i_parallel_for(s->tasks, n[2], gs4i_read_kinds, u);
     for (k = 0; k < n[2]; k++)
-        if (u->seen[k].fault)
-            return gs4i_fault(s, u->seen[k].fault, u->seen[k].value, ", which is none of gs4_cell");
-    gs4i_parallel_for(s->tasks, n[2], gs4i_see_plane, u);
-    if (gs4i_choose_units(s, u->d, u->seen) != GS4_OK) return GS4_ERROR_ARGUMENT;
+        if (u->range[k].fault)
+            return gs4i_fault(s, u->range[k].fault, u->range[k].value,
+                              ", which is none of gs4_cell");
+    gs4i_parallel_for(s->tasks, n[2], gs4i_range_of_plane, u);
+    if (gs4i_choose_units(s, u->d, u->range) != GS4_OK) return GS4_ERROR_ARGUMENT;
     if (gs4i_reserve_levels(s) != GS4_OK) return GS4_ERROR_MEMORY;
     for (l = 0; l < 2; l++) s->level[l].span = s->span[l];
     return GS4_OK;
@@ -2352,14 +2361,14 @@ static int gs4i_take(gs4i_setup *u)
 
 /* Faces of cell i of a row: -x +x -y +y -z +z, 0 where they do not conduct; gives the kinds on
  * their other sides. */
-typedef struct gs4i_rows {
+typedef struct gs4i_given_row {
     const uint8_t *kind;
     const gs4_real *face[6], *diagonal;
     ptrdiff_t beside[6];
-    double unit, mass_unit;
-} gs4i_rows;
+    double unit, diagonal_unit;
+} gs4i_given_row;
 
-static void gs4i_open_row(gs4i_rows *q, const gs4i_solver *s, const gs4_poisson_desc *d, int j,
+static void gs4i_find_row(gs4i_given_row *q, const gs4i_solver *s, const gs4_poisson_desc *d, int j,
                           int k)
 {
     const size_t nx = (size_t)d->cells[0], ny = (size_t)d->cells[1],
@@ -2371,7 +2380,7 @@ static void gs4i_open_row(gs4i_rows *q, const gs4i_solver *s, const gs4_poisson_
     q->kind = gs4i_kinds_of(s, j, k);
     q->diagonal = d->diagonal ? d->diagonal + row * nx : NULL;
     q->unit = s->unit;
-    q->mass_unit = s->mass_unit;
+    q->diagonal_unit = s->diagonal_unit;
     for (a = 0; a < 3; a++) {
         const gs4_real *c = d->coefficient[a];
         q->face[2 * a] = c ? c + low[a] : NULL;
@@ -2381,7 +2390,7 @@ static void gs4i_open_row(gs4i_rows *q, const gs4i_solver *s, const gs4_poisson_
     }
 }
 
-GS4I_INLINE double gs4i_face_of(const gs4i_rows *q, int i, int f)
+GS4I_INLINE double gs4i_face_of(const gs4i_given_row *q, int i, int f)
 {
     if (!GS4I_CONDUCTS(q->kind[i], q->kind[i + q->beside[f]])) return 0;
     return q->face[f] ? (double)q->face[f][i] * q->unit : q->unit;
@@ -2392,7 +2401,7 @@ enum {
     GS4I_BOTH = 2 * GS4I_STRIP
 };
 typedef struct gs4i_built {
-    double w[6][GS4I_BOTH], mass[GS4I_BOTH];
+    double w[6][GS4I_BOTH], exact[GS4I_BOTH]; /* faces, diagonal */
     float face[3][GS4I_BOTH], low[3][GS4I_BOTH], inverse[GS4I_BOTH], diagonal[GS4I_BOTH],
         diagonal_low[GS4I_BOTH];
     /* what level 1 gets: of faces towards + between liquid cells, of those to the air */
@@ -2400,7 +2409,7 @@ typedef struct gs4i_built {
 } gs4i_built;
 
 /* Whether any of n cells or their neighbours towards + is liquid. */
-static int gs4i_is_strip_wet(const gs4i_rows *q, int i, int n)
+static int gs4i_is_strip_wet(const gs4i_given_row *q, int i, int n)
 {
     const uint8_t *kind = q->kind + i;
     int l, all = kind[n];
@@ -2408,7 +2417,7 @@ static int gs4i_is_strip_wet(const gs4i_rows *q, int i, int n)
     return all & GS4I_IS_LIQUID;
 }
 
-static void gs4i_build_faces(gs4i_built *b, const gs4i_rows *q, int i, int n, int f)
+static void gs4i_build_faces(gs4i_built *b, const gs4i_given_row *q, int i, int n, int f)
 {
     const uint8_t *GS4I_RESTRICT kind = q->kind + i, *GS4I_RESTRICT other =
                                                          q->kind + i + q->beside[f];
@@ -2427,23 +2436,24 @@ static void gs4i_build_faces(gs4i_built *b, const gs4i_rows *q, int i, int n, in
         link[l] = (float)(0.5 * w[l]) * (float)((kind[l] & other[l]) / GS4I_IS_LIQUID);
 }
 
-static void gs4i_build_cells(gs4i_built *GS4I_RESTRICT b, const gs4i_rows *q, int i, int n)
+static void gs4i_build_cells(gs4i_built *GS4I_RESTRICT b, const gs4i_given_row *q, int i, int n)
 {
     const uint8_t *GS4I_RESTRICT kind = q->kind + i;
     int l, f;
     memset(b->air, 0, sizeof b->air);
     for (f = 0; f < 6; f++) gs4i_build_faces(b, q, i, n, f);
     for (l = 0; l < n; l++)
-        b->mass[l] =
-            q->diagonal && kind[l] & GS4I_IS_LIQUID ? (double)q->diagonal[i + l] * q->mass_unit : 0;
+        b->exact[l] = q->diagonal && kind[l] & GS4I_IS_LIQUID
+                          ? (double)q->diagonal[i + l] * q->diagonal_unit
+                          : 0;
     for (l = 0; l < n; l++) {
         const double sum =
-            b->mass[l]
+            b->exact[l]
             + (((b->w[0][l] + b->w[1][l]) + (b->w[2][l] + b->w[3][l])) + (b->w[4][l] + b->w[5][l]));
         const double unknown = (double)(kind[l] / GS4I_IS_LIQUID) * (sum > 0 ? 1.0 : 0.0);
         b->inverse[l] = (float)(unknown / (sum + (1 - unknown)));
-        b->diagonal[l] = (float)(unknown * b->mass[l] - (1 - unknown));
-        b->diagonal_low[l] = (float)(b->mass[l] - (double)(float)b->mass[l]);
+        b->diagonal[l] = (float)(unknown * b->exact[l] - (1 - unknown));
+        b->diagonal_low[l] = (float)(b->exact[l] - (double)(float)b->exact[l]);
     }
     for (f = 0; f < 3; f++)
         for (l = 0; l < n; l++) {
@@ -2453,8 +2463,8 @@ static void gs4i_build_cells(gs4i_built *GS4I_RESTRICT b, const gs4i_rows *q, in
 }
 
 /* n cells of a row, the first an even one, to two colours. */
-static void gs4i_part(float *GS4I_RESTRICT even, float *GS4I_RESTRICT odd,
-                      const float *GS4I_RESTRICT from, int n)
+static void gs4i_split_colours(float *GS4I_RESTRICT even, float *GS4I_RESTRICT odd,
+                               const float *GS4I_RESTRICT from, int n)
 {
     int m;
     for (m = 0; m < n / 2; m++) {
@@ -2467,13 +2477,13 @@ static void gs4i_part(float *GS4I_RESTRICT even, float *GS4I_RESTRICT odd,
 /* One row of level 0 with coefficients, and what its cells add to level 1. */
 static void gs4i_build_row(gs4i_solver *s, const gs4_poisson_desc *d, int j, int k)
 {
-    const gs4i_masked *g = &s->level[0], *h = &s->level[1];
+    const gs4i_level *g = &s->level[0], *h = &s->level[1];
     const size_t row = gs4i_row_of(g, j, k), coarse = gs4i_row_of(h, j / 2, k / 2);
     const int c = (j + k) & 1;
-    gs4i_rows q;
+    gs4i_given_row q;
     gs4i_built b;
     int i, n, f, l;
-    gs4i_open_row(&q, s, d, j, k);
+    gs4i_find_row(&q, s, d, j, k);
     memset(&b, 0, sizeof b);
     for (i = 0; i < g->n[0]; i += GS4I_BOTH) {
         const size_t at = row + (size_t)(i / 2);
@@ -2485,12 +2495,15 @@ static void gs4i_build_row(gs4i_solver *s, const gs4_poisson_desc *d, int j, int
             memset(&b, 0, sizeof b);
             for (l = 0; l < n; l++) b.diagonal[l] = -1;
         }
-        gs4i_part(g->inverse[c] + at, g->inverse[!c] + at, b.inverse, n);
-        gs4i_part(g->mass[c] + at, g->mass[!c] + at, b.diagonal, n);
-        if (g->mass_low[0]) gs4i_part(g->mass_low[c] + at, g->mass_low[!c] + at, b.diagonal_low, n);
+        gs4i_split_colours(g->inverse[c] + at, g->inverse[!c] + at, b.inverse, n);
+        gs4i_split_colours(g->diagonal[c] + at, g->diagonal[!c] + at, b.diagonal, n);
+        if (g->diagonal_low[0])
+            gs4i_split_colours(g->diagonal_low[c] + at, g->diagonal_low[!c] + at, b.diagonal_low,
+                               n);
         for (f = 0; f < 3; f++) {
-            gs4i_part(g->w[f][c] + at, g->w[f][!c] + at, b.face[f], n);
-            if (g->w_low[f][0]) gs4i_part(g->w_low[f][c] + at, g->w_low[f][!c] + at, b.low[f], n);
+            gs4i_split_colours(g->w[f][c] + at, g->w[f][!c] + at, b.face[f], n);
+            if (g->w_low[f][0])
+                gs4i_split_colours(g->w_low[f][c] + at, g->w_low[f][!c] + at, b.low[f], n);
         }
         for (l = 0; l < n && wet; l++) {
             const int up = ((i + l) / 2 + j / 2 + k / 2) & 1;
@@ -2499,7 +2512,7 @@ static void gs4i_build_row(gs4i_solver *s, const gs4_poisson_desc *d, int j, int
             if (j & 1) h->w[1][up][to] += b.link[1][l];
             if (k & 1) h->w[2][up][to] += b.link[2][l];
             /* z: to the air alone, while setting up */
-            h->mass[up][to] += b.air[l] + (float)b.mass[l];
+            h->diagonal[up][to] += b.air[l] + (float)b.exact[l];
             h->z[up][to] += b.air[l];
         }
     }
@@ -2526,19 +2539,19 @@ GS4I_INLINE int gs4i_is_deep(const uint8_t *v, ptrdiff_t ny, ptrdiff_t nz)
 }
 
 /* What the diagonal of a cell with `degree` faces of coefficient 1 makes of it. */
-GS4I_INLINE void gs4i_build_mass(const gs4i_solver *s, const gs4i_rows *q, int j, int k, int i,
-                                 int degree)
+GS4I_INLINE void gs4i_build_diagonal(const gs4i_solver *s, const gs4i_given_row *q, int j, int k,
+                                     int i, int degree)
 {
-    const gs4i_masked *g = &s->level[0], *h = &s->level[1];
+    const gs4i_level *g = &s->level[0], *h = &s->level[1];
     const size_t at = gs4i_row_of(g, j, k) + (size_t)(i / 2);
     const int c = (i + j + k) & 1;
-    const double mass = (double)q->diagonal[i] * q->mass_unit;
-    if (!(mass > 0)) return;
-    g->mass[c][at] = (float)mass;
-    g->mass_low[c][at] = (float)(mass - (double)(float)mass);
-    g->inverse[c][at] = (float)(1 / (degree + mass));
-    h->mass[(i / 2 + j / 2 + k / 2) & 1][gs4i_row_of(h, j / 2, k / 2) + (size_t)(i / 4)] +=
-        (float)mass;
+    const double diagonal = (double)q->diagonal[i] * q->diagonal_unit;
+    if (!(diagonal > 0)) return;
+    g->diagonal[c][at] = (float)diagonal;
+    g->diagonal_low[c][at] = (float)(diagonal - (double)(float)diagonal);
+    g->inverse[c][at] = (float)(1 / (degree + diagonal));
+    h->diagonal[(i / 2 + j / 2 + k / 2) & 1][gs4i_row_of(h, j / 2, k / 2) + (size_t)(i / 4)] +=
+        (float)diagonal;
 }
 
 /* The same where one coefficient serves all faces, for cells `begin` to `end`, which hold all
@@ -2546,20 +2559,20 @@ GS4I_INLINE void gs4i_build_mass(const gs4i_solver *s, const gs4i_rows *q, int j
 static void gs4i_build_uniform_row(gs4i_solver *s, const gs4_poisson_desc *d, int j, int k,
                                    int begin, int end)
 {
-    const gs4i_masked *g = &s->level[0], *h = &s->level[1];
+    const gs4i_level *g = &s->level[0], *h = &s->level[1];
     const size_t row = gs4i_row_of(g, j, k), coarse = gs4i_row_of(h, j / 2, k / 2);
     const ptrdiff_t ny = (ptrdiff_t)s->kind_row, nz = (ptrdiff_t)s->kind_plane;
     static const float inverse[7] = { 0, 1, 1 / 2.0f, 1 / 3.0f, 1 / 4.0f, 1 / 5.0f, 1 / 6.0f };
-    gs4i_rows q;
+    gs4i_given_row q;
     size_t m;
     int i, c;
-    gs4i_open_row(&q, s, d, j, k);
+    gs4i_find_row(&q, s, d, j, k);
     for (c = 0; c < 2; c++) {
         memset(g->inverse[c] + row, 0, (size_t)g->width * sizeof(float));
         memset(g->degree[c] + row, 0, (size_t)g->width * sizeof(float));
-        if (!g->mass[c]) continue;
-        memset(g->mass[c] + row, 0, (size_t)g->width * sizeof(float));
-        memset(g->mass_low[c] + row, 0, (size_t)g->width * sizeof(float));
+        if (!g->diagonal[c]) continue;
+        memset(g->diagonal[c] + row, 0, (size_t)g->width * sizeof(float));
+        memset(g->diagonal_low[c] + row, 0, (size_t)g->width * sizeof(float));
     }
     for (i = begin; i < end; i++) {
         const uint8_t *v = q.kind + i;
@@ -2572,7 +2585,7 @@ static void gs4i_build_uniform_row(gs4i_solver *s, const gs4_poisson_desc *d, in
                     g->degree[c][at + m] = 6;
                     g->inverse[c][at + m] = inverse[6];
                 }
-            for (m = 0; m < 8 && q.diagonal; m++) gs4i_build_mass(s, &q, j, k, i + (int)m, 6);
+            for (m = 0; m < 8 && q.diagonal; m++) gs4i_build_diagonal(s, &q, j, k, i + (int)m, 6);
             for (m = 0; m < 4; m++) {
                 const int up_m = (up + (int)m) & 1;
                 h->w[0][up_m][to + m / 2] += 0.5f;
@@ -2589,12 +2602,12 @@ static void gs4i_build_uniform_row(gs4i_solver *s, const gs4_poisson_desc *d, in
               + (v[nz] >> 1);
         g->degree[c][at] = (float)open;
         g->inverse[c][at] = inverse[open];
-        if (q.diagonal) gs4i_build_mass(s, &q, j, k, i, open);
+        if (q.diagonal) gs4i_build_diagonal(s, &q, j, k, i, open);
         if (i & 1) h->w[0][up][to] += 0.5f * (float)(v[1] >> 1);
         if (j & 1) h->w[1][up][to] += 0.5f * (float)(v[ny] >> 1);
         if (k & 1) h->w[2][up][to] += 0.5f * (float)(v[nz] >> 1);
         if (open != wet) {
-            h->mass[up][to] += 0.75f * (float)(open - wet);
+            h->diagonal[up][to] += 0.75f * (float)(open - wet);
             h->z[up][to] += 0.75f * (float)(open - wet);
         }
     }
@@ -2612,21 +2625,21 @@ static void gs4i_build_span(const gs4i_solver *s, int j, int k, int32_t span[2])
 }
 
 /* A plane of level 1 and the two below it. */
-static void gs4i_build_planes(int K, void *context)
+static void gs4i_build_planes(int bk, void *context)
 {
     const gs4i_setup *u = (const gs4i_setup *)context;
     gs4i_solver *s = u->s;
-    const gs4i_masked *g = &s->level[0], *h = &s->level[1];
+    const gs4i_level *g = &s->level[0], *h = &s->level[1];
     int32_t first, last;
     int j, k;
     for (j = 0; j < h->n[1]; j++) {
-        h->span[2 * (K * h->n[1] + j)] = INT32_MAX;
-        h->span[2 * (K * h->n[1] + j) + 1] = 0;
+        h->span[2 * (bk * h->n[1] + j)] = INT32_MAX;
+        h->span[2 * (bk * h->n[1] + j) + 1] = 0;
     }
-    for (k = 2 * K; k < 2 * K + 2 && k < g->n[2]; k++)
+    for (k = 2 * bk; k < 2 * bk + 2 && k < g->n[2]; k++)
         for (j = 0; j < g->n[1]; j++) {
             int32_t *span = g->span + 2 * ((size_t)k * (size_t)g->n[1] + (size_t)j);
-            int32_t *wide = h->span + 2 * ((size_t)K * (size_t)h->n[1] + (size_t)(j / 2));
+            int32_t *wide = h->span + 2 * ((size_t)bk * (size_t)h->n[1] + (size_t)(j / 2));
             gs4i_build_span(s, j, k, span);
             if (s->uniform)
                 gs4i_build_uniform_row(s, u->d, j, k, 2 * span[0],
@@ -2640,11 +2653,11 @@ static void gs4i_build_planes(int K, void *context)
             if (last > wide[1]) wide[1] = last;
         }
     for (j = 0; j < h->n[1]; j++)
-        if (!h->span[2 * (K * h->n[1] + j) + 1]) h->span[2 * (K * h->n[1] + j)] = 0;
+        if (!h->span[2 * (bk * h->n[1] + j) + 1]) h->span[2 * (bk * h->n[1] + j)] = 0;
 }
 
 /* Sum of the faces of a cell of level 1. */
-static float gs4i_faces(const gs4i_masked *g, int c, size_t at, int t)
+static float gs4i_faces(const gs4i_level *g, int c, size_t at, int t)
 {
     return ((g->w[0][!c][at + (size_t)t - 1] + g->w[0][c][at])
             + (g->w[1][!c][at - g->stride] + g->w[1][c][at]))
@@ -2653,7 +2666,7 @@ static float gs4i_faces(const gs4i_masked *g, int c, size_t at, int t)
 
 static void gs4i_build_inverse(int k, void *context)
 {
-    const gs4i_masked *g = &((const gs4i_setup *)context)->s->level[1];
+    const gs4i_level *g = &((const gs4i_setup *)context)->s->level[1];
     int j, c, m;
     for (j = 0; j < g->n[1]; j++)
         for (c = 0; c < 2; c++) {
@@ -2661,16 +2674,16 @@ static void gs4i_build_inverse(int k, void *context)
             const int t = (c + j + k) & 1;
             for (m = 0; m < g->width; m++) {
                 const float sum =
-                    g->mass[c][row + (size_t)m] + gs4i_faces(g, c, row + (size_t)m, t);
+                    g->diagonal[c][row + (size_t)m] + gs4i_faces(g, c, row + (size_t)m, t);
                 g->inverse[c][row + (size_t)m] = sum > 0 ? 1 / sum : 0;
             }
         }
 }
 
-/* Slabs of equal work for the tasks of a sweep: thick enough for its stages, at even planes. */
-static void gs4i_cut(gs4i_solver *s, int level, int slabs)
+/* Slabs of equal work for the tasks of a wavefront: thick enough for its passes, at even planes. */
+static void gs4i_cut_slabs(gs4i_solver *s, int level, int slabs)
 {
-    const gs4i_masked *g = &s->level[level];
+    const gs4i_level *g = &s->level[level];
     const size_t rows = (size_t)g->n[1];
     double all = 0, done = 0;
     size_t j;
@@ -2693,16 +2706,16 @@ static void gs4i_cut(gs4i_solver *s, int level, int slabs)
 
 /* Colours and places of the eight cells of level 1 in a block; number x + 2 y + 4 z. */
 GS4I_INLINE int gs4i_child_colour(int q) { return (q ^ (q >> 1) ^ (q >> 2)) & 1; }
-GS4I_INLINE size_t gs4i_child(const gs4i_masked *g, size_t block, int q)
+GS4I_INLINE size_t gs4i_child(const gs4i_level *g, size_t block, int q)
 {
     return block + (size_t)(q >> 1 & 1) * g->stride + (size_t)(q >> 2) * g->plane;
 }
-GS4I_INLINE size_t gs4i_block_of(const gs4i_masked *g, int I, int J, int K)
+GS4I_INLINE size_t gs4i_block_of(const gs4i_level *g, int bi, int bj, int bk)
 {
-    return gs4i_row_of(g, 2 * J, 2 * K) + (size_t)I;
+    return gs4i_row_of(g, 2 * bj, 2 * bk) + (size_t)bi;
 }
 
-static float gs4i_strongest(const gs4i_masked *g, int c, size_t at, int t)
+static float gs4i_largest_weight(const gs4i_level *g, int c, size_t at, int t)
 {
     const float w[6] = { g->w[0][!c][at + (size_t)t - 1], g->w[0][c][at],
                          g->w[1][!c][at - g->stride],     g->w[1][c][at],
@@ -2722,12 +2735,12 @@ GS4I_INLINE int gs4i_is_strong(float w, float most, float other, float strong)
 }
 
 /* Groups of a block: of each cell the first cell of its group, -1 without edges. */
-static void gs4i_group_block(const gs4i_masked *g, size_t block, int group[8])
+static void gs4i_group_block(const gs4i_level *g, size_t block, int group[8])
 {
     int q, a, i;
     float most[8];
     for (q = 0; q < 8; q++) {
-        most[q] = gs4i_strongest(g, gs4i_child_colour(q), gs4i_child(g, block, q), q & 1);
+        most[q] = gs4i_largest_weight(g, gs4i_child_colour(q), gs4i_child(g, block, q), q & 1);
         group[q] = most[q] > 0 ? q : -1;
     }
     for (q = 0; q < 8; q++)
@@ -2748,12 +2761,12 @@ static void gs4i_group_block(const gs4i_masked *g, size_t block, int group[8])
 /* Blocks in the bulk, where all links of all eight cells are equal: that link, 0 for other
  * blocks. Most blocks are in the bulk, and what follows is quick there. In x, which is larger: a
  * float for 64 cells. */
-GS4I_INLINE float *gs4i_bulk(const gs4i_solver *s, int I, int J, int K)
+GS4I_INLINE float *gs4i_bulk(const gs4i_solver *s, int bi, int bj, int bk)
 {
     const int *n = s->level[1].n;
     return (float *)(void *)s->x[0]
-           + ((size_t)K * (size_t)((n[1] + 1) / 2) + (size_t)J) * (size_t)((n[0] + 1) / 2)
-           + (size_t)I;
+           + ((size_t)bk * (size_t)((n[1] + 1) / 2) + (size_t)bj) * (size_t)((n[0] + 1) / 2)
+           + (size_t)bi;
 }
 
 static void gs4i_see_link(float *GS4I_RESTRICT least, float *GS4I_RESTRICT most,
@@ -2766,13 +2779,13 @@ static void gs4i_see_link(float *GS4I_RESTRICT least, float *GS4I_RESTRICT most,
     }
 }
 
-static void gs4i_find_bulk(const gs4i_solver *s, int J, int K)
+static void gs4i_find_bulk(const gs4i_solver *s, int bj, int bk)
 {
-    const gs4i_masked *g = &s->level[1];
+    const gs4i_level *g = &s->level[1];
     float least[GS4I_STRIP], most[GS4I_STRIP];
-    int I, l, q, a;
-    for (I = 0; I < (g->n[0] + 1) / 2; I += GS4I_STRIP) {
-        const size_t block = gs4i_block_of(g, I, J, K);
+    int bi, l, q, a;
+    for (bi = 0; bi < (g->n[0] + 1) / 2; bi += GS4I_STRIP) {
+        const size_t block = gs4i_block_of(g, bi, bj, bk);
         memcpy(least, g->w[0][0] + block, sizeof least);
         memcpy(most, least, sizeof most);
         for (q = 0; q < 8; q++)
@@ -2787,36 +2800,36 @@ static void gs4i_find_bulk(const gs4i_solver *s, int J, int K)
                                          : a == 1 ? g->stride
                                                   : g->plane));
             }
-        for (l = 0; l < GS4I_STRIP && I + l < (g->n[0] + 1) / 2; l++)
-            *gs4i_bulk(s, I + l, J, K) = least[l] == most[l] ? most[l] : 0;
+        for (l = 0; l < GS4I_STRIP && bi + l < (g->n[0] + 1) / 2; l++)
+            *gs4i_bulk(s, bi + l, bj, bk) = least[l] == most[l] ? most[l] : 0;
     }
 }
 
-static void gs4i_number_groups(int K, void *context)
+static void gs4i_number_groups(int bk, void *context)
 {
     const gs4i_setup *u = (const gs4i_setup *)context;
     gs4i_solver *s = u->s;
-    const gs4i_masked *g = &s->level[1];
-    int32_t *count = u->counts + 2 * K, number[8];
-    int group[8], I, J, q;
+    const gs4i_level *g = &s->level[1];
+    int32_t *count = u->counts + 2 * bk, number[8];
+    int group[8], bi, bj, q;
     count[0] = count[1] = 0;
     /* no parent behind the end of a row either */
-    for (J = 2 * K * g->n[1]; J < 2 * (K + 1) * g->n[1] && J < g->n[1] * g->n[2]; J++)
-        memset(s->parent[0] + gs4i_row_of(g, J % g->n[1], J / g->n[1]), 0xff,
+    for (bj = 2 * bk * g->n[1]; bj < 2 * (bk + 1) * g->n[1] && bj < g->n[1] * g->n[2]; bj++)
+        memset(s->parent[0] + gs4i_row_of(g, bj % g->n[1], bj / g->n[1]), 0xff,
                g->stride * sizeof(int32_t));
-    for (J = 0; J < (g->n[1] + 1) / 2; J++)
-        for (gs4i_find_bulk(s, J, K), I = 0; I < (g->n[0] + 1) / 2; I++) {
-            const size_t block = gs4i_block_of(g, I, J, K);
-            if (*gs4i_bulk(s, I, J, K) > 0) {
-                const int32_t one = count[(I + J + K) & 1]++;
+    for (bj = 0; bj < (g->n[1] + 1) / 2; bj++)
+        for (gs4i_find_bulk(s, bj, bk), bi = 0; bi < (g->n[0] + 1) / 2; bi++) {
+            const size_t block = gs4i_block_of(g, bi, bj, bk);
+            if (*gs4i_bulk(s, bi, bj, bk) > 0) {
+                const int32_t one = count[(bi + bj + bk) & 1]++;
                 for (q = 0; q < 8; q++)
                     s->parent[gs4i_child_colour(q)][gs4i_child(g, block, q)] = one;
                 continue;
             }
             gs4i_group_block(g, block, group);
             for (q = 0; q < 8; q++) {
-                if (group[q] == q) number[q] = count[(I + J + K) & 1]++;
-                if (2 * J + (q >> 1 & 1) < g->n[1] && 2 * K + (q >> 2) < g->n[2])
+                if (group[q] == q) number[q] = count[(bi + bj + bk) & 1]++;
+                if (2 * bj + (q >> 1 & 1) < g->n[1] && 2 * bk + (q >> 2) < g->n[2])
                     s->parent[gs4i_child_colour(q)][gs4i_child(g, block, q)] =
                         group[q] < 0 ? -1 : number[group[q]];
             }
@@ -2859,29 +2872,29 @@ GS4I_INLINE float gs4i_air(float air, float link)
 }
 
 /* Numbers of planes to numbers of the graph; what nodes have of their cells. */
-static void gs4i_fill_groups(int K, void *context)
+static void gs4i_fill_groups(int bk, void *context)
 {
     const gs4i_setup *u = (const gs4i_setup *)context;
     gs4i_solver *s = u->s;
-    const gs4i_masked *g = &s->level[1];
+    const gs4i_level *g = &s->level[1];
     gs4i_graph *up = &s->graph[0];
-    int I, J, q;
-    for (J = 0; J < (g->n[1] + 1) / 2; J++)
-        for (I = 0; I < (g->n[0] + 1) / 2; I++)
+    int bi, bj, q;
+    for (bj = 0; bj < (g->n[1] + 1) / 2; bj++)
+        for (bi = 0; bi < (g->n[0] + 1) / 2; bi++)
             for (q = 0; q < 8; q++) {
-                const size_t block = gs4i_block_of(g, I, J, K);
+                const size_t block = gs4i_block_of(g, bi, bj, bk);
                 const int c = gs4i_child_colour(q);
                 const size_t at = gs4i_child(g, block, q);
                 int32_t *parent = &s->parent[c][at];
-                float mass;
-                if (2 * J + (q >> 1 & 1) >= g->n[1] || 2 * K + (q >> 2) >= g->n[2] || *parent < 0)
+                float diagonal;
+                if (2 * bj + (q >> 1 & 1) >= g->n[1] || 2 * bk + (q >> 2) >= g->n[2] || *parent < 0)
                     continue;
-                *parent += u->counts[2 * K + ((I + J + K) & 1)];
-                mass = g->mass[c][at] - g->z[c][at];
+                *parent += u->counts[2 * bk + ((bi + bj + bk) & 1)];
+                diagonal = g->diagonal[c][at] - g->z[c][at];
                 if (g->z[c][at] > 0)
-                    up->air[*parent] += gs4i_air(g->z[c][at], gs4i_strongest(g, c, at, q & 1));
-                up->mass[*parent] += mass > 0 ? mass : 0;
-                up->block[*parent] = (uint64_t)I | (uint64_t)J << 21 | (uint64_t)K << 42;
+                    up->air[*parent] += gs4i_air(g->z[c][at], gs4i_largest_weight(g, c, at, q & 1));
+                up->diagonal[*parent] += diagonal > 0 ? diagonal : 0;
+                up->block[*parent] = (uint64_t)bi | (uint64_t)bj << 21 | (uint64_t)bk << 42;
             }
 }
 
@@ -2891,24 +2904,24 @@ typedef struct gs4i_edge {
 } gs4i_edge;
 
 /* Link of cell `bits` of a block to the other one along axis a in it. */
-GS4I_INLINE float gs4i_link(const gs4i_masked *g, int c, size_t at, int bits, int a)
+GS4I_INLINE float gs4i_link(const gs4i_level *g, int c, size_t at, int bits, int a)
 {
     return !(bits >> a & 1) ? g->w[a][c][at]
                             : g->w[a][!c][a == 0 ? at : at - (a == 1 ? g->stride : g->plane)];
 }
 
 /* Edges of a block in the bulk among others there; 0 if it is not. */
-GS4I_INLINE int gs4i_bulk_edges(const gs4i_solver *s, int I, int J, int K, gs4i_edge *edge)
+GS4I_INLINE int gs4i_bulk_edges(const gs4i_solver *s, int bi, int bj, int bk, gs4i_edge *edge)
 {
     static const int beside[6][3] = { { -1, 0, 0 }, { 1, 0, 0 },  { 0, -1, 0 },
                                       { 0, 1, 0 },  { 0, 0, -1 }, { 0, 0, 1 } };
-    const gs4i_masked *g = &s->level[1];
-    const float w = *gs4i_bulk(s, I, J, K);
+    const gs4i_level *g = &s->level[1];
+    const float w = *gs4i_bulk(s, bi, bj, bk);
     int f;
     for (f = 0; f < 6 && w > 0; f++) { /* around the bulk there are blocks */
-        const int i = I + beside[f][0], j = J + beside[f][1], k = K + beside[f][2];
+        const int i = bi + beside[f][0], j = bj + beside[f][1], k = bk + beside[f][2];
         if (!(*gs4i_bulk(s, i, j, k) > 0)) return 0;
-        edge[f].from = s->parent[0][gs4i_block_of(g, I, J, K)];
+        edge[f].from = s->parent[0][gs4i_block_of(g, bi, bj, bk)];
         edge[f].to = s->parent[0][gs4i_block_of(g, i, j, k)];
         edge[f].w = 4 * (0.5f * w);
     }
@@ -2916,17 +2929,18 @@ GS4I_INLINE int gs4i_bulk_edges(const gs4i_solver *s, int I, int J, int K, gs4i_
 }
 
 /* Edges from the groups of a block to groups around, each once; their w where `weigh`. */
-GS4I_INLINE int gs4i_block_edges(const gs4i_solver *s, int I, int J, int K, gs4i_edge *edge,
+GS4I_INLINE int gs4i_block_edges(const gs4i_solver *s, int bi, int bj, int bk, gs4i_edge *edge,
                                  int weigh)
 {
-    const gs4i_masked *g = &s->level[1];
-    const size_t block = gs4i_block_of(g, I, J, K);
-    int q, f, e, count = gs4i_bulk_edges(s, I, J, K, edge);
+    const gs4i_level *g = &s->level[1];
+    const size_t block = gs4i_block_of(g, bi, bj, bk);
+    int q, f, e, count = gs4i_bulk_edges(s, bi, bj, bk, edge);
     if (count) return count;
     for (q = 0; q < 8; q++) {
         const int c = gs4i_child_colour(q);
         const size_t at = gs4i_child(g, block, q);
-        if (2 * J + (q >> 1 & 1) >= g->n[1] || 2 * K + (q >> 2) >= g->n[2] || s->parent[c][at] < 0)
+        if (2 * bj + (q >> 1 & 1) >= g->n[1] || 2 * bk + (q >> 2) >= g->n[2]
+            || s->parent[c][at] < 0)
             continue;
         for (f = 0; f < 6; f++) {
             const int a = f >> 1, high = f & 1, x = q & 1;
@@ -2959,28 +2973,28 @@ GS4I_INLINE int gs4i_block_edges(const gs4i_solver *s, int I, int J, int K, gs4i
     return count;
 }
 
-static void gs4i_count_edges(int K, void *context)
+static void gs4i_count_edges(int bk, void *context)
 {
     const gs4i_setup *u = (const gs4i_setup *)context;
-    const gs4i_masked *g = &u->s->level[1];
+    const gs4i_level *g = &u->s->level[1];
     gs4i_edge edge[48];
-    int I, J, e;
-    for (J = 0; J < (g->n[1] + 1) / 2; J++)
-        for (I = 0; I < (g->n[0] + 1) / 2; I++)
-            for (e = gs4i_block_edges(u->s, I, J, K, edge, 0) - 1; e >= 0; e--)
+    int bi, bj, e;
+    for (bj = 0; bj < (g->n[1] + 1) / 2; bj++)
+        for (bi = 0; bi < (g->n[0] + 1) / 2; bi++)
+            for (e = gs4i_block_edges(u->s, bi, bj, bk, edge, 0) - 1; e >= 0; e--)
                 u->s->graph[0].start[edge[e].from + 1]++;
 }
 
-static void gs4i_fill_edges(int K, void *context)
+static void gs4i_fill_edges(int bk, void *context)
 {
     const gs4i_setup *u = (const gs4i_setup *)context;
-    const gs4i_masked *g = &u->s->level[1];
+    const gs4i_level *g = &u->s->level[1];
     gs4i_graph *up = &u->s->graph[0];
     gs4i_edge edge[48];
-    int I, J, e, f, count;
-    for (J = 0; J < (g->n[1] + 1) / 2; J++)
-        for (I = 0; I < (g->n[0] + 1) / 2; I++) {
-            count = gs4i_block_edges(u->s, I, J, K, edge, 1);
+    int bi, bj, e, f, count;
+    for (bj = 0; bj < (g->n[1] + 1) / 2; bj++)
+        for (bi = 0; bi < (g->n[0] + 1) / 2; bi++) {
+            count = gs4i_block_edges(u->s, bi, bj, bk, edge, 1);
             for (e = 0; e < count; e++) {
                 int32_t place = up->start[edge[e].from];
                 for (f = 0; f < e; f++) place += edge[f].from == edge[e].from;
@@ -2994,12 +3008,12 @@ static int gs4i_reserve_nodes(gs4i_solver *s, gs4i_graph *g, int n, int reds)
 {
     char *base = NULL;
     size_t used;
-    int pass;
+    int laid;
     g->n = n;
     g->reds = reds;
     g->mixed = 0;
-    for (pass = 0; pass < 2; pass++) {
-        float **const numbers[6] = { &g->inverse, &g->diagonal, &g->air, &g->mass, &g->b, &g->x };
+    for (laid = 0; laid < 2; laid++) {
+        float **const numbers[6] = { &g->inverse, &g->center, &g->air, &g->diagonal, &g->b, &g->x };
         int i;
         used = 0;
         for (i = 0; i < 6; i++)
@@ -3007,7 +3021,7 @@ static int gs4i_reserve_nodes(gs4i_solver *s, gs4i_graph *g, int n, int reds)
         g->start = (int32_t *)gs4i_carve(base, &used, (size_t)n + 1, sizeof(int32_t));
         g->parent = (int32_t *)gs4i_carve(base, &used, (size_t)n, sizeof(int32_t));
         g->block = (uint64_t *)gs4i_carve(base, &used, (size_t)n, sizeof(uint64_t));
-        if (!pass && gs4i_reserve(s, &g->nodes, used, 1) != GS4_OK) return GS4_ERROR_MEMORY;
+        if (!laid && gs4i_reserve(s, &g->nodes, used, 1) != GS4_OK) return GS4_ERROR_MEMORY;
         base = (char *)g->nodes.data;
     }
     return GS4_OK;
@@ -3031,12 +3045,12 @@ static void gs4i_finish_graph(gs4i_graph *g)
 {
     int i, e;
     for (i = 0; i < g->n; i++) {
-        float sum = g->air[i] + g->mass[i];
+        float sum = g->air[i] + g->diagonal[i];
         for (e = g->start[i]; e < g->start[i + 1]; e++) {
             sum += g->w[e];
             g->mixed |= (i < g->reds) == (g->to[e] < g->reds);
         }
-        g->diagonal[i] = sum;
+        g->center[i] = sum;
         g->inverse[i] = sum > 0 ? 1 / sum : 0;
     }
 }
@@ -3076,7 +3090,7 @@ static void gs4i_join_nodes(gs4i_graph *g, float strong, int most, int32_t *numb
                             int *blacks)
 {
     int32_t *root = g->parent;
-    int i, e, pass;
+    int i, e, round;
     *reds = *blacks = 0;
     /* x: the strongest edge, while setting up */
     for (i = 0; i < g->n; i++) {
@@ -3088,12 +3102,12 @@ static void gs4i_join_nodes(gs4i_graph *g, float strong, int most, int32_t *numb
         root[i] = g->start[i] < g->start[i + 1] ? i : -1;
         number[i] = 1;
     }
-    for (pass = 2; pass > 0; pass--)
+    for (round = 2; round > 0; round--)
         for (i = 0; i < g->n; i++)
             for (e = g->start[i]; e < g->start[i + 1]; e++) {
                 int32_t a = i, b = g->to[e];
                 if ((g->block[a] ^ g->block[b]) & ~GS4I_LOWEST_BITS
-                    || !gs4i_is_strong(g->w[e], g->x[a], g->x[b], (float)pass * strong))
+                    || !gs4i_is_strong(g->w[e], g->x[a], g->x[b], (float)round * strong))
                     continue;
                 while (root[a] != a) a = root[a] = root[root[a]];
                 while (root[b] != b) b = root[b] = root[root[b]];
@@ -3152,7 +3166,7 @@ static int gs4i_coarsen_graph(gs4i_solver *s)
     /* blocks in the bulk, four of a chain */
     const int bulk = (int)(3 * (int64_t)g->start[g->n] / g->n) - 4;
     float strong = all ? 0 : GS4I_STRONG;
-    int most = all ? g->n : bulk > 4 ? bulk : 4, reds, blacks, i, j, e, pass;
+    int most = all ? g->n : bulk > 4 ? bulk : 4, reds, blacks, i, j, e, filling;
     first = (int32_t *)(void *)s->x[0];
     child = first + g->n + 2;
     place = child + g->n;
@@ -3169,14 +3183,14 @@ static int gs4i_coarsen_graph(gs4i_solver *s)
     for (i = 0; i < g->n; i++)
         if (g->parent[i] >= 0) {
             up->air[g->parent[i]] += gs4i_air(g->air[i], g->x[i]);
-            up->mass[g->parent[i]] += g->mass[i];
+            up->diagonal[g->parent[i]] += g->diagonal[i];
             up->block[g->parent[i]] = (g->block[i] & ~GS4I_LOWEST_BITS) >> 1;
             first[g->parent[i] + 2]++;
         }
     for (i = 0; i < up->n; i++) first[i + 2] += first[i + 1];
     for (i = 0; i < g->n; i++)
         if (g->parent[i] >= 0) child[first[g->parent[i] + 1]++] = i;
-    for (pass = 0; pass < 2; pass++) { /* count edges, then fill them in */
+    for (filling = 0; filling < 2; filling++) { /* count edges, then fill them in */
         int32_t next = 0;
         for (i = 0; i < up->n; i++) place[i] = -1;
         for (i = 0; i < up->n; i++) {
@@ -3191,20 +3205,20 @@ static int gs4i_coarsen_graph(gs4i_solver *s)
                     if (to == i) continue;
                     if (place[to] < begin) {
                         place[to] = next++;
-                        if (pass) {
+                        if (filling) {
                             up->to[place[to]] = to;
                             up->w[place[to]] = 0;
                         }
                     }
-                    if (pass)
+                    if (filling)
                         up->w[place[to]] += inside
                                                 ? gs4i_chain(g->w[e], one, first[i + 1] - first[i],
                                                              other, first[to + 1] - first[to])
                                                 : gs4i_series(g->w[e], one, other);
                 }
-            if (!pass) up->start[i + 1] = next - begin;
+            if (!filling) up->start[i + 1] = next - begin;
         }
-        if (!pass && gs4i_reserve_edges(s, up) != GS4_OK) return GS4_ERROR_MEMORY;
+        if (!filling && gs4i_reserve_edges(s, up) != GS4_OK) return GS4_ERROR_MEMORY;
     }
     gs4i_finish_graph(up);
     s->graphs++;
@@ -3213,28 +3227,28 @@ static int gs4i_coarsen_graph(gs4i_solver *s)
 
 /* Cholesky of the last graph; a pivot below 1e-6 of its diagonal belongs to a pocket without
  * anything to hold it, and is skipped. */
-static int gs4i_factor(gs4i_solver *s)
+static int gs4i_factorize(gs4i_solver *s)
 {
     const gs4i_graph *g = &s->graph[s->graphs - 1];
     const size_t n = (size_t)g->n;
-    double *L;
+    double *factor;
     size_t i, j, k;
     int e;
     if (gs4i_reserve(s, &s->square, n * n * sizeof(double), 1) != GS4_OK) return GS4_ERROR_MEMORY;
-    s->matrix = L = (double *)s->square.data;
+    s->factor = factor = (double *)s->square.data;
     for (i = 0; i < n; i++) {
-        L[i * n + i] = (double)g->diagonal[i];
+        factor[i * n + i] = (double)g->center[i];
         for (e = g->start[i]; e < g->start[i + 1]; e++)
-            if ((size_t)g->to[e] < i) L[i * n + (size_t)g->to[e]] = -(double)g->w[e];
+            if ((size_t)g->to[e] < i) factor[i * n + (size_t)g->to[e]] = -(double)g->w[e];
     }
     for (i = 0; i < n; i++) {
         for (j = 0; j <= i; j++) {
-            double sum = L[i * n + j];
-            for (k = 0; k < j; k++) sum -= L[i * n + k] * L[j * n + k];
+            double sum = factor[i * n + j];
+            for (k = 0; k < j; k++) sum -= factor[i * n + k] * factor[j * n + k];
             if (j < i)
-                L[i * n + j] = L[j * n + j] > 0 ? sum / L[j * n + j] : 0;
+                factor[i * n + j] = factor[j * n + j] > 0 ? sum / factor[j * n + j] : 0;
             else
-                L[i * n + i] = sum > 1e-6 * (double)g->diagonal[i] ? sqrt(sum) : 0;
+                factor[i * n + i] = sum > 1e-6 * (double)g->center[i] ? sqrt(sum) : 0;
         }
     }
     return GS4_OK;
@@ -3243,36 +3257,36 @@ static int gs4i_factor(gs4i_solver *s)
 /* --- setup: closed pockets -------------------------------------------------------------------- */
 
 /* Whether air or a diagonal holds one of the cells begin to end of a row. */
-static int gs4i_is_held(const gs4i_rows *q, int uniform, int begin, int end)
+static int gs4i_is_regular(const gs4i_given_row *q, int uniform, int begin, int end)
 {
-    int i, f, held = 0;
-    for (i = begin; i < end && !held; i++) {
+    int i, f, regular = 0;
+    for (i = begin; i < end && !regular; i++) {
         if (uniform && !q->diagonal && i + 8 <= end
             && gs4i_is_deep(q->kind + i, q->beside[3], q->beside[5])) {
             i += 7;
             continue;
         }
         for (f = 0; f < 6; f++)
-            held |=
+            regular |=
                 q->kind[i + q->beside[f]] == GS4I_IS_OPEN && (uniform || gs4i_face_of(q, i, f) > 0);
-        if (q->diagonal) held |= q->diagonal[i] > 0;
+        if (q->diagonal) regular |= q->diagonal[i] > 0;
     }
-    return held;
+    return regular;
 }
 
 /* Runs of liquid cells of a plane that faces join, from u->counts[k] on: `pocket` is the place
- * in the list, `sum` above 0 where the run is held. Without a list they are counted. */
+ * in the list, `sum` above 0 where the run is regular. Without a list they are counted. */
 static void gs4i_list_runs(int k, void *context)
 {
     const gs4i_setup *u = (const gs4i_setup *)context;
     const gs4i_solver *s = u->s;
-    gs4i_cells *run = s->runs;
-    gs4i_rows q;
+    gs4i_run *run = s->runs;
+    gs4i_given_row q;
     int32_t count = run ? u->counts[k] : 0;
     const int n = s->level[0].n[0];
     int i, j, end;
     for (j = 0; j < s->level[0].n[1]; j++) {
-        gs4i_open_row(&q, s, u->d, j, k);
+        gs4i_find_row(&q, s, u->d, j, k);
         for (i = 0; i < n; i = end) {
             end = i + 1;
             if (!(q.kind[i] & GS4I_IS_LIQUID)) continue;
@@ -3283,7 +3297,7 @@ static void gs4i_list_runs(int k, void *context)
                 run[count].begin = i;
                 run[count].end = end;
                 run[count].pocket = count;
-                run[count].sum = gs4i_is_held(&q, s->uniform, i, end);
+                run[count].sum = gs4i_is_regular(&q, s->uniform, i, end);
             }
             count++;
         }
@@ -3291,7 +3305,7 @@ static void gs4i_list_runs(int k, void *context)
     if (!run) u->counts[k] = count;
 }
 
-static int32_t gs4i_root(gs4i_cells *run, int32_t a)
+static int32_t gs4i_root(gs4i_run *run, int32_t a)
 {
     while (run[a].pocket != a) a = run[a].pocket = run[run[a].pocket].pocket;
     return a;
@@ -3299,15 +3313,15 @@ static int32_t gs4i_root(gs4i_cells *run, int32_t a)
 
 /* Joins run a with those of the row before it along axis f / 2; `b` is the first that may touch
  * it, and moves on. */
-static void gs4i_join_runs(gs4i_setup *u, gs4i_cells *run, int32_t a, int32_t *b, int row, int f)
+static void gs4i_join_runs(gs4i_setup *u, gs4i_run *run, int32_t a, int32_t *b, int row, int f)
 {
     const int ny = u->s->level[0].n[1];
-    gs4i_rows q;
+    gs4i_given_row q;
     int32_t o;
     int i;
     while (*b < a && (run[*b].row < row || (run[*b].row == row && run[*b].end <= run[a].begin)))
         (*b)++;
-    gs4i_open_row(&q, u->s, u->d, run[a].row % ny, run[a].row / ny);
+    gs4i_find_row(&q, u->s, u->d, run[a].row % ny, run[a].row / ny);
     for (o = *b; o < a && run[o].row == row && run[o].begin < run[a].end; o++) {
         const int begin = run[o].begin > run[a].begin ? run[o].begin : run[a].begin,
                   end = run[o].end < run[a].end ? run[o].end : run[a].end;
@@ -3330,7 +3344,7 @@ static int gs4i_find_pockets(gs4i_setup *u)
     const int ny = s->level[0].n[1], nz = s->level[0].n[2];
     int64_t all = 0;
     int32_t a, y = 0, z = 0, count, kept = 0;
-    gs4i_cells *run;
+    gs4i_run *run;
     int k;
     s->runs = NULL;
     gs4i_parallel_for(s->tasks, nz, gs4i_list_runs, u);
@@ -3342,13 +3356,13 @@ static int gs4i_find_pockets(gs4i_setup *u)
     if (all > INT32_MAX || gs4i_reserve(s, &s->cells, (size_t)all * sizeof *run, 0) != GS4_OK)
         return GS4_ERROR_MEMORY;
     count = (int32_t)all;
-    s->runs = run = (gs4i_cells *)s->cells.data;
+    s->runs = run = (gs4i_run *)s->cells.data;
     gs4i_parallel_for(s->tasks, nz, gs4i_list_runs, u);
     for (a = 0; a < count; a++) {
         if (run[a].row % ny) gs4i_join_runs(u, run, a, &y, run[a].row - 1, 2);
         if (run[a].row >= ny) gs4i_join_runs(u, run, a, &z, run[a].row - ny, 4);
     }
-    /* a root comes before all of its runs; sum: 1 held, -1 - p in pocket p */
+    /* a root comes before all of its runs; sum: 1 regular, -1 - p in pocket p */
     for (s->pockets = 0, a = 0; a < count; a++) {
         run[a].pocket = gs4i_root(run, a);
         if (run[a].pocket != a)
@@ -3382,15 +3396,15 @@ static int gs4i_solver_setup(gs4i_solver *s, const gs4_poisson_desc *d)
     u.d = d;
     s->graphs = 0;
     s->fault = NULL;
-    if (gs4i_take(&u) != GS4_OK) return s->fault ? GS4_ERROR_ARGUMENT : GS4_ERROR_MEMORY;
+    if (gs4i_read_problem(&u) != GS4_OK) return s->fault ? GS4_ERROR_ARGUMENT : GS4_ERROR_MEMORY;
     gs4i_parallel_for(s->tasks, s->level[1].n[2], gs4i_build_planes, &u);
     gs4i_parallel_for(s->tasks, s->level[1].n[2], gs4i_build_inverse, &u);
-    for (l = 0; l < 2; l++) gs4i_cut(s, l, slabs > GS4I_SLABS ? GS4I_SLABS : slabs);
+    for (l = 0; l < 2; l++) gs4i_cut_slabs(s, l, slabs > GS4I_SLABS ? GS4I_SLABS : slabs);
     if (gs4i_build_groups(&u) != GS4_OK) return GS4_ERROR_MEMORY;
-    while (s->graph[s->graphs - 1].n > GS4I_DIRECT)
+    while (s->graph[s->graphs - 1].n > GS4I_DENSE)
         if (gs4i_coarsen_graph(s) != GS4_OK) return GS4_ERROR_MEMORY;
     gs4i_clear(s, s->x[0], s->level[0].count * sizeof(double));
-    if (gs4i_factor(s) != GS4_OK) return GS4_ERROR_MEMORY;
+    if (gs4i_factorize(s) != GS4_OK) return GS4_ERROR_MEMORY;
     return gs4i_find_pockets(&u);
 }
 
@@ -3441,7 +3455,7 @@ static void gs4i_largest_bits(const gs4_real *GS4I_RESTRICT rhs, const gs4_real 
 }
 
 /* Largest right-hand side in liquid, x in air and x in liquid; infinity where one is not finite. */
-static void gs4i_see_given(int k, void *context)
+static void gs4i_largest_given(int k, void *context)
 {
     const gs4i_given *v = (const gs4i_given *)context;
     const gs4i_solver *s = v->s;
@@ -3465,7 +3479,7 @@ static void gs4i_load_plane(int k, void *context)
 {
     const gs4i_given *v = (const gs4i_given *)context;
     const gs4i_solver *s = v->s;
-    const gs4i_masked *g = &s->level[0];
+    const gs4i_level *g = &s->level[0];
     const double b = s->rhs_unit, unit = s->x_unit;
     int i, j, odd;
     for (j = 0; j < g->n[1]; j++)
@@ -3496,7 +3510,7 @@ static void gs4i_store_plane(int k, void *context)
 {
     const gs4i_given *v = (const gs4i_given *)context;
     const gs4i_solver *s = v->s;
-    const gs4i_masked *g = &s->level[0];
+    const gs4i_level *g = &s->level[0];
     const double unit = 1 / s->x_unit;
     int i, j, odd;
     for (j = 0; j < g->n[1]; j++)
@@ -3529,13 +3543,13 @@ static double gs4i_sum_range(const double *v, int n)
 }
 
 /* Sums of runs; or, once the means are found, takes them off. */
-static void gs4i_means_of_runs(int index, void *context)
+static void gs4i_sum_or_shift_runs(int index, void *context)
 {
     const gs4i_means *w = (const gs4i_means *)context;
-    const gs4i_masked *g = &w->s->level[0];
+    const gs4i_level *g = &w->s->level[0];
     int a, c, m;
     for (a = GS4I_RUNS * index; a < GS4I_RUNS * (index + 1) && a < w->s->run_count; a++) {
-        gs4i_cells *run = &w->s->runs[a];
+        gs4i_run *run = &w->s->runs[a];
         const int j = run->row % g->n[1], k = run->row / g->n[1];
         const double mean = w->s->pocket[2 * run->pocket];
         if (!w->found) run->sum = 0;
@@ -3553,7 +3567,7 @@ static void gs4i_means_of_runs(int index, void *context)
 }
 
 /* Takes the mean of v off in every closed pocket; gives the largest one. */
-static double gs4i_take_means(gs4i_solver *s, double **v)
+static double gs4i_subtract_means(gs4i_solver *s, double **v)
 {
     const int tasks = (s->run_count + GS4I_RUNS - 1) / GS4I_RUNS;
     gs4i_means w;
@@ -3562,7 +3576,7 @@ static double gs4i_take_means(gs4i_solver *s, double **v)
     w.s = s;
     w.v = v;
     w.found = 0;
-    gs4i_parallel_for(s->tasks, tasks, gs4i_means_of_runs, &w);
+    gs4i_parallel_for(s->tasks, tasks, gs4i_sum_or_shift_runs, &w);
     for (p = 0; p < s->pockets; p++) s->pocket[2 * p] = 0;
     for (a = 0; a < s->run_count; a++) s->pocket[2 * s->runs[a].pocket] += s->runs[a].sum;
     for (p = 0; p < s->pockets; p++) {
@@ -3570,63 +3584,63 @@ static double gs4i_take_means(gs4i_solver *s, double **v)
         if (fabs(s->pocket[2 * p]) > largest) largest = fabs(s->pocket[2 * p]);
     }
     w.found = 1;
-    gs4i_parallel_for(s->tasks, tasks, gs4i_means_of_runs, &w);
+    gs4i_parallel_for(s->tasks, tasks, gs4i_sum_or_shift_runs, &w);
     return largest;
 }
 
 /* r = b - A x with x as given (guess 0, 1) or as it is (-1); gives |r|. */
 static double gs4i_true_residual(gs4i_solver *s, gs4i_given *v, int guess, double *removed)
 {
-    static const gs4i_stage_fn defect[] = { gs4i_stage_defect }, size[] = { gs4i_stage_size };
+    static const gs4i_pass_fn residual[] = { gs4i_pass_residual }, norm[] = { gs4i_pass_norm };
     double mean;
     v->guess = guess;
     gs4i_parallel_for(s->tasks, s->level[0].n[2], gs4i_load_plane, v);
-    if (guess > 0) gs4i_take_means(s, s->x);
-    mean = gs4i_take_means(s, s->level[0].r);
+    if (guess > 0) gs4i_subtract_means(s, s->x);
+    mean = gs4i_subtract_means(s, s->level[0].r);
     if (removed) *removed = mean / s->rhs_unit;
-    gs4i_sweep_run(s, 0, guess || v->air ? defect : size, 1); /* A 0 = 0 */
-    return sqrt(gs4i_total(s));
+    gs4i_wavefront_run(s, 0, guess || v->air ? residual : norm, 1); /* A 0 = 0 */
+    return sqrt(gs4i_sum_planes(s));
 }
 
-typedef enum gs4i_end {
+typedef enum gs4i_outcome {
     GS4I_CONVERGED,
     GS4I_LIMIT,
     GS4I_STAGNATED,
     GS4I_BROKE_DOWN
-} gs4i_end;
+} gs4i_outcome;
 
 /* Conjugate gradients from r as it is until |r| <= goal; `norm` is |r| before and after. */
-static gs4i_end gs4i_iterate(gs4i_solver *s, double goal, int limit, int diagonal, double *norm,
-                             int *iterations)
+static gs4i_outcome gs4i_poisson_cg(gs4i_solver *s, double goal, int limit, int diagonal,
+                                    double *norm, int *iterations)
 {
-    static const gs4i_stage_fn jacobi[] = { gs4i_stage_jacobi, gs4i_stage_dot },
-                               direct[] = { gs4i_stage_direct, gs4i_stage_curvature };
-    static const gs4i_stage_fn update[] = { gs4i_stage_update };
+    static const gs4i_pass_fn jacobi[] = { gs4i_pass_jacobi, gs4i_pass_dot },
+                              direct[] = { gs4i_pass_direction, gs4i_pass_p_dot_ap };
+    static const gs4i_pass_fn update[] = { gs4i_pass_update };
     /* |r| need not fall in each: over 30 it does where anything does */
     const int patience = diagonal ? 200 : 30;
     double last = 0, least = *norm, look = *norm;
     int i;
     for (i = 0; *norm > goal; i++) {
-        double rz, curvature;
+        double rz, p_dot_ap;
         if (*iterations >= limit) return GS4I_LIMIT;
         if (i && i % patience == 0) {
             if (least > 0.9 * look) return GS4I_STAGNATED;
             look = least;
         }
         if (diagonal) {
-            gs4i_sweep_run(s, 0, jacobi, 2);
-            rz = gs4i_total(s);
+            gs4i_wavefront_run(s, 0, jacobi, 2);
+            rz = gs4i_sum_planes(s);
         } else
             rz = gs4i_cycle(s);
         if (!(rz > 0 && rz <= DBL_MAX)) return GS4I_BROKE_DOWN;
         s->beta = i ? (float)(rz / last) : 0;
         last = rz;
-        gs4i_sweep_run(s, 0, direct, 2);
-        curvature = gs4i_total(s);
-        if (!(curvature > 0 && curvature <= DBL_MAX)) return GS4I_BROKE_DOWN;
-        s->alpha = rz / curvature;
-        gs4i_sweep_run(s, 0, update, 1);
-        *norm = sqrt(gs4i_total(s));
+        gs4i_wavefront_run(s, 0, direct, 2);
+        p_dot_ap = gs4i_sum_planes(s);
+        if (!(p_dot_ap > 0 && p_dot_ap <= DBL_MAX)) return GS4I_BROKE_DOWN;
+        s->alpha = rz / p_dot_ap;
+        gs4i_wavefront_run(s, 0, update, 1);
+        *norm = sqrt(gs4i_sum_planes(s));
         ++*iterations;
         if (!(*norm <= DBL_MAX)) return GS4I_BROKE_DOWN;
         if (*norm < least) least = *norm;
@@ -3635,11 +3649,12 @@ static gs4i_end gs4i_iterate(gs4i_solver *s, double goal, int limit, int diagona
 }
 
 /* Scales, and |b| with what flows in from the air. 0: nothing to solve for. */
-static int gs4i_begin(gs4i_solver *s, gs4i_given *v, double *norm, int *guess, double *removed)
+static int gs4i_begin_solve(gs4i_solver *s, gs4i_given *v, double *norm, int *guess,
+                            double *removed)
 {
     double most[3] = { 0, 0, 0 }, b;
     int k, i, exponent = 0;
-    gs4i_parallel_for(s->tasks, s->level[0].n[2], gs4i_see_given, v);
+    gs4i_parallel_for(s->tasks, s->level[0].n[2], gs4i_largest_given, v);
     for (k = 0; k < s->level[0].n[2]; k++)
         for (i = 0; i < 3; i++)
             if (s->given[3 * k + i] > most[i]) most[i] = s->given[3 * k + i];
@@ -3650,10 +3665,10 @@ static int gs4i_begin(gs4i_solver *s, gs4i_given *v, double *norm, int *guess, d
         return gs4i_fault(s, "the largest |x[]| in liquid and air is ",
                           most[1] > most[2] ? most[1] : most[2],
                           "; all must be finite and not absurdly large");
-    b = most[0] * s->mass_unit > most[1] ? most[0] * s->mass_unit : most[1];
+    b = most[0] * s->diagonal_unit > most[1] ? most[0] * s->diagonal_unit : most[1];
     frexp(b, &exponent);
     s->x_unit = ldexp(1, -exponent);
-    s->rhs_unit = s->mass_unit * s->x_unit;
+    s->rhs_unit = s->diagonal_unit * s->x_unit;
     *guess = most[2] > 0;
     v->air = most[1] > 0;
     *norm = gs4i_true_residual(s, v, 0, removed);
@@ -3686,7 +3701,7 @@ static int gs4i_solver_solve(gs4i_solver *s, const gs4_real *rhs, gs4_real *x, d
         { "the iteration broke down, twice; the residual is ",
           " of the right-hand side; less contrast of coefficient and diagonal would do" }
     };
-    gs4i_end end = GS4I_CONVERGED;
+    gs4i_outcome end = GS4I_CONVERGED;
     double size, norm, before = HUGE_VAL;
     int guess, diagonal = 0, iterations = 0;
     s->fault = NULL;
@@ -3694,7 +3709,8 @@ static int gs4i_solver_solve(gs4i_solver *s, const gs4_real *rhs, gs4_real *x, d
     v.rhs = rhs;
     v.x = x;
     v.guess = v.air = 0;
-    if (gs4i_begin(s, &v, &size, &guess, &stats->removed_mean) != GS4_OK) return GS4_ERROR_ARGUMENT;
+    if (gs4i_begin_solve(s, &v, &size, &guess, &stats->removed_mean) != GS4_OK)
+        return GS4_ERROR_ARGUMENT;
     stats->pockets = s->pockets;
     norm = size;
     if (guess && size > 0) norm = gs4i_true_residual(s, &v, 1, NULL);
@@ -3709,7 +3725,7 @@ static int gs4i_solver_solve(gs4i_solver *s, const gs4_real *rhs, gs4_real *x, d
             break;
         }
         before = norm;
-        end = gs4i_iterate(s, tolerance * size, limit, diagonal, &norm, &iterations);
+        end = gs4i_poisson_cg(s, tolerance * size, limit, diagonal, &norm, &iterations);
         norm = gs4i_true_residual(s, &v, -1, NULL);
         /* once more, without the cycle, from where it was last sound */
         if (end == GS4I_BROKE_DOWN) {
@@ -3723,7 +3739,7 @@ static int gs4i_solver_solve(gs4i_solver *s, const gs4_real *rhs, gs4_real *x, d
         }
         if (end != GS4I_CONVERGED) break;
     }
-    gs4i_take_means(s, s->x);
+    gs4i_subtract_means(s, s->x);
     gs4i_parallel_for(s->tasks, s->level[0].n[2], gs4i_store_plane, &v);
     stats->iterations = iterations;
     stats->residual = size > 0 ? norm / size : 0;
@@ -14762,7 +14778,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_CONDUCTS
 #undef GS4I_DESTINATION
 #undef GS4I_DIFFERENCE
-#undef GS4I_DIRECT
+#undef GS4I_DENSE
 #undef GS4I_EACH
 #undef GS4I_EACH_ROW
 #undef GS4I_EPSILON
@@ -14789,7 +14805,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_LOW_FACES
 #undef GS4I_LOW_FACES_OF
 #undef GS4I_MAD
-#undef GS4I_MASS
+#undef GS4I_DIAGONALS
 #undef GS4I_MAX_PARTICLES
 #undef GS4I_MAX_STEPS
 #undef GS4I_MIXING

@@ -797,6 +797,14 @@ typedef struct gs4i_text {
     size_t left;
 } gs4i_text;
 
+static gs4i_text gs4i_text_into(char *buffer, size_t size)
+{
+    gs4i_text t;
+    t.at = buffer;
+    t.left = size;
+    return t;
+}
+
 static void gs4i_put(gs4i_text *t, const char *s)
 {
     while (*s && t->left > 1) {
@@ -819,28 +827,11 @@ static void gs4i_put_integer(gs4i_text *t, int64_t value)
     gs4i_put(t, d);
 }
 
-/* Six significant digits, like %g in the C locale. */
-static void gs4i_put_real(gs4i_text *t, double v)
+/* Six significant digits of v > 0: v = d.ddddd x 10^exponent. */
+static int gs4i_decimal_digits(double v, char digits[6])
 {
-    char digits[8];
-    int exponent = 0, n, i;
+    int exponent = 5, i;
     int64_t m;
-    if (v != v) {
-        gs4i_put(t, "NaN");
-        return;
-    }
-    if (v < 0) {
-        gs4i_put(t, "-");
-        v = -v;
-    }
-    if (v > DBL_MAX) {
-        gs4i_put(t, "infinity");
-        return;
-    }
-    if (v == 0) {
-        gs4i_put(t, "0");
-        return;
-    }
     while (v >= 1e6) {
         v /= 10;
         exponent++;
@@ -854,35 +845,91 @@ static void gs4i_put_real(gs4i_text *t, double v)
         m = 100000;
         exponent++;
     }
-    exponent += 5; /* now digits are d.ddddd x 10^exponent */
     for (i = 5; i >= 0; i--) {
         digits[i] = (char)('0' + (int)(m % 10));
         m /= 10;
     }
-    n = 6;
-    while (n > 1 && digits[n - 1] == '0') n--;
-    {
-        char out[32], *o = out;
-        int scientific = exponent < -4 || exponent > 6;
-        /* index of the digit before the decimal point */
-        int point = scientific ? 0 : exponent;
-        if (point < 0) {
-            *o++ = '0';
-            *o++ = '.';
-            for (i = -1; i > point; i--) *o++ = '0';
-        }
-        for (i = 0; i < n || i <= point; i++) {
-            *o++ = i < n ? digits[i] : '0';
-            if (i == point && i + 1 < n) *o++ = '.';
-        }
-        *o = 0;
-        gs4i_put(t, out);
-        if (scientific) {
-            gs4i_put(t, "e");
-            gs4i_put_integer(t, exponent);
-        }
-    }
+    return exponent;
 }
+
+/* Like %g in the C locale, with an exponent below 1e-4 and from 1e7 on. */
+static void gs4i_put_real(gs4i_text *t, double v)
+{
+    char digits[6], out[32], *o = out;
+    int exponent, is_scientific, point, i, n = 6;
+    if (v < 0) gs4i_put(t, "-");
+    v = v < 0 ? -v : v;
+    if (!(v > 0 && v <= DBL_MAX)) {
+        gs4i_put(t, v != v ? "NaN" : v > 0 ? "infinity" : "0");
+        return;
+    }
+    exponent = gs4i_decimal_digits(v, digits);
+    while (n > 1 && digits[n - 1] == '0') n--;
+    is_scientific = exponent < -4 || exponent > 6;
+    point = is_scientific ? 0 : exponent; /* the digit before the decimal point */
+    if (point < 0) {
+        *o++ = '0';
+        *o++ = '.';
+        for (i = -1; i > point; i--) *o++ = '0';
+    }
+    for (i = 0; i < n || i <= point; i++) {
+        *o++ = i < n ? digits[i] : '0';
+        if (i == point && i + 1 < n) *o++ = '.';
+    }
+    *o = 0;
+    gs4i_put(t, out);
+    if (!is_scientific) return;
+    gs4i_put(t, "e");
+    gs4i_put_integer(t, exponent);
+}
+
+/* Why a call failed: its code, a sentence, and who is told. Functions that can fail take one and
+ * return the code, so that checks need no simulation. */
+typedef struct gs4i_error {
+    int code;
+    char text[320];
+    gs4_log_fn log;
+    void *log_user;
+} gs4i_error;
+
+/* A sentence begins, is put together, and ends with its code. */
+static gs4i_text gs4i_begin_error(gs4i_error *e) { return gs4i_text_into(e->text, sizeof e->text); }
+
+static int gs4i_end_error(gs4i_error *e, int code)
+{
+    e->code = code;
+    if (e->log) e->log(2, e->text, e->log_user);
+    return code;
+}
+
+static int gs4i_fail(gs4i_error *e, int code, const char *what)
+{
+    gs4i_text t = gs4i_begin_error(e);
+    gs4i_put(&t, what);
+    return gs4i_end_error(e, code);
+}
+
+/* "<before><value><after>" */
+static int gs4i_fail_value(gs4i_error *e, int code, const char *before, double value,
+                           const char *after)
+{
+    gs4i_text t = gs4i_begin_error(e);
+    gs4i_put(&t, before);
+    gs4i_put_real(&t, value);
+    gs4i_put(&t, after);
+    return gs4i_end_error(e, code);
+}
+
+static int gs4i_fail_memory(gs4i_error *e)
+{
+    return gs4i_fail(e, GS4_ERROR_MEMORY, "out of memory; nothing has changed");
+}
+
+#define GS4I_TRY(call)                       \
+    do {                                     \
+        int gs4i_r = (call);                 \
+        if (gs4i_r != GS4_OK) return gs4i_r; \
+    } while (0)
 
 /* Finite, whatever flags the file is compiled with. */
 GS4I_INLINE int gs4i_finite(gs4_real v)
@@ -8218,7 +8265,7 @@ struct gs4_sim {
     int edited; /* by hand, not checked yet */
     /* velocities were set by hand: how solids turn must be found out */
     int needs_spin;
-    char error[320];
+    gs4i_error error; /* the last one */
 };
 
 static double gs4i_now(const gs4_sim *sim)
@@ -8258,37 +8305,6 @@ GS4I_INLINE const gs4i_material_constants *gs4i_constants_of(const gs4_sim *sim,
     const gs4i_particles *p = &sim->particles;
     return p->liquid && !p->liquid[i] ? &sim->solid_phase[p->material[i]]
                                       : &sim->constants[p->material[i]];
-}
-
-/* --- errors in words -------------------------------------------------------------------------- */
-
-static int gs4i_fail(gs4_sim *sim, int code, const char *what)
-{
-    gs4i_text t;
-    t.at = sim->error;
-    t.left = sizeof sim->error;
-    gs4i_put(&t, what);
-    if (sim->desc.log) sim->desc.log(2, sim->error, sim->desc.log_user);
-    return code;
-}
-
-/* "<before><value><after>" */
-static int gs4i_fail_value(gs4_sim *sim, int code, const char *before, double value,
-                           const char *after)
-{
-    char line[320];
-    gs4i_text t;
-    t.at = line;
-    t.left = sizeof line;
-    gs4i_put(&t, before);
-    gs4i_put_real(&t, value);
-    gs4i_put(&t, after);
-    return gs4i_fail(sim, code, line);
-}
-
-static int gs4i_fail_memory(gs4_sim *sim)
-{
-    return gs4i_fail(sim, GS4_ERROR_MEMORY, "out of memory; nothing has changed");
 }
 
 /* --- passes over nodes ------------------------------------------------------------------------ */
@@ -9130,7 +9146,7 @@ static int gs4i_sort_image_particles(gs4_sim *sim)
     int32_t *slots =
         (int32_t *)gs4i_scratch_reserve(&sim->memory, &g->slots, (size_t)active * sizeof *slots, 0);
     int k, s, colour, n = 0;
-    if (!order || !first || !slots) return gs4i_fail_memory(sim);
+    if (!order || !first || !slots) return gs4i_fail_memory(&sim->error);
     memset(first, 0, (size_t)(active + 1) * sizeof *first);
     for (k = 0; k < g->count; k++)
         if (all[k].kind) first[all[k].slot + 1]++;
@@ -9163,7 +9179,7 @@ static int gs4i_find_image_particles(gs4_sim *sim)
     if (!sticky) return GS4_OK;
     of = (int32_t *)gs4i_scratch_reserve(&sim->memory, &g->of, (size_t)grid->occupied * sizeof *of,
                                          0);
-    if (!of) return gs4i_fail_memory(sim);
+    if (!of) return gs4i_fail_memory(&sim->error);
     for (o = 0; o < grid->occupied; o++) {
         gs4_real d;
         of[o] = gs4i_nearest_sticky(&sim->boundary, gs4i_block_midst(grid, grid->occupied_block[o]),
@@ -9176,7 +9192,7 @@ static int gs4i_find_image_particles(gs4_sim *sim)
     if (!gs4i_scratch_reserve(&sim->memory, &g->all, (size_t)g->count * sizeof(gs4i_image_particle),
                               0)) {
         g->count = 0;
-        return gs4i_fail_memory(sim);
+        return gs4i_fail_memory(&sim->error);
     }
     memset(&pass, 0, sizeof pass);
     pass.sim = sim;
@@ -11031,7 +11047,7 @@ static int gs4i_solve_heat_system(gs4_sim *sim)
     k->solver.memory = &sim->memory;
     k->solver.tasks = &sim->tasks;
     result = gs4i_solver_setup(&k->solver, &d);
-    if (result == GS4_ERROR_MEMORY) return gs4i_fail_memory(sim);
+    if (result == GS4_ERROR_MEMORY) return gs4i_fail_memory(&sim->error);
     if (result == GS4_OK)
         result = k->outer
                      ? gs4i_solve_periodic(sim, tolerance, &stats)
@@ -11042,11 +11058,12 @@ static int gs4i_solve_heat_system(gs4_sim *sim)
     if (result == GS4_OK) return result;
     if (result == GS4_ERROR_NOT_CONVERGED)
         return gs4i_fail_value(
-            sim, result, "the heat of the step did not converge: the residual is ", stats.residual,
+            &sim->error, result, "the heat of the step did not converge: the residual is ",
+            stats.residual,
             " of the heat that flows (solver_tolerance, solver_max_iterations); the step was not "
             "taken; a larger tolerance, more iterations or a smaller dt would do");
     return gs4i_fail_value(
-        sim, GS4_ERROR_UNSTABLE, k->solver.fault, k->solver.fault_value,
+        &sim->error, GS4_ERROR_UNSTABLE, k->solver.fault, k->solver.fault_value,
         " of the heat of the step, which is not finite or absurd; the step was not taken; smaller "
         "conductivities, temperatures or heat capacities would do");
 }
@@ -11097,7 +11114,7 @@ static int gs4i_solve_heat(gs4_sim *sim, gs4i_node_pass *nodes)
     size_t cells;
     int a, result;
     gs4i_fold_heat(sim);
-    if (gs4i_heat_box(sim) != GS4_OK) return gs4i_fail_memory(sim);
+    if (gs4i_heat_box(sim) != GS4_OK) return gs4i_fail_memory(&sim->error);
     cells = (size_t)k->size[0] * (size_t)k->size[1] * (size_t)k->size[2];
     memset(k->kind, GS4_CELL_SOLID, cells);
     for (a = GS4I_HEAT_T; a <= GS4I_HEAT_X; a++) memset(k->field[a], 0, cells * sizeof(gs4_real));
@@ -11124,10 +11141,7 @@ static int gs4i_solve_heat(gs4_sim *sim, gs4i_node_pass *nodes)
 
 static int gs4i_fail_bad(gs4_sim *sim, const gs4i_report *r)
 {
-    char line[320];
-    gs4i_text t;
-    t.at = line;
-    t.left = sizeof line;
+    gs4i_text t = gs4i_begin_error(&sim->error);
     gs4i_put(&t, "particle ");
     gs4i_put_integer(&t, (int64_t)r->bad_id);
     gs4i_put(
@@ -11142,7 +11156,7 @@ static int gs4i_fail_bad(gs4_sim *sim, const gs4i_report *r)
     gs4i_put(
         &t,
         "; the step was not taken; a smaller dt, a higher sound_speed or a slower start would do");
-    return gs4i_fail(sim, GS4_ERROR_UNSTABLE, line);
+    return gs4i_end_error(&sim->error, GS4_ERROR_UNSTABLE);
 }
 
 /* --- stability -------------------------------------------------------------------------------- */
@@ -11616,27 +11630,21 @@ static void gs4i_deconvolve_forces(int index, void *context)
 
 /* --- stages ----------------------------------------------------------------------------------- */
 
-#define GS4I_TRY(call)                       \
-    do {                                     \
-        int gs4i_r = (call);                 \
-        if (gs4i_r != GS4_OK) return gs4i_r; \
-    } while (0)
-
 /* Everything whose size follows the blocks. */
 static int gs4i_after_occupy(gs4_sim *sim)
 {
     gs4i_memory *m = &sim->memory;
     if (gs4i_list_mirror_nodes(m, &sim->boundary, &sim->grid) != GS4_OK)
-        return gs4i_fail_memory(sim);
+        return gs4i_fail_memory(&sim->error);
     if (sim->grid.occupied_capacity > sim->report_capacity) {
         gs4i_report *r =
             (gs4i_report *)gs4i_alloc(m, (size_t)sim->grid.occupied_capacity, sizeof *r);
-        if (!r) return gs4i_fail_memory(sim);
+        if (!r) return gs4i_fail_memory(&sim->error);
         gs4i_free(m, sim->reports, (size_t)sim->report_capacity, sizeof *r);
         sim->reports = r;
         sim->report_capacity = sim->grid.occupied_capacity;
     }
-    return gs4i_reserve_heat(sim) == GS4_OK ? GS4_OK : gs4i_fail_memory(sim);
+    return gs4i_reserve_heat(sim) == GS4_OK ? GS4_OK : gs4i_fail_memory(&sim->error);
 }
 
 /* S1: sort. */
@@ -11646,7 +11654,7 @@ static int gs4i_bin(gs4_sim *sim)
     if (gs4i_particles_sort(&sim->memory, &sim->tasks, &sim->particles, &sim->grid,
                             sim->integrator.prediction)
         != GS4_OK)
-        return gs4i_fail_memory(sim);
+        return gs4i_fail_memory(&sim->error);
     sim->needs_sort = 1;
     GS4I_TRY(gs4i_after_occupy(sim));
     sim->needs_sort = 0;
@@ -11669,7 +11677,7 @@ static int gs4i_rasterise(gs4_sim *sim, gs4i_node_pass *nodes)
                                                      : gs4i_scatter_euler);
         if (!gs4i_all_reports(sim).left_tile) return GS4_OK;
     }
-    return gs4i_fail(sim, GS4_ERROR_UNSTABLE,
+    return gs4i_fail(&sim->error, GS4_ERROR_UNSTABLE,
                      "particles would move more than a cell beyond the domain in one step; the "
                      "step was not taken");
 }
@@ -11724,7 +11732,7 @@ static int gs4i_check_stage(gs4_sim *sim)
     if (r.bad) return gs4i_fail_bad(sim, &r);
     sim->stage_limit = gs4i_stable_dt(sim, &r);
     if (sim->integrator.dt > GS4I_C(1.25) * sim->stage_limit)
-        return gs4i_fail_value(sim, GS4_ERROR_UNSTABLE,
+        return gs4i_fail_value(&sim->error, GS4_ERROR_UNSTABLE,
                                "viscosity or compression rose during the step: dt ",
                                (double)sim->integrator.dt,
                                " s is beyond the stability limit there; the step was not taken");
@@ -11904,10 +11912,10 @@ static int gs4i_prepare_emitters(gs4_sim *sim, double dt)
     if (sim->desc.max_particles) return GS4_OK;
     if (wanted <= sim->particles.capacity) return GS4_OK;
     if (wanted > GS4I_MAX_PARTICLES)
-        return gs4i_fail(sim, GS4_ERROR_MEMORY, "more than 2^30 particles");
+        return gs4i_fail(&sim->error, GS4_ERROR_MEMORY, "more than 2^30 particles");
     wanted += wanted / 8;
     if (gs4i_particles_reserve(&sim->memory, &sim->particles, wanted) != GS4_OK)
-        return gs4i_fail_memory(sim);
+        return gs4i_fail_memory(&sim->error);
     return GS4_OK;
 }
 
@@ -12014,7 +12022,7 @@ static int gs4i_find_spin(gs4_sim *sim, gs4i_node_pass *nodes)
         result = gs4i_rasterise(sim, nodes);
         if (result == GS4_OK
             && gs4i_place_jumps(&sim->memory, &sim->boundary, &sim->grid) != GS4_OK)
-            result = gs4i_fail_memory(sim);
+            result = gs4i_fail_memory(&sim->error);
         if (result != GS4_OK) break;
         gs4i_set_velocities(sim, nodes);
         gs4i_gather(sim, gs4i_find_spin_task);
@@ -12046,7 +12054,7 @@ static int gs4i_make_step(gs4_sim *sim, gs4_real dt)
         /* S2, S3 */
         GS4I_TRY(gs4i_rasterise(sim, &nodes));
         if (gs4i_place_jumps(&sim->memory, &sim->boundary, &sim->grid) != GS4_OK)
-            return gs4i_fail_memory(sim);
+            return gs4i_fail_memory(&sim->error);
         gs4i_set_velocities(sim, &nodes);
         if (!euler) {
             /* S4, S5 */
@@ -12112,13 +12120,13 @@ static int gs4i_file_open(gs4_sim *sim, gs4i_file *f, const char *path)
 {
     size_t n;
     memset(f, 0, sizeof *f);
-    if (!path || !*path) return gs4i_fail(sim, GS4_ERROR_ARGUMENT, "path is empty");
+    if (!path || !*path) return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT, "path is empty");
     f->path = path;
     n = strlen(path);
     if (!gs4i_is_special(path)) {
         f->temporary_size = n + 5;
         f->temporary = (char *)gs4i_alloc(&sim->memory, f->temporary_size, 1);
-        if (!f->temporary) return gs4i_fail_memory(sim);
+        if (!f->temporary) return gs4i_fail_memory(&sim->error);
         memcpy(f->temporary, path, n);
         memcpy(f->temporary + n, ".tmp", 5);
     }
@@ -12126,7 +12134,7 @@ static int gs4i_file_open(gs4_sim *sim, gs4i_file *f, const char *path)
     if (f->stream) return GS4_OK;
     gs4i_free(&sim->memory, f->temporary, f->temporary_size, 1);
     return gs4i_fail(
-        sim, GS4_ERROR_IO,
+        &sim->error, GS4_ERROR_IO,
         "the file could not be created: does its folder exist, and may it be written to?");
 }
 
@@ -12151,7 +12159,7 @@ static int gs4i_file_close(gs4_sim *sim, gs4i_file *f)
         gs4i_free(&sim->memory, f->temporary, f->temporary_size, 1);
     }
     if (failed)
-        return gs4i_fail(sim, GS4_ERROR_IO,
+        return gs4i_fail(&sim->error, GS4_ERROR_IO,
                          "the file could not be written whole: is the disk full? What was there "
                          "before is untouched");
     return GS4_OK;
@@ -12439,12 +12447,12 @@ static int gs4i_check_head(gs4_sim *sim, const gs4i_head *h)
     gs4i_head own;
     gs4i_head_of(sim, &own);
     if (memcmp(h->magic, own.magic, 8) != 0)
-        return gs4i_fail(sim, GS4_ERROR_FORMAT, "the file is not a gs4mpm checkpoint");
+        return gs4i_fail(&sim->error, GS4_ERROR_FORMAT, "the file is not a gs4mpm checkpoint");
     if (h->version != own.version || h->real_size != own.real_size
         || h->byte_order != own.byte_order || h->head_size != own.head_size
         || h->material_size != own.material_size || h->body_size != own.body_size
         || h->emitter_size != own.emitter_size)
-        return gs4i_fail(sim, GS4_ERROR_FORMAT,
+        return gs4i_fail(&sim->error, GS4_ERROR_FORMAT,
                          "the checkpoint was made by another build (version, precision, byte order "
                          "or platform)");
     if (memcmp(h->cells, own.cells, sizeof h->cells) || memcmp(h->walls, own.walls, sizeof h->walls)
@@ -12455,20 +12463,20 @@ static int gs4i_check_head(gs4_sim *sim, const gs4i_head *h)
         || memcmp(h->rho, own.rho, sizeof h->rho) || memcmp(&h->decay, &own.decay, sizeof h->decay)
         || memcmp(h->heat, own.heat, sizeof h->heat)
         || memcmp(h->isothermal, own.isothermal, sizeof h->isothermal))
-        return gs4i_fail(sim, GS4_ERROR_FORMAT,
+        return gs4i_fail(&sim->error, GS4_ERROR_FORMAT,
                          "the checkpoint belongs to a simulation with another description");
     if (h->materials != own.materials || h->colliders != own.colliders
         || h->emitters != own.emitters || h->elastic_reals != own.elastic_reals
         || h->deformation_reals != own.deformation_reals || h->with_heat != own.with_heat
         || h->with_flux != own.with_flux)
-        return gs4i_fail(sim, GS4_ERROR_FORMAT,
+        return gs4i_fail(&sim->error, GS4_ERROR_FORMAT,
                          "the checkpoint belongs to a scene with other materials, colliders or "
                          "emitters: add the same ones, in the same order, before gs4_load");
     if (h->particles < 0 || h->active < 0 || h->occupied < 0 || h->particles > GS4I_MAX_PARTICLES
         || (size_t)h->active > sim->grid.table_count || h->occupied > h->active)
-        return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint is damaged");
+        return gs4i_fail(&sim->error, GS4_ERROR_FORMAT, "the checkpoint is damaged");
     if (sim->desc.max_particles && h->particles > sim->desc.max_particles)
-        return gs4i_fail(sim, GS4_ERROR_ARGUMENT,
+        return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT,
                          "the checkpoint holds more particles than max_particles");
     return GS4_OK;
 }
@@ -12690,8 +12698,8 @@ static int gs4i_restore(gs4_sim *sim, const gs4i_head *h, const gs4i_pieces *p)
     if (result != GS4_OK) {
         gs4i_release_state(&next);
         return result == GS4_ERROR_MEMORY
-                   ? gs4i_fail_memory(sim)
-                   : gs4i_fail(sim, GS4_ERROR_FORMAT,
+                   ? gs4i_fail_memory(&sim->error)
+                   : gs4i_fail(&sim->error, GS4_ERROR_FORMAT,
                                "the checkpoint is damaged: its blocks are out of order");
     }
     {
@@ -12733,10 +12741,11 @@ static int gs4i_load_body(gs4_sim *sim, FILE *f, const gs4i_head *h, unsigned ch
     size_t at = 0;
     int k, sequence[GS4I_PIECES], n = 0;
     if (fread(data, 1, size, f) != size)
-        return gs4i_fail(sim, ferror(f) ? GS4_ERROR_IO : GS4_ERROR_FORMAT,
+        return gs4i_fail(&sim->error, ferror(f) ? GS4_ERROR_IO : GS4_ERROR_FORMAT,
                          "the checkpoint is cut off");
     if (fread(&more, 1, 1, f) == 1)
-        return gs4i_fail(sim, GS4_ERROR_FORMAT, "the checkpoint has something behind its end");
+        return gs4i_fail(&sim->error, GS4_ERROR_FORMAT,
+                         "the checkpoint has something behind its end");
     for (k = 0; k < 3; k++) sequence[n++] = order[k];
     for (k = 0; k < GS4I_STATE_ARRAYS; k++) sequence[n++] = GS4I_PIECE_PARTICLES + k;
     for (k = 0; k < 4; k++) sequence[n++] = after[k];
@@ -12749,10 +12758,10 @@ static int gs4i_load_body(gs4_sim *sim, FILE *f, const gs4i_head *h, unsigned ch
     }
     memcpy(&stored, data + at, sizeof stored);
     if (hash != stored)
-        return gs4i_fail(sim, GS4_ERROR_FORMAT,
+        return gs4i_fail(&sim->error, GS4_ERROR_FORMAT,
                          "the checkpoint is damaged: its contents do not match their checksum");
     if (!gs4i_same_scene(sim, p))
-        return gs4i_fail(sim, GS4_ERROR_FORMAT,
+        return gs4i_fail(&sim->error, GS4_ERROR_FORMAT,
                          "the checkpoint belongs to a scene with other materials, colliders or "
                          "emitters: add the same ones, in the same order, before gs4_load");
     return gs4i_restore(sim, h, p);
@@ -12766,22 +12775,23 @@ static int gs4i_load(gs4_sim *sim, const char *path)
     size_t size;
     FILE *f;
     int result;
-    if (!path || !*path) return gs4i_fail(sim, GS4_ERROR_ARGUMENT, "path is empty");
+    if (!path || !*path) return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT, "path is empty");
     f = fopen(path, "rb");
     if (!f)
-        return gs4i_fail(sim, GS4_ERROR_IO,
+        return gs4i_fail(&sim->error, GS4_ERROR_IO,
                          "the checkpoint could not be opened: does it exist, and may it be read?");
     if (fread(&h, 1, sizeof h, f) != sizeof h)
-        result = ferror(f) ? gs4i_fail(sim, GS4_ERROR_IO, "the checkpoint could not be read")
-                           : gs4i_fail(sim, GS4_ERROR_FORMAT,
-                                       "the checkpoint is cut off, or no checkpoint at all");
+        result = ferror(f)
+                     ? gs4i_fail(&sim->error, GS4_ERROR_IO, "the checkpoint could not be read")
+                     : gs4i_fail(&sim->error, GS4_ERROR_FORMAT,
+                                 "the checkpoint is cut off, or no checkpoint at all");
     else
         result = gs4i_check_head(sim, &h);
     if (result == GS4_OK) {
         size = gs4i_piece_sizes(sim, &h, &p) + sizeof(uint64_t);
         data = (unsigned char *)gs4i_alloc(&sim->memory, size, 1);
         if (!data)
-            result = gs4i_fail_memory(sim);
+            result = gs4i_fail_memory(&sim->error);
         else {
             result = gs4i_load_body(sim, f, &h, data, size, &p);
             gs4i_free(&sim->memory, data, size, 1);
@@ -12793,38 +12803,34 @@ static int gs4i_load(gs4_sim *sim, const char *path)
 
 /* ==== [[public]] every value checked, then the work =========================================== */
 
-/* --- rules ------------------------------------------------------------------------------------ */
+/* --- rules ------------------------------------------------------------------------------------
+ *
+ * A rule a line: the value, what is accepted, and the sentence that says so. A check is the list
+ * of the rules of one thing that crosses the interface. */
 
 typedef enum gs4i_must {
     GS4I_FINITE,
     GS4I_POSITIVE,
     GS4I_NOT_NEGATIVE,
-    GS4I_FRACTION,
-    GS4I_ZERO
+    GS4I_FRACTION
 } gs4i_must;
 
-/* One value against one rule; the sentence names the field, its value and what would do. */
-static int gs4i_check(gs4_sim *sim, const char *field, gs4_real value, gs4i_must must)
+/* Of one value; beyond GS4I_HUGE, or above 0 and below its inverse, it is called absurd. */
+static int gs4i_check(gs4i_error *e, const char *field, gs4_real value, gs4i_must must)
 {
-    static const char *const accepted[] = {
-        "a finite number", "a finite number above 0", "0 or a finite number above",
-        "a number from 0 to 1",
-        "0: it belongs to a part of the model that this version does not have"
-    };
+    static const char *const accepted[] = { "a finite number", "a finite number above 0",
+                                            "0 or a finite number above", "a number from 0 to 1" };
     const int sane = gs4i_finite(value) && value < GS4I_HUGE && value > -GS4I_HUGE;
-    int good = 0;
-    char line[320];
+    int good = sane;
     gs4i_text t;
     switch (must) {
-    case GS4I_FINITE: good = sane; break;
+    case GS4I_FINITE: break;
     case GS4I_POSITIVE: good = sane && value > 0 && value > 1 / GS4I_HUGE; break;
     case GS4I_NOT_NEGATIVE: good = sane && value >= 0; break;
     case GS4I_FRACTION: good = sane && value >= 0 && value <= 1; break;
-    case GS4I_ZERO: good = value == 0; break;
     }
     if (good) return GS4_OK;
-    t.at = line;
-    t.left = sizeof line;
+    t = gs4i_begin_error(e);
     gs4i_put(&t, field);
     gs4i_put(&t, " is ");
     gs4i_put_real(&t, (double)value);
@@ -12834,335 +12840,344 @@ static int gs4i_check(gs4_sim *sim, const char *field, gs4_real value, gs4i_must
         gs4i_put(&t, " that is not absurdly large");
     else if (must == GS4I_POSITIVE && value > 0)
         gs4i_put(&t, " that is not absurdly small");
-    return gs4i_fail(sim, GS4_ERROR_ARGUMENT, line);
+    return gs4i_end_error(e, GS4_ERROR_ARGUMENT);
 }
 
-static int gs4i_check3(gs4_sim *sim, const char *field, gs4_vec3 v)
+static int gs4i_check3(gs4i_error *e, const char *field, gs4_vec3 v)
 {
-    GS4I_TRY(gs4i_check(sim, field, v.x, GS4I_FINITE));
-    GS4I_TRY(gs4i_check(sim, field, v.y, GS4I_FINITE));
-    return gs4i_check(sim, field, v.z, GS4I_FINITE);
+    GS4I_TRY(gs4i_check(e, field, v.x, GS4I_FINITE));
+    GS4I_TRY(gs4i_check(e, field, v.y, GS4I_FINITE));
+    return gs4i_check(e, field, v.z, GS4I_FINITE);
 }
 
-/* A field that this version has no use for: rejected, never ignored. */
-static int gs4i_check_absent(gs4_sim *sim, const char *field, gs4_real value, const char *why)
+static int gs4i_require(gs4i_error *e, int holds, const char *otherwise)
 {
-    char line[320];
+    return holds ? GS4_OK : gs4i_fail(e, GS4_ERROR_ARGUMENT, otherwise);
+}
+
+/* The sentence is "<before><value><after>". */
+static int gs4i_require_value(gs4i_error *e, int holds, const char *before, double value,
+                              const char *after)
+{
+    return holds ? GS4_OK : gs4i_fail_value(e, GS4_ERROR_ARGUMENT, before, value, after);
+}
+
+static int gs4i_require_between(gs4i_error *e, double low, double high, const char *before,
+                                double value, const char *after)
+{
+    return gs4i_require_value(e, value >= low && value <= high, before, value, after);
+}
+
+/* A field that has no use here: refused, never ignored. */
+static int gs4i_check_absent(gs4i_error *e, const char *field, gs4_real value, const char *why)
+{
     gs4i_text t;
     if (value == 0) return GS4_OK;
-    t.at = line;
-    t.left = sizeof line;
+    t = gs4i_begin_error(e);
     gs4i_put(&t, field);
     gs4i_put(&t, " is ");
     gs4i_put_real(&t, (double)value);
     gs4i_put(&t, "; ");
     gs4i_put(&t, why);
-    return gs4i_fail(sim, GS4_ERROR_ARGUMENT, line);
+    return gs4i_end_error(e, GS4_ERROR_ARGUMENT);
 }
 
-#define GS4I_NO_HEAT                                                                               \
-    "no material so far conducts heat, melts or is heated by viscosity: add that material first, " \
-    "or leave it 0"
-
-static int gs4i_bad_argument(gs4_sim *sim, const char *what)
+static int gs4i_check_id(gs4i_error *e, const char *what, int id, int count)
 {
-    return gs4i_fail(sim, GS4_ERROR_ARGUMENT, what);
-}
-
-static int gs4i_check_id(gs4_sim *sim, const char *what, int id, int count)
-{
-    char line[160];
     gs4i_text t;
     if (id >= 0 && id < count) return GS4_OK;
-    t.at = line;
-    t.left = sizeof line;
+    t = gs4i_begin_error(e);
     gs4i_put(&t, what);
     gs4i_put(&t, " ");
     gs4i_put_integer(&t, id);
     gs4i_put(&t, " does not exist; there are ");
     gs4i_put_integer(&t, count);
     gs4i_put(&t, ", numbered from 0");
-    return gs4i_bad_argument(sim, line);
+    return gs4i_end_error(e, GS4_ERROR_ARGUMENT);
 }
 
-/* Fields, degeneracy, direction, closedness; normalises the normal of a plane. `open` allows a
- * plane. */
-static int gs4i_check_shape(gs4_sim *sim, gs4_shape *s)
+/* --- rules of shapes -------------------------------------------------------------------------- */
+
+static int gs4i_check_box(gs4i_error *e, const gs4_shape *s)
+{
+    GS4I_TRY(gs4i_check3(e, "shape low corner", s->a));
+    GS4I_TRY(gs4i_check3(e, "shape high corner", s->b));
+    return gs4i_require(
+        e, s->a.x < s->b.x && s->a.y < s->b.y && s->a.z < s->b.z,
+        "shape: each coordinate of the low corner must be below that of the high corner");
+}
+
+static int gs4i_check_cylinder(gs4i_error *e, const gs4_shape *s)
+{
+    GS4I_TRY(gs4i_check3(e, "shape end a", s->a));
+    GS4I_TRY(gs4i_check3(e, "shape end b", s->b));
+    GS4I_TRY(gs4i_require(e, gs4i_length(gs4i_sub(s->b, s->a)) > 0,
+                          "shape: the ends of the cylinder coincide"));
+    return gs4i_check(e, "shape radius", s->radius, GS4I_POSITIVE);
+}
+
+/* Makes the normal one of unit length. */
+static int gs4i_check_plane(gs4i_error *e, gs4_shape *s)
+{
+    gs4_real n;
+    GS4I_TRY(gs4i_check3(e, "shape point", s->a));
+    GS4I_TRY(gs4i_check3(e, "shape normal", s->b));
+    n = gs4i_length(s->b);
+    GS4I_TRY(
+        gs4i_require(e, n > 0 && gs4i_finite(n), "shape: the normal of the plane has no length"));
+    s->b = gs4i_scale(s->b, 1 / n);
+    return GS4_OK;
+}
+
+static int gs4i_check_mesh(gs4i_error *e, gs4i_memory *memory, const gs4_shape *s)
 {
     int fault;
+    gs4i_text t;
+    GS4I_TRY(gs4i_require(
+        e, s->vertices && s->triangles && s->vertex_count >= 4 && s->triangle_count >= 4,
+        "shape: a mesh needs vertices and triangles, at least four of each"));
+    fault = gs4i_mesh_check(memory, s);
+    if (fault == 0) return GS4_OK;
+    if (fault == GS4_ERROR_MEMORY) return gs4i_fail_memory(e);
+    t = gs4i_begin_error(e);
+    gs4i_put(&t, "shape: the mesh ");
+    gs4i_put(&t, gs4i_mesh_faults[fault]);
+    return gs4i_end_error(e, GS4_ERROR_ARGUMENT);
+}
+
+static int gs4i_check_shape(gs4i_error *e, gs4i_memory *memory, gs4_shape *s)
+{
     switch (s->kind) {
-    case GS4_SHAPE_BOX:
-    case GS4_SHAPE_SDF:
-        GS4I_TRY(gs4i_check3(sim, "shape low corner", s->a));
-        GS4I_TRY(gs4i_check3(sim, "shape high corner", s->b));
-        if (!(s->a.x < s->b.x && s->a.y < s->b.y && s->a.z < s->b.z))
-            return gs4i_bad_argument(
-                sim,
-                "shape: each coordinate of the low corner must be below that of the high corner");
-        if (s->kind == GS4_SHAPE_SDF && !s->distance)
-            return gs4i_bad_argument(sim, "shape: the distance function is missing");
-        return GS4_OK;
+    case GS4_SHAPE_BOX: return gs4i_check_box(e, s);
     case GS4_SHAPE_SPHERE:
-        GS4I_TRY(gs4i_check3(sim, "shape centre", s->a));
-        return gs4i_check(sim, "shape radius", s->radius, GS4I_POSITIVE);
-    case GS4_SHAPE_CYLINDER:
-        GS4I_TRY(gs4i_check3(sim, "shape end a", s->a));
-        GS4I_TRY(gs4i_check3(sim, "shape end b", s->b));
-        if (!(gs4i_length(gs4i_sub(s->b, s->a)) > 0))
-            return gs4i_bad_argument(sim, "shape: the ends of the cylinder coincide");
-        return gs4i_check(sim, "shape radius", s->radius, GS4I_POSITIVE);
-    case GS4_SHAPE_PLANE: {
-        gs4_real n;
-        GS4I_TRY(gs4i_check3(sim, "shape point", s->a));
-        GS4I_TRY(gs4i_check3(sim, "shape normal", s->b));
-        n = gs4i_length(s->b);
-        if (!(n > 0 && gs4i_finite(n)))
-            return gs4i_bad_argument(sim, "shape: the normal of the plane has no length");
-        s->b = gs4i_scale(s->b, 1 / n);
-        return GS4_OK;
-    }
-    case GS4_SHAPE_MESH:
-        if (!s->vertices || !s->triangles || s->vertex_count < 4 || s->triangle_count < 4)
-            return gs4i_bad_argument(
-                sim, "shape: a mesh needs vertices and triangles, at least four of each");
-        fault = gs4i_mesh_check(&sim->memory, s);
-        if (fault == GS4_ERROR_MEMORY) return gs4i_fail_memory(sim);
-        if (fault) {
-            char line[200];
-            gs4i_text t;
-            t.at = line;
-            t.left = sizeof line;
-            gs4i_put(&t, "shape: the mesh ");
-            gs4i_put(&t, gs4i_mesh_faults[fault]);
-            return gs4i_bad_argument(sim, line);
-        }
-        return GS4_OK;
+        GS4I_TRY(gs4i_check3(e, "shape centre", s->a));
+        return gs4i_check(e, "shape radius", s->radius, GS4I_POSITIVE);
+    case GS4_SHAPE_CYLINDER: return gs4i_check_cylinder(e, s);
+    case GS4_SHAPE_PLANE: return gs4i_check_plane(e, s);
+    case GS4_SHAPE_SDF:
+        GS4I_TRY(gs4i_check_box(e, s));
+        return gs4i_require(e, s->distance != NULL, "shape: the distance function is missing");
+    case GS4_SHAPE_MESH: return gs4i_check_mesh(e, memory, s);
     case GS4_SHAPE_NONE: break;
     }
-    return gs4i_bad_argument(sim, "shape is empty: make it with gs4_box, gs4_sphere, gs4_cylinder, "
-                                  "gs4_plane, gs4_sdf or gs4_mesh");
+    return gs4i_require(e, 0,
+                        "shape is empty: make it with gs4_box, gs4_sphere, gs4_cylinder, "
+                        "gs4_plane, gs4_sdf or gs4_mesh");
 }
 
-static int gs4i_check_numerics(gs4_sim *sim, gs4_sim_desc *d)
+/* --- rules of descriptions -------------------------------------------------------------------- */
+
+/* Each of three counts between `least` and `most`. */
+static int gs4i_check_cells(gs4i_error *e, const int cells[3], int least, int most,
+                            const char *accepted)
 {
-    if (d->scheme != GS4_EXPLICIT)
-        return gs4i_bad_argument(
-            sim, "scheme: this version has the explicit scheme only; use GS4_EXPLICIT");
-    if (d->integrator == GS4_INTEGRATOR_BACKWARD_EULER)
-        return gs4i_bad_argument(sim, "integrator: backward Euler belongs to the implicit schemes; "
-                                      "use GS4_INTEGRATOR_GS4 or GS4_INTEGRATOR_SYMPLECTIC_EULER");
-    if (d->integrator != GS4_INTEGRATOR_GS4 && d->integrator != GS4_INTEGRATOR_SYMPLECTIC_EULER)
-        return gs4i_check_absent(sim, "integrator", GS4I_C((int)d->integrator),
-                                 "it is none of gs4_integrator");
-    GS4I_TRY(gs4i_check(sim, "rho_inf", d->rho_inf, GS4I_FRACTION));
-    GS4I_TRY(gs4i_check(sim, "rho_inf_spurious", d->rho_inf_spurious, GS4I_FRACTION));
-    if (d->rho_inf_spurious > d->rho_inf)
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "rho_inf_spurious is ",
-                               (double)d->rho_inf_spurious, "; it must not be above rho_inf");
-    if (d->rho_inf * d->rho_inf_spurious > GS4I_C(0.98))
-        return gs4i_bad_argument(
-            sim, "rho_inf_spurious: with both rho near 1 (Crank-Nicolson) the explicit scheme has "
-                 "no stable step; rho_inf * rho_inf_spurious must not be above 0.98");
-    if (d->integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER) {
-        GS4I_TRY(gs4i_check_absent(sim, "rho_inf", d->rho_inf,
-                                   "symplectic Euler has no such parameter, leave it 0"));
-        if (d->sharp_gradients)
-            return gs4i_bad_argument(sim, "sharp_gradients: symplectic Euler has no use for them, "
-                                          "its error is of first order; leave it 0");
-        GS4I_TRY(gs4i_check_absent(sim, "flip_decay_time", d->flip_decay_time,
-                                   "symplectic Euler carries an affine velocity that the grid sees "
-                                   "whole (APIC), leave it 0"));
-    } else {
-        if (!(d->flip_decay_time >= 0)) /* infinity is welcome */
-            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "flip_decay_time is ",
-                                   (double)d->flip_decay_time,
-                                   "; it must be 0 or above, INFINITY for pure FLIP");
-        if (d->flip_decay_time == 0) d->flip_decay_time = GS4I_C(0.5);
-    }
-    GS4I_TRY(gs4i_check(sim, "cfl", d->cfl, GS4I_FRACTION));
-    GS4I_TRY(gs4i_check(sim, "max_dt", d->max_dt, GS4I_NOT_NEGATIVE));
-    GS4I_TRY(gs4i_check(sim, "solver_tolerance", d->solver_tolerance, GS4I_FRACTION));
-    if (d->solver_max_iterations < 0)
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "solver_max_iterations is ",
-                               d->solver_max_iterations, "; it must be 0 or above");
-    if (d->cfl == 0) d->cfl = GS4I_C(0.5);
-    if (d->solver_tolerance == 0)
-        d->solver_tolerance = sizeof(gs4_real) == 8 ? GS4I_C(1e-6) : GS4I_C(1e-4);
-    if (d->solver_max_iterations == 0) d->solver_max_iterations = 200;
+    GS4I_TRY(gs4i_require_between(e, least, most, "cells[0] is ", cells[0], accepted));
+    GS4I_TRY(gs4i_require_between(e, least, most, "cells[1] is ", cells[1], accepted));
+    return gs4i_require_between(e, least, most, "cells[2] is ", cells[2], accepted);
+}
+
+static int gs4i_check_cell_size(gs4i_error *e, gs4_real h)
+{
+    GS4I_TRY(gs4i_check(e, "cell_size", h, GS4I_POSITIVE));
+    return gs4i_require_value(e, h >= GS4I_C(1e-9) && h <= GS4I_C(1e9), "cell_size is ", (double)h,
+                              "; it must be from 1e-9 to 1e9");
+}
+
+static int gs4i_check_threads(gs4i_error *e, int threads, gs4_parallel_for_fn parallel_for)
+{
+    GS4I_TRY(
+        gs4i_require_between(e, 0, 1024, "threads is ", threads, "; it must be from 0 to 1024"));
+#ifdef GS4_PTHREADS
+    (void)parallel_for;
     return GS4_OK;
-}
-
-static int gs4i_check_walls(gs4_sim *sim, const gs4_sim_desc *d)
-{
-    int w;
-    for (w = 0; w < 6; w++) {
-        if ((int)d->walls[w] < 0 || d->walls[w] > GS4_WALL_PERIODIC)
-            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "walls[] holds ", (int)d->walls[w],
-                                   ", which is none of gs4_wall");
-        if ((d->walls[w] == GS4_WALL_PERIODIC) != (d->walls[w ^ 1] == GS4_WALL_PERIODIC))
-            return gs4i_bad_argument(
-                sim, "walls: both walls of an axis must be GS4_WALL_PERIODIC, or neither");
-        GS4I_TRY(gs4i_check(sim, "wall_temperature", d->wall_temperature[w], GS4I_FINITE));
-        if (d->wall_is_isothermal[w] && d->walls[w] >= GS4_WALL_OPEN)
-            return gs4i_bad_argument(
-                sim, "wall_is_isothermal: an open or periodic wall has no temperature, leave it 0");
-    }
-    if (!(gs4i_abs(d->ambient_temperature) < GS4I_HUGE))
-        return gs4i_fail_value(
-            sim, GS4_ERROR_ARGUMENT, "ambient_temperature is ", (double)d->ambient_temperature,
-            "; give a finite temperature, which viscosity laws see in a scene without heat");
-    return GS4_OK;
-}
-
-/* All of a description; fills in the defaults. */
-static int gs4i_check_desc(gs4_sim *sim, gs4_sim_desc *d)
-{
-    static const char *const cells[3] = { "cells[0] is ", "cells[1] is ", "cells[2] is " };
-    double blocks = 1, origin[3];
-    int a;
-    for (a = 0; a < 3; a++) {
-        if (d->cells[a] < 4 || d->cells[a] > 1 << 22)
-            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, cells[a], d->cells[a],
-                                   "; it must be from 4 to 4194304");
-        blocks *= (d->cells[a] + 3) / 4 + 2;
-    }
-    if (blocks > 1e9) return gs4i_bad_argument(sim, "cells: more than 2^36 cells in all");
-    GS4I_TRY(gs4i_check(sim, "cell_size", d->cell_size, GS4I_POSITIVE));
-    if (d->cell_size < GS4I_C(1e-9) || d->cell_size > GS4I_C(1e9))
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "cell_size is ", (double)d->cell_size,
-                               "; it must be from 1e-9 to 1e9");
-    GS4I_TRY(gs4i_check3(sim, "origin", d->origin));
-    gs4i_to_double(d->origin, origin);
-    for (a = 0; a < 3; a++)
-        if (fabs(origin[a]) + d->cells[a] * (double)d->cell_size
-            > 2e-2 * (double)d->cell_size / (double)GS4I_EPSILON)
-            return gs4i_fail_value(
-                sim, GS4_ERROR_ARGUMENT, "the grid reaches to the coordinate ",
-                fabs(origin[a]) + d->cells[a] * (double)d->cell_size,
-                " from its origin: so far out that positions could not tell a fiftieth of a cell; "
-                "use an origin near 0, fewer cells, or define GS4_DOUBLE");
-    GS4I_TRY(gs4i_check3(sim, "gravity", d->gravity));
-    GS4I_TRY(gs4i_check_numerics(sim, d));
-    GS4I_TRY(gs4i_check_walls(sim, d));
-    if (d->max_particles < 0 || d->max_particles > GS4I_MAX_PARTICLES)
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "max_particles is ", d->max_particles,
-                               "; it must be 0 (grows as needed) or up to 1073741808");
-    if (d->threads < 0 || d->threads > 1024)
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "threads is ", d->threads,
-                               "; it must be from 0 to 1024");
-#ifndef GS4_PTHREADS
-    if (d->threads > 1 && !d->parallel_for)
-        return gs4i_fail_value(
-            sim, GS4_ERROR_ARGUMENT, "threads is ", d->threads,
-            "; more than 1 needs GS4_PTHREADS defined with the implementation, or parallel_for");
+#else
+    return gs4i_require_value(
+        e, threads <= 1 || parallel_for, "threads is ", threads,
+        "; more than 1 needs GS4_PTHREADS defined with the implementation, or parallel_for");
 #endif
-    if (!d->allocator.alloc_fn != !d->allocator.free_fn)
-        return gs4i_bad_argument(sim, "allocator: both functions or neither");
-    if (d->threads == 0) d->threads = 1;
-    return GS4_OK;
 }
 
-/* The non-local part of a liquid: what it needs, and what it must not have. */
-static int gs4i_check_viscoelastic(gs4_sim *sim, const gs4_material *m)
+static int gs4i_check_allocator(gs4i_error *e, const gs4_allocator *a)
 {
-    if (m->liquid < GS4_NEWTONIAN || m->liquid > GS4_POM_POM)
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "liquid is ", (int)m->liquid,
-                               ", which is none of gs4_liquid");
-    GS4I_TRY(gs4i_check(sim, "local_fraction", m->local_fraction, GS4I_FRACTION));
+    return gs4i_require(e, !a->alloc_fn == !a->free_fn, "allocator: both functions or neither");
+}
+
+/* What symplectic Euler has no use for. */
+static int gs4i_check_euler(gs4i_error *e, const gs4_sim_desc *d)
+{
+    GS4I_TRY(gs4i_check_absent(e, "rho_inf", d->rho_inf,
+                               "symplectic Euler has no such parameter, leave it 0"));
+    GS4I_TRY(gs4i_require(e, !d->sharp_gradients,
+                          "sharp_gradients: symplectic Euler has no use for them, its error is of "
+                          "first order; leave it 0"));
+    return gs4i_check_absent(e, "flip_decay_time", d->flip_decay_time,
+                             "symplectic Euler carries an affine velocity that the grid sees whole "
+                             "(APIC), leave it 0");
+}
+
+static int gs4i_check_numerics(gs4i_error *e, const gs4_sim_desc *d)
+{
+    GS4I_TRY(gs4i_require(e, d->scheme == GS4_EXPLICIT,
+                          "scheme: this version has the explicit scheme only; use GS4_EXPLICIT"));
+    GS4I_TRY(gs4i_require(e, d->integrator != GS4_INTEGRATOR_BACKWARD_EULER,
+                          "integrator: backward Euler belongs to the implicit schemes; use "
+                          "GS4_INTEGRATOR_GS4 or GS4_INTEGRATOR_SYMPLECTIC_EULER"));
+    GS4I_TRY(gs4i_require_between(e, GS4_INTEGRATOR_GS4, GS4_INTEGRATOR_SYMPLECTIC_EULER,
+                                  "integrator is ", (int)d->integrator,
+                                  "; it is none of gs4_integrator"));
+    GS4I_TRY(gs4i_check(e, "rho_inf", d->rho_inf, GS4I_FRACTION));
+    GS4I_TRY(gs4i_check(e, "rho_inf_spurious", d->rho_inf_spurious, GS4I_FRACTION));
+    GS4I_TRY(gs4i_require_value(e, d->rho_inf_spurious <= d->rho_inf, "rho_inf_spurious is ",
+                                (double)d->rho_inf_spurious, "; it must not be above rho_inf"));
+    GS4I_TRY(gs4i_require(e, d->rho_inf * d->rho_inf_spurious <= GS4I_C(0.98),
+                          "rho_inf_spurious: with both rho near 1 (Crank-Nicolson) the explicit "
+                          "scheme has no stable step; rho_inf * rho_inf_spurious must not be above "
+                          "0.98"));
+    if (d->integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER) GS4I_TRY(gs4i_check_euler(e, d));
+    GS4I_TRY(gs4i_require_value(e, d->flip_decay_time >= 0, /* infinity is welcome */
+                                "flip_decay_time is ", (double)d->flip_decay_time,
+                                "; it must be 0 or above, INFINITY for pure FLIP"));
+    GS4I_TRY(gs4i_check(e, "cfl", d->cfl, GS4I_FRACTION));
+    GS4I_TRY(gs4i_check(e, "max_dt", d->max_dt, GS4I_NOT_NEGATIVE));
+    GS4I_TRY(gs4i_check(e, "solver_tolerance", d->solver_tolerance, GS4I_FRACTION));
+    return gs4i_require_value(e, d->solver_max_iterations >= 0, "solver_max_iterations is ",
+                              d->solver_max_iterations, "; it must be 0 or above");
+}
+
+static int gs4i_check_wall(gs4i_error *e, const gs4_sim_desc *d, int w)
+{
+    GS4I_TRY(gs4i_require_between(e, 0, GS4_WALL_PERIODIC, "walls[] holds ", (int)d->walls[w],
+                                  ", which is none of gs4_wall"));
+    GS4I_TRY(gs4i_require(
+        e, (d->walls[w] == GS4_WALL_PERIODIC) == (d->walls[w ^ 1] == GS4_WALL_PERIODIC),
+        "walls: both walls of an axis must be GS4_WALL_PERIODIC, or neither"));
+    GS4I_TRY(gs4i_check(e, "wall_temperature", d->wall_temperature[w], GS4I_FINITE));
+    return gs4i_require(
+        e, !d->wall_is_isothermal[w] || d->walls[w] < GS4_WALL_OPEN,
+        "wall_is_isothermal: an open or periodic wall has no temperature, leave it 0");
+}
+
+/* Positions must tell a fiftieth of a cell everywhere: 0.02 h is at least an ulp of the farthest
+ * coordinate. */
+static int gs4i_check_extent(gs4i_error *e, double origin, int cells, double h)
+{
+    const double farthest = fabs(origin) + cells * h;
+    return gs4i_require_value(
+        e, farthest <= 2e-2 * h / (double)GS4I_EPSILON, "the grid reaches to the coordinate ",
+        farthest,
+        " from its origin: so far out that positions could not tell a fiftieth of a cell; use an "
+        "origin near 0, fewer cells, or define GS4_DOUBLE");
+}
+
+static int gs4i_check_desc(gs4i_error *e, const gs4_sim_desc *d)
+{
+    double blocks = 1, origin[3];
+    int i;
+    GS4I_TRY(gs4i_check_cells(e, d->cells, 4, 1 << 22, "; it must be from 4 to 4194304"));
+    for (i = 0; i < 3; i++) blocks *= (d->cells[i] + 3) / 4 + 2;
+    GS4I_TRY(gs4i_require(e, blocks <= 1e9, "cells: more than 2^36 cells in all"));
+    GS4I_TRY(gs4i_check_cell_size(e, d->cell_size));
+    GS4I_TRY(gs4i_check3(e, "origin", d->origin));
+    gs4i_to_double(d->origin, origin);
+    for (i = 0; i < 3; i++)
+        GS4I_TRY(gs4i_check_extent(e, origin[i], d->cells[i], (double)d->cell_size));
+    GS4I_TRY(gs4i_check3(e, "gravity", d->gravity));
+    GS4I_TRY(gs4i_check_numerics(e, d));
+    for (i = 0; i < 6; i++) GS4I_TRY(gs4i_check_wall(e, d, i));
+    GS4I_TRY(gs4i_require_value(
+        e, gs4i_abs(d->ambient_temperature) < GS4I_HUGE, "ambient_temperature is ",
+        (double)d->ambient_temperature,
+        "; give a finite temperature, which viscosity laws see in a scene without heat"));
+    GS4I_TRY(gs4i_require_between(e, 0, GS4I_MAX_PARTICLES, "max_particles is ", d->max_particles,
+                                  "; it must be 0 (grows as needed) or up to 1073741808"));
+    GS4I_TRY(gs4i_check_threads(e, d->threads, d->parallel_for));
+    return gs4i_check_allocator(e, &d->allocator);
+}
+
+/* --- rules of materials ----------------------------------------------------------------------- */
+
+/* What a material is checked against: the scene it comes into. */
+typedef struct gs4i_scene {
+    gs4_real cell_size, temperature; /* m; of the air */
+    int is_deconvolved, has_heat;
+    const gs4i_material_constants *materials; /* that are there already */
+    int count;
+} gs4i_scene;
+
+static gs4i_scene gs4i_scene_of(const gs4_sim *sim)
+{
+    gs4i_scene s;
+    s.cell_size = sim->grid.h;
+    s.temperature = sim->desc.ambient_temperature;
+    s.is_deconvolved = sim->desc.sharp_gradients;
+    s.has_heat = sim->particles.with_heat;
+    s.materials = sim->constants;
+    s.count = sim->material_count;
+    return s;
+}
+
+#define GS4I_NO_POM_POM "only liquid GS4_POM_POM has one, leave it 0"
+
+/* Of the non-local part of a liquid. */
+static int gs4i_check_viscoelastic(gs4i_error *e, const gs4_material *m)
+{
+    GS4I_TRY(gs4i_require_between(e, GS4_NEWTONIAN, GS4_POM_POM, "liquid is ", (int)m->liquid,
+                                  ", which is none of gs4_liquid"));
+    GS4I_TRY(gs4i_check(e, "local_fraction", m->local_fraction, GS4I_FRACTION));
     if (m->liquid == GS4_NEWTONIAN)
-        GS4I_TRY(gs4i_check_absent(sim, "relaxation_time", m->relaxation_time,
+        GS4I_TRY(gs4i_check_absent(e, "relaxation_time", m->relaxation_time,
                                    "a Newtonian liquid has none, leave it 0"));
     else {
-        if (m->relaxation_time == 0)
-            return gs4i_bad_argument(
-                sim, "relaxation_time is 0; a viscoelastic liquid needs one above 0");
-        GS4I_TRY(gs4i_check(sim, "relaxation_time", m->relaxation_time, GS4I_POSITIVE));
-        if (!((double)m->viscosity / (double)m->relaxation_time < (double)GS4I_HUGE))
-            return gs4i_fail_value(
-                sim, GS4_ERROR_ARGUMENT, "relaxation_time is ", (double)m->relaxation_time,
-                "; the modulus (1 - local_fraction) viscosity / relaxation_time is absurdly large");
+        GS4I_TRY(gs4i_require(e, m->relaxation_time != 0,
+                              "relaxation_time is 0; a viscoelastic liquid needs one above 0"));
+        GS4I_TRY(gs4i_check(e, "relaxation_time", m->relaxation_time, GS4I_POSITIVE));
+        GS4I_TRY(gs4i_require_value(
+            e, (double)m->viscosity / (double)m->relaxation_time < (double)GS4I_HUGE,
+            "relaxation_time is ", (double)m->relaxation_time,
+            "; the modulus (1 - local_fraction) viscosity / relaxation_time is absurdly large"));
     }
     if (m->liquid != GS4_POM_POM) {
-        GS4I_TRY(gs4i_check_absent(sim, "stretch_time", m->stretch_time,
-                                   "only liquid GS4_POM_POM has one, leave it 0"));
-        GS4I_TRY(gs4i_check_absent(sim, "anisotropy", m->anisotropy,
-                                   "only liquid GS4_POM_POM has one, leave it 0"));
-        return gs4i_check_absent(sim, "arms", m->arms,
+        GS4I_TRY(gs4i_check_absent(e, "stretch_time", m->stretch_time, GS4I_NO_POM_POM));
+        GS4I_TRY(gs4i_check_absent(e, "anisotropy", m->anisotropy, GS4I_NO_POM_POM));
+        return gs4i_check_absent(e, "arms", m->arms,
                                  "only liquid GS4_POM_POM has some, leave it 0");
     }
-    GS4I_TRY(gs4i_check(sim, "stretch_time", m->stretch_time, GS4I_POSITIVE));
-    GS4I_TRY(gs4i_check(sim, "anisotropy", m->anisotropy, GS4I_NOT_NEGATIVE));
-    if (m->anisotropy > GS4I_C(1e6))
-        return gs4i_fail_value(
-            sim, GS4_ERROR_ARGUMENT, "anisotropy is ", (double)m->anisotropy,
-            "; it must be up to 1e6: beyond, rounding alone stretches the pom-poms");
-    GS4I_TRY(gs4i_check(sim, "arms", m->arms, GS4I_POSITIVE));
-    if (m->arms < 1)
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "arms is ", (double)m->arms,
-                               "; a pom-pom has 1 or more");
-    return GS4_OK;
+    GS4I_TRY(gs4i_check(e, "stretch_time", m->stretch_time, GS4I_POSITIVE));
+    GS4I_TRY(gs4i_check(e, "anisotropy", m->anisotropy, GS4I_NOT_NEGATIVE));
+    GS4I_TRY(gs4i_require_value(
+        e, m->anisotropy <= GS4I_C(1e6), "anisotropy is ", (double)m->anisotropy,
+        "; it must be up to 1e6: beyond, rounding alone stretches the pom-poms"));
+    GS4I_TRY(gs4i_check(e, "arms", m->arms, GS4I_POSITIVE));
+    return gs4i_require_value(e, m->arms >= 1, "arms is ", (double)m->arms,
+                              "; a pom-pom has 1 or more");
 }
 
-/* A solid: what it needs. Without heat it never melts, so that a liquid phase other than plain
- * damping has no meaning. */
-static int gs4i_check_solid(gs4_sim *sim, const gs4_material *m)
+#define GS4I_NO_SOLID_PHASE "a liquid has none, leave it 0 or choose a solid"
+
+static int gs4i_check_solid(gs4i_error *e, const gs4i_scene *scene, const gs4_material *m)
 {
-    if (m->solid < GS4_NO_SOLID || m->solid > GS4_FIXED_COROTATED)
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "solid is ", (int)m->solid,
-                               ", which is none of gs4_solid");
+    GS4I_TRY(gs4i_require_between(e, GS4_NO_SOLID, GS4_FIXED_COROTATED, "solid is ", (int)m->solid,
+                                  ", which is none of gs4_solid"));
     if (m->solid == GS4_NO_SOLID) {
-        GS4I_TRY(gs4i_check_absent(sim, "shear_modulus", m->shear_modulus,
-                                   "a liquid has none, leave it 0 or choose a solid"));
-        GS4I_TRY(gs4i_check_absent(sim, "yield_compression", m->yield_compression,
-                                   "a liquid has none, leave it 0 or choose a solid"));
-        return gs4i_check_absent(sim, "yield_stretch", m->yield_stretch,
-                                 "a liquid has none, leave it 0 or choose a solid");
+        GS4I_TRY(gs4i_check_absent(e, "shear_modulus", m->shear_modulus, GS4I_NO_SOLID_PHASE));
+        GS4I_TRY(
+            gs4i_check_absent(e, "yield_compression", m->yield_compression, GS4I_NO_SOLID_PHASE));
+        return gs4i_check_absent(e, "yield_stretch", m->yield_stretch, GS4I_NO_SOLID_PHASE);
     }
-    if (sim->desc.sharp_gradients)
-        return gs4i_bad_argument(
-            sim, "solid: with sharp_gradients solids would lose energy at their surfaces; leave "
-                 "that field of gs4_sim_desc 0 where there are solids");
-    if (m->shear_modulus == 0)
-        return gs4i_bad_argument(sim, "shear_modulus is 0; a solid needs one above 0");
-    GS4I_TRY(gs4i_check(sim, "shear_modulus", m->shear_modulus, GS4I_POSITIVE));
-    GS4I_TRY(gs4i_check(sim, "yield_compression", m->yield_compression, GS4I_NOT_NEGATIVE));
-    if (m->yield_compression >= 1)
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "yield_compression is ",
-                               (double)m->yield_compression, "; it must be below 1, 0 for none");
-    GS4I_TRY(gs4i_check(sim, "yield_stretch", m->yield_stretch, GS4I_NOT_NEGATIVE));
-    if (m->liquid != GS4_NEWTONIAN && !m->can_melt)
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "liquid is ", (int)m->liquid,
-                               "; a solid that does not melt has no liquid phase, use "
-                               "GS4_NEWTONIAN (its viscosity damps the solid)");
-    return GS4_OK;
-}
-
-/* In a scene without heat the viscosity at the temperature of the air, at rest and far from it,
- * must be a number. */
-static int gs4i_check_cross_wlf(gs4_sim *sim, const gs4_material *m, int at_ambient)
-{
-    gs4i_material_constants l;
-    int i;
-    for (i = 0; i < 6; i++) {
-        static const char *const names[6] = { "cross_wlf.a",  "cross_wlf.n",  "cross_wlf.d1",
-                                              "cross_wlf.a1", "cross_wlf.t1", "cross_wlf.t2" };
-        const gs4_real values[6] = { m->cross_wlf.a,  m->cross_wlf.n,  m->cross_wlf.d1,
-                                     m->cross_wlf.a1, m->cross_wlf.t1, m->cross_wlf.t2 };
-        GS4I_TRY(gs4i_check(sim, names[i], values[i],
-                            i == 0 || i == 2 ? GS4I_NOT_NEGATIVE : GS4I_FINITE));
-    }
-    memset(&l, 0, sizeof l);
-    l.is = *m;
-    gs4i_set_material_constants(&l, sim->desc.ambient_temperature);
-    for (i = -6; i <= 6 && at_ambient; i += 2) {
-        const gs4_real mu = gs4i_cross_wlf(&l.is, l.temperature, GS4I_C(pow(10, i)));
-        if (!(mu >= 0 && mu < GS4I_HUGE))
-            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT,
-                                   "cross_wlf gives no finite viscosity at ambient_temperature ",
-                                   (double)l.temperature,
-                                   "; other constants would, or a temperature well above t2");
-    }
-    return GS4_OK;
+    GS4I_TRY(gs4i_require(e, !scene->is_deconvolved,
+                          "solid: with sharp_gradients solids would lose energy at their surfaces; "
+                          "leave that field of gs4_sim_desc 0 where there are solids"));
+    GS4I_TRY(
+        gs4i_require(e, m->shear_modulus != 0, "shear_modulus is 0; a solid needs one above 0"));
+    GS4I_TRY(gs4i_check(e, "shear_modulus", m->shear_modulus, GS4I_POSITIVE));
+    GS4I_TRY(gs4i_check(e, "yield_compression", m->yield_compression, GS4I_NOT_NEGATIVE));
+    GS4I_TRY(gs4i_require_value(e, m->yield_compression < 1, "yield_compression is ",
+                                (double)m->yield_compression, "; it must be below 1, 0 for none"));
+    GS4I_TRY(gs4i_check(e, "yield_stretch", m->yield_stretch, GS4I_NOT_NEGATIVE));
+    return gs4i_require_value(e, m->liquid == GS4_NEWTONIAN || m->can_melt, "liquid is ",
+                              (int)m->liquid,
+                              "; a solid that does not melt has no liquid phase, use GS4_NEWTONIAN "
+                              "(its viscosity damps the solid)");
 }
 
 /* A scene carries heat from the first material on that conducts it, melts or is heated by
@@ -13172,125 +13187,195 @@ static int gs4i_has_heat(const gs4_material *m)
     return m->conductivity > 0 || m->can_melt || m->viscous_heating;
 }
 
-static int gs4i_check_heat(gs4_sim *sim, const gs4_material *m)
+/* In a scene without heat the viscosity at the temperature of the air must be a number at shear
+ * rates from 1e-6 to 1e6 /s. */
+static int gs4i_check_cross_wlf(gs4i_error *e, const gs4i_scene *scene, const gs4_material *m)
 {
+    static const char *const names[6] = { "cross_wlf.a",  "cross_wlf.n",  "cross_wlf.d1",
+                                          "cross_wlf.a1", "cross_wlf.t1", "cross_wlf.t2" };
+    const gs4_real values[6] = { m->cross_wlf.a,  m->cross_wlf.n,  m->cross_wlf.d1,
+                                 m->cross_wlf.a1, m->cross_wlf.t1, m->cross_wlf.t2 };
+    gs4i_material_constants l;
     int i;
-    GS4I_TRY(gs4i_check(sim, "heat_capacity", m->heat_capacity, GS4I_NOT_NEGATIVE));
-    GS4I_TRY(gs4i_check(sim, "conductivity", m->conductivity, GS4I_NOT_NEGATIVE));
-    GS4I_TRY(gs4i_check(sim, "flux_relaxation_time", m->flux_relaxation_time, GS4I_NOT_NEGATIVE));
-    GS4I_TRY(gs4i_check(sim, "fourier_fraction", m->fourier_fraction, GS4I_FRACTION));
-    GS4I_TRY(gs4i_check(sim, "melting_temperature", m->melting_temperature, GS4I_FINITE));
-    GS4I_TRY(gs4i_check(sim, "latent_heat", m->latent_heat, GS4I_NOT_NEGATIVE));
-    if (m->heat_capacity > 0
-        && (m->heat_capacity < GS4I_C(1e-9) || m->heat_capacity > GS4I_C(1e12)))
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "heat_capacity is ",
-                               (double)m->heat_capacity,
-                               "; it must be 0 (no heat) or from 1e-9 to 1e12 J/(kg K)");
-    if (m->conductivity > 0 && (m->conductivity < GS4I_C(1e-12) || m->conductivity > GS4I_C(1e12)))
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "conductivity is ", (double)m->conductivity,
-                               "; it must be 0 (insulating) or from 1e-12 to 1e12 W/(m K)");
-    if (m->flux_relaxation_time > 0
-        && (m->flux_relaxation_time < GS4I_C(1e-15) || m->flux_relaxation_time > GS4I_C(1e15)))
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "flux_relaxation_time is ",
-                               (double)m->flux_relaxation_time,
-                               "; it must be 0 (Fourier) or from 1e-15 to 1e15 s");
-    if (m->heat_capacity == 0 && (gs4i_has_heat(m) || sim->particles.with_heat))
-        return gs4i_bad_argument(
-            sim,
-            "heat_capacity is 0; every material of a scene with heat needs one above 0, J/(kg K)");
-    for (i = 0; i < sim->material_count && gs4i_has_heat(m); i++)
-        if (sim->constants[i].is.heat_capacity == 0)
-            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "heat_capacity of material ", i,
-                                   " is 0; with this material the scene has heat, and every "
-                                   "material needs one above 0");
-    if (m->flux_relaxation_time > 0 && m->conductivity == 0)
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "flux_relaxation_time is ",
-                               (double)m->flux_relaxation_time,
-                               "; without conductivity there is no flux, leave it 0");
-    if (!m->can_melt) {
-        GS4I_TRY(gs4i_check_absent(sim, "latent_heat", m->latent_heat,
-                                   "only a material that can_melt has one, leave it 0"));
-        return gs4i_check_absent(sim, "melting_temperature", m->melting_temperature,
-                                 "only a material that can_melt has one, leave it 0");
+    for (i = 0; i < 6 && m->viscosity_law != GS4_VISCOSITY_CROSS_WLF; i++)
+        GS4I_TRY(gs4i_check_absent(
+            e, "cross_wlf", values[i],
+            "only viscosity_law GS4_VISCOSITY_CROSS_WLF has constants, leave it 0"));
+    if (m->viscosity_law != GS4_VISCOSITY_CROSS_WLF) return GS4_OK;
+    for (i = 0; i < 6; i++)
+        GS4I_TRY(
+            gs4i_check(e, names[i], values[i], i == 0 || i == 2 ? GS4I_NOT_NEGATIVE : GS4I_FINITE));
+    if (gs4i_has_heat(m) || scene->has_heat) return GS4_OK;
+    memset(&l, 0, sizeof l);
+    l.is = *m;
+    gs4i_set_material_constants(&l, scene->temperature);
+    for (i = -6; i <= 6; i += 2) {
+        const gs4_real mu = gs4i_cross_wlf(&l.is, l.temperature, GS4I_C(pow(10, i)));
+        GS4I_TRY(gs4i_require_value(e, mu >= 0 && mu < GS4I_HUGE,
+                                    "cross_wlf gives no finite viscosity at ambient_temperature ",
+                                    (double)l.temperature,
+                                    "; other constants would, or a temperature well above t2"));
     }
-    if (!((double)m->latent_heat / (double)m->heat_capacity < (double)GS4I_HUGE))
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "latent_heat is ", (double)m->latent_heat,
-                               "; over heat_capacity it is absurdly large");
     return GS4_OK;
 }
 
-static int gs4i_check_material(gs4_sim *sim, const gs4_material *m)
+/* 0, or a number between `low` and `high`. */
+static int gs4i_check_heat_range(gs4i_error *e, gs4_real value, double low, double high,
+                                 const char *before, const char *after)
 {
-    int i;
-    GS4I_TRY(gs4i_check(sim, "density", m->density, GS4I_POSITIVE));
-    GS4I_TRY(gs4i_check(sim, "viscosity", m->viscosity, GS4I_NOT_NEGATIVE));
-    GS4I_TRY(gs4i_check_viscoelastic(sim, m));
-    GS4I_TRY(gs4i_check_solid(sim, m));
-    if (m->viscosity_law != GS4_VISCOSITY_CROSS_WLF)
-        for (i = 0; i < 6; i++) {
-            const gs4_real *constants[6] = { &m->cross_wlf.a,  &m->cross_wlf.n,  &m->cross_wlf.d1,
-                                             &m->cross_wlf.a1, &m->cross_wlf.t1, &m->cross_wlf.t2 };
-            GS4I_TRY(gs4i_check_absent(
-                sim, "cross_wlf", *constants[i],
-                "only viscosity_law GS4_VISCOSITY_CROSS_WLF has constants, leave it 0"));
-        }
-    else
-        GS4I_TRY(gs4i_check_cross_wlf(sim, m, !gs4i_has_heat(m) && !sim->particles.with_heat));
-    if (m->viscosity_law == GS4_VISCOSITY_CALLBACK && !m->viscosity_fn)
-        return gs4i_bad_argument(sim, "viscosity_fn is missing; GS4_VISCOSITY_CALLBACK needs it");
-    if (m->viscosity_law < GS4_VISCOSITY_CONSTANT || m->viscosity_law > GS4_VISCOSITY_CALLBACK)
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "viscosity_law is ", (int)m->viscosity_law,
-                               ", which is none of gs4_viscosity_law");
-    GS4I_TRY(gs4i_check(sim, "bulk_modulus", m->bulk_modulus, GS4I_NOT_NEGATIVE));
-    GS4I_TRY(gs4i_check(sim, "sound_speed", m->sound_speed, GS4I_NOT_NEGATIVE));
-    if (m->bulk_modulus > 0 && m->sound_speed > 0) {
-        const double k = (double)m->density * (double)m->sound_speed * (double)m->sound_speed;
-        if (fabs(k - (double)m->bulk_modulus) > 1e-3 * k)
-            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "bulk_modulus is ",
-                                   (double)m->bulk_modulus,
-                                   ", which is not density * sound_speed^2; give one of the two");
-    }
-    /* mass and stiffness of a cell must be numbers that leave room */
-    {
-        const double h = (double)sim->grid.h,
-                     c = (double)(m->sound_speed > 1 ? m->sound_speed : GS4I_C(1));
-        const double mass = (double)m->density * h * h * h,
-                     room = 1e-4 / (double)(GS4I_TINY * GS4I_HUGE);
-        if (!(1e6 * (double)m->shear_modulus < (double)GS4I_HUGE
-              && (double)m->shear_modulus * h * h * h < room * (double)GS4I_HUGE))
-            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "shear_modulus is ",
-                                   (double)m->shear_modulus,
-                                   "; with this cell_size the stiffness of a cell is beyond "
-                                   "gs4_real; use other units, or define GS4_DOUBLE");
-        if (!(mass < (double)GS4I_HUGE * 1e4 && mass * c * c < room * (double)GS4I_HUGE
-              && mass > 64 * (double)GS4I_TINY / (double)GS4I_EPSILON))
-            return gs4i_fail_value(
-                sim, GS4_ERROR_ARGUMENT, "density is ", (double)m->density,
-                "; with this cell_size and sound_speed the mass or the stiffness of a cell is "
-                "beyond gs4_real; use other units, or define GS4_DOUBLE");
-    }
-    GS4I_TRY(gs4i_check_absent(sim, "incompressible", GS4I_C(m->incompressible),
-                               "the explicit scheme is weakly compressible, leave it 0"));
-    return gs4i_check_heat(sim, m);
+    return gs4i_require_value(e, value == 0 || (value >= GS4I_C(low) && value <= GS4I_C(high)),
+                              before, (double)value, after);
 }
 
+/* Every material of a scene with heat has a heat capacity. */
+static int gs4i_check_capacities(gs4i_error *e, const gs4i_scene *scene, const gs4_material *m)
+{
+    int i;
+    GS4I_TRY(gs4i_require(
+        e, m->heat_capacity > 0 || !(gs4i_has_heat(m) || scene->has_heat),
+        "heat_capacity is 0; every material of a scene with heat needs one above 0, J/(kg K)"));
+    for (i = 0; i < scene->count && gs4i_has_heat(m); i++)
+        GS4I_TRY(gs4i_require_value(
+            e, scene->materials[i].is.heat_capacity > 0, "heat_capacity of material ", i,
+            " is 0; with this material the scene has heat, and every material needs one above 0"));
+    return GS4_OK;
+}
+
+#define GS4I_NEVER_MELTS "only a material that can_melt has one, leave it 0"
+
+static int gs4i_check_heat(gs4i_error *e, const gs4i_scene *scene, const gs4_material *m)
+{
+    GS4I_TRY(gs4i_check(e, "heat_capacity", m->heat_capacity, GS4I_NOT_NEGATIVE));
+    GS4I_TRY(gs4i_check(e, "conductivity", m->conductivity, GS4I_NOT_NEGATIVE));
+    GS4I_TRY(gs4i_check(e, "flux_relaxation_time", m->flux_relaxation_time, GS4I_NOT_NEGATIVE));
+    GS4I_TRY(gs4i_check(e, "fourier_fraction", m->fourier_fraction, GS4I_FRACTION));
+    GS4I_TRY(gs4i_check(e, "melting_temperature", m->melting_temperature, GS4I_FINITE));
+    GS4I_TRY(gs4i_check(e, "latent_heat", m->latent_heat, GS4I_NOT_NEGATIVE));
+    GS4I_TRY(gs4i_check_heat_range(e, m->heat_capacity, 1e-9, 1e12, "heat_capacity is ",
+                                   "; it must be 0 (no heat) or from 1e-9 to 1e12 J/(kg K)"));
+    GS4I_TRY(gs4i_check_heat_range(e, m->conductivity, 1e-12, 1e12, "conductivity is ",
+                                   "; it must be 0 (insulating) or from 1e-12 to 1e12 W/(m K)"));
+    GS4I_TRY(gs4i_check_heat_range(e, m->flux_relaxation_time, 1e-15, 1e15,
+                                   "flux_relaxation_time is ",
+                                   "; it must be 0 (Fourier) or from 1e-15 to 1e15 s"));
+    GS4I_TRY(gs4i_check_capacities(e, scene, m));
+    GS4I_TRY(gs4i_require_value(e, m->flux_relaxation_time == 0 || m->conductivity > 0,
+                                "flux_relaxation_time is ", (double)m->flux_relaxation_time,
+                                "; without conductivity there is no flux, leave it 0"));
+    if (!m->can_melt) {
+        GS4I_TRY(gs4i_check_absent(e, "latent_heat", m->latent_heat, GS4I_NEVER_MELTS));
+        return gs4i_check_absent(e, "melting_temperature", m->melting_temperature,
+                                 GS4I_NEVER_MELTS);
+    }
+    return gs4i_require_value(
+        e, (double)m->latent_heat / (double)m->heat_capacity < (double)GS4I_HUGE, "latent_heat is ",
+        (double)m->latent_heat, "; over heat_capacity it is absurdly large");
+}
+
+/* Mass and stiffness of a cell must be numbers that leave gs4_real some room: for sums over a
+ * neighbourhood, for J^-7 at 1/16, and for nodes with an epsilon of the mass of a cell. */
+static int gs4i_check_scales(gs4i_error *e, gs4_real cell_size, const gs4_material *m)
+{
+    const double h = (double)cell_size, volume = h * h * h, mass = (double)m->density * volume,
+                 c = fmax((double)m->sound_speed, 1), huge = (double)GS4I_HUGE,
+                 room = 1e-4 / (double)(GS4I_TINY * GS4I_HUGE);
+    GS4I_TRY(gs4i_require_value(
+        e,
+        1e6 * (double)m->shear_modulus < huge && (double)m->shear_modulus * h * h * h < room * huge,
+        "shear_modulus is ", (double)m->shear_modulus,
+        "; with this cell_size the stiffness of a cell is beyond gs4_real; use other units, or "
+        "define GS4_DOUBLE"));
+    return gs4i_require_value(
+        e,
+        mass < huge * 1e4 && mass * c * c < room * huge
+            && mass > 64 * (double)GS4I_TINY / (double)GS4I_EPSILON,
+        "density is ", (double)m->density,
+        "; with this cell_size and sound_speed the mass or the stiffness of a cell is beyond "
+        "gs4_real; use other units, or define GS4_DOUBLE");
+}
+
+static int gs4i_check_material(gs4i_error *e, const gs4i_scene *scene, const gs4_material *m)
+{
+    const double K = (double)m->density * (double)m->sound_speed * (double)m->sound_speed;
+    GS4I_TRY(gs4i_check(e, "density", m->density, GS4I_POSITIVE));
+    GS4I_TRY(gs4i_check(e, "viscosity", m->viscosity, GS4I_NOT_NEGATIVE));
+    GS4I_TRY(gs4i_check_viscoelastic(e, m));
+    GS4I_TRY(gs4i_check_solid(e, scene, m));
+    GS4I_TRY(gs4i_check_cross_wlf(e, scene, m));
+    GS4I_TRY(gs4i_require(e, m->viscosity_law != GS4_VISCOSITY_CALLBACK || m->viscosity_fn,
+                          "viscosity_fn is missing; GS4_VISCOSITY_CALLBACK needs it"));
+    GS4I_TRY(gs4i_require_between(e, GS4_VISCOSITY_CONSTANT, GS4_VISCOSITY_CALLBACK,
+                                  "viscosity_law is ", (int)m->viscosity_law,
+                                  ", which is none of gs4_viscosity_law"));
+    GS4I_TRY(gs4i_check(e, "bulk_modulus", m->bulk_modulus, GS4I_NOT_NEGATIVE));
+    GS4I_TRY(gs4i_check(e, "sound_speed", m->sound_speed, GS4I_NOT_NEGATIVE));
+    GS4I_TRY(gs4i_require_value(e,
+                                !(m->bulk_modulus > 0 && m->sound_speed > 0)
+                                    || fabs(K - (double)m->bulk_modulus) <= 1e-3 * K,
+                                "bulk_modulus is ", (double)m->bulk_modulus,
+                                ", which is not density * sound_speed^2; give one of the two"));
+    GS4I_TRY(gs4i_check_scales(e, scene->cell_size, m));
+    GS4I_TRY(gs4i_check_absent(e, "incompressible", GS4I_C(m->incompressible),
+                               "the explicit scheme is weakly compressible, leave it 0"));
+    return gs4i_check_heat(e, scene, m);
+}
+
+/* --- rules of fillings, colliders and emitters ------------------------------------------------ */
+
+#define GS4I_NO_HEAT                                                                               \
+    "no material so far conducts heat, melts or is heated by viscosity: add that material first, " \
+    "or leave it 0"
+
+/* Fills in the default spacing, half a cell. */
 static int gs4i_check_fill(gs4_sim *sim, gs4_fill *f)
 {
-    GS4I_TRY(gs4i_check_id(sim, "fill.material", f->material, sim->material_count));
-    GS4I_TRY(gs4i_check(sim, "fill.spacing", f->spacing, GS4I_NOT_NEGATIVE));
+    gs4i_error *e = &sim->error;
+    GS4I_TRY(gs4i_check_id(e, "fill.material", f->material, sim->material_count));
+    GS4I_TRY(gs4i_check(e, "fill.spacing", f->spacing, GS4I_NOT_NEGATIVE));
     if (f->spacing == 0) f->spacing = GS4I_C(0.5) * sim->grid.h;
-    if (f->spacing > sim->grid.h)
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "fill.spacing is ", (double)f->spacing,
-                               "; above one cell there would be holes in the material");
-    if (f->spacing < GS4I_C(0.02) * sim->grid.h)
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "fill.spacing is ", (double)f->spacing,
-                               "; below a fiftieth of a cell it is absurdly small");
-    GS4I_TRY(gs4i_check3(sim, "fill.velocity", f->velocity));
-    GS4I_TRY(gs4i_check3(sim, "fill.angular_velocity", f->angular_velocity));
-    GS4I_TRY(gs4i_check(sim, "fill.temperature", f->temperature, GS4I_FINITE));
+    GS4I_TRY(gs4i_require_value(e, f->spacing <= sim->grid.h, "fill.spacing is ",
+                                (double)f->spacing,
+                                "; above one cell there would be holes in the material"));
+    GS4I_TRY(gs4i_require_value(e, f->spacing >= GS4I_C(0.02) * sim->grid.h, "fill.spacing is ",
+                                (double)f->spacing,
+                                "; below a fiftieth of a cell it is absurdly small"));
+    GS4I_TRY(gs4i_check3(e, "fill.velocity", f->velocity));
+    GS4I_TRY(gs4i_check3(e, "fill.angular_velocity", f->angular_velocity));
+    GS4I_TRY(gs4i_check(e, "fill.temperature", f->temperature, GS4I_FINITE));
     if (!sim->particles.with_heat)
-        GS4I_TRY(gs4i_check_absent(sim, "fill.temperature", f->temperature, GS4I_NO_HEAT));
-    return gs4i_check(sim, "fill.jitter", f->jitter, GS4I_FRACTION);
+        GS4I_TRY(gs4i_check_absent(e, "fill.temperature", f->temperature, GS4I_NO_HEAT));
+    return gs4i_check(e, "fill.jitter", f->jitter, GS4I_FRACTION);
+}
+
+static int gs4i_check_collider(gs4_sim *sim, gs4_collider *c)
+{
+    gs4i_error *e = &sim->error;
+    GS4I_TRY(gs4i_check_shape(e, &sim->memory, &c->shape));
+    GS4I_TRY(gs4i_require(e, (int)c->contact >= 0 && c->contact <= GS4_WALL_SEPARATE,
+                          "contact of a collider must be stick, slip or separate"));
+    GS4I_TRY(gs4i_check(e, "friction", c->friction, GS4I_NOT_NEGATIVE));
+    GS4I_TRY(gs4i_require(e, c->friction == 0 || c->contact == GS4_WALL_SEPARATE,
+                          "friction is for contact GS4_WALL_SEPARATE, leave it 0"));
+    GS4I_TRY(gs4i_check3(e, "velocity", c->velocity));
+    GS4I_TRY(gs4i_check3(e, "angular_velocity", c->angular_velocity));
+    GS4I_TRY(gs4i_check3(e, "pivot", c->pivot));
+    return gs4i_check(e, "temperature", c->temperature, GS4I_FINITE);
+}
+
+static int gs4i_check_emitter(gs4_sim *sim, gs4_emitter *m)
+{
+    gs4i_error *e = &sim->error;
+    GS4I_TRY(gs4i_check_shape(e, &sim->memory, &m->shape));
+    GS4I_TRY(gs4i_require(e, m->shape.kind != GS4_SHAPE_PLANE,
+                          "shape: a plane has no volume to emit from"));
+    GS4I_TRY(gs4i_check_fill(sim, &m->fill));
+    GS4I_TRY(gs4i_require(e, !(gs4i_length(m->fill.angular_velocity) > 0),
+                          "fill.angular_velocity: a nozzle does not spin, leave it 0"));
+    GS4I_TRY(gs4i_check3(e, "travel", m->travel));
+    GS4I_TRY(gs4i_check(e, "start", m->start, GS4I_NOT_NEGATIVE));
+    GS4I_TRY(gs4i_check(e, "stop", m->stop, GS4I_NOT_NEGATIVE));
+    return gs4i_require(e, m->stop == 0 || m->stop > m->start,
+                        "stop must be later than start, or 0 for never");
 }
 
 /* --- sound speed where none is given ---------------------------------------------------------- */
@@ -13349,8 +13434,28 @@ static void gs4i_note_speed(gs4_sim *sim, gs4_real speed)
 #else
 #define GS4I_THREAD_LOCAL
 #endif
-/* The one thing outside of simulations: why the last gs4_create of this thread failed. */
-static GS4I_THREAD_LOCAL char gs4i_create_error[320];
+/* The one thing outside of simulations: why the last call without one failed on this thread. */
+static GS4I_THREAD_LOCAL char gs4i_last_error[sizeof((gs4i_error *)0)->text];
+
+#define GS4I_DEFAULT_TOLERANCE (sizeof(gs4_real) == 8 ? GS4I_C(1e-6) : GS4I_C(1e-4))
+#define GS4I_DEFAULT_ITERATIONS 200
+
+static int gs4i_start_tasks(gs4i_memory *memory, gs4i_tasks *tasks, int threads,
+                            gs4_parallel_for_fn parallel_for, void *user)
+{
+    tasks->parallel_for = parallel_for;
+    tasks->user = user;
+#ifdef GS4_PTHREADS
+    if (threads > 1 && !parallel_for) {
+        tasks->pool = gs4i_pool_create(memory, threads - 1);
+        if (!tasks->pool) return GS4_ERROR_MEMORY;
+    }
+#else
+    (void)memory;
+    (void)threads;
+#endif
+    return GS4_OK;
+}
 
 static int gs4i_init(gs4_sim *sim)
 {
@@ -13373,62 +13478,85 @@ static int gs4i_init(gs4_sim *sim)
     sim->particles.with_rates = d->integrator == GS4_INTEGRATOR_GS4;
     sim->particles.with_subgrid = sim->particles.with_rates && gs4i_finite(d->flip_decay_time);
     sim->restart = sim->needs_sort = sim->limits_stale = 1;
-    sim->tasks.parallel_for = d->parallel_for;
-    sim->tasks.user = d->parallel_user;
     g->table = (int32_t *)gs4i_alloc(&sim->memory, g->table_count, sizeof *g->table);
     if (!g->table) {
         g->table_count = 0;
-        return gs4i_fail_memory(sim);
+        return gs4i_fail_memory(&sim->error);
     }
-    if (gs4i_grid_reserve_occupied(&sim->memory, g, 1) != GS4_OK) return gs4i_fail_memory(sim);
+    if (gs4i_grid_reserve_occupied(&sim->memory, g, 1) != GS4_OK)
+        return gs4i_fail_memory(&sim->error);
     if (d->max_particles
         && gs4i_particles_reserve(&sim->memory, &sim->particles, d->max_particles) != GS4_OK)
-        return gs4i_fail_memory(sim);
-#ifdef GS4_PTHREADS
-    if (d->threads > 1 && !d->parallel_for) {
-        sim->tasks.pool = gs4i_pool_create(&sim->memory, d->threads - 1);
-        if (!sim->tasks.pool)
-            return gs4i_fail(sim, GS4_ERROR_MEMORY, "the threads could not be started");
-    }
-#endif
+        return gs4i_fail_memory(&sim->error);
+    if (gs4i_start_tasks(&sim->memory, &sim->tasks, d->threads, d->parallel_for, d->parallel_user)
+        != GS4_OK)
+        return gs4i_fail(&sim->error, GS4_ERROR_MEMORY, "the threads could not be started");
     return GS4_OK;
+}
+
+/* The hooks, or malloc and free. */
+static gs4i_memory gs4i_memory_with(gs4_allocator hook)
+{
+    gs4i_memory memory;
+    memset(&memory, 0, sizeof memory);
+    memory.hook = hook;
+    if (!hook.alloc_fn) {
+        memory.hook.alloc_fn = gs4i_default_alloc;
+        memory.hook.free_fn = gs4i_default_free;
+    }
+    return memory;
+}
+
+static void gs4i_set_defaults(gs4_sim_desc *d)
+{
+    const int is_euler = d->integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER;
+    if (d->flip_decay_time == 0 && !is_euler) d->flip_decay_time = GS4I_C(0.5);
+    if (d->cfl == 0) d->cfl = GS4I_C(0.5);
+    if (d->solver_tolerance == 0) d->solver_tolerance = GS4I_DEFAULT_TOLERANCE;
+    if (d->solver_max_iterations == 0) d->solver_max_iterations = GS4I_DEFAULT_ITERATIONS;
+    if (d->threads == 0) d->threads = 1;
+}
+
+/* A simulation with nothing in it, in *out. */
+static int gs4i_create(gs4i_error *e, const gs4_sim_desc *desc, gs4_sim **out)
+{
+    gs4i_memory memory;
+    gs4_sim *sim;
+    int result;
+    GS4I_TRY(gs4i_require(e, desc && out,
+                          "gs4_create needs a description and a place for the simulation"));
+    e->log = desc->log;
+    e->log_user = desc->log_user;
+    GS4I_TRY(gs4i_check_desc(e, desc));
+    memory = gs4i_memory_with(desc->allocator);
+    sim = (gs4_sim *)gs4i_alloc(&memory, 1, sizeof *sim);
+    if (!sim) return gs4i_fail_memory(e);
+    sim->desc = *desc;
+    gs4i_set_defaults(&sim->desc);
+    sim->memory = memory;
+    sim->error = *e;
+    result = gs4i_init(sim);
+    *e = sim->error;
+    if (result == GS4_OK)
+        *out = sim;
+    else
+        gs4_destroy(sim);
+    return result;
+}
+
+/* The result of a call without a simulation; its sentence is kept for gs4_last_error(NULL). */
+static int gs4i_tell(const gs4i_error *e, int result)
+{
+    if (result != GS4_OK) memcpy(gs4i_last_error, e->text, sizeof gs4i_last_error);
+    return result;
 }
 
 GS4_API int gs4_create(const gs4_sim_desc *desc, gs4_sim **out)
 {
-    gs4_sim fake, *sim;
-    int result;
-    memset(&fake, 0, sizeof fake); /* somewhere to put the sentence */
+    gs4i_error e;
+    memset(&e, 0, sizeof e);
     if (out) *out = NULL;
-    if (!desc || !out)
-        result = gs4i_bad_argument(&fake,
-                                   "gs4_create needs a description and a place for the simulation");
-    else {
-        fake.desc = *desc;
-        result = gs4i_check_desc(&fake, &fake.desc);
-    }
-    if (result == GS4_OK) {
-        fake.memory.hook = fake.desc.allocator;
-        if (!fake.memory.hook.alloc_fn) {
-            fake.memory.hook.alloc_fn = gs4i_default_alloc;
-            fake.memory.hook.free_fn = gs4i_default_free;
-        }
-        sim = (gs4_sim *)gs4i_alloc(&fake.memory, 1, sizeof *sim);
-        if (!sim)
-            result = gs4i_fail_memory(&fake);
-        else {
-            *sim = fake;
-            result = gs4i_init(sim);
-            if (result == GS4_OK) {
-                *out = sim;
-                return GS4_OK;
-            }
-            memcpy(fake.error, sim->error, sizeof fake.error);
-            gs4_destroy(sim);
-        }
-    }
-    memcpy(gs4i_create_error, fake.error, sizeof gs4i_create_error);
-    return result;
+    return gs4i_tell(&e, gs4i_create(&e, desc, out));
 }
 
 GS4_API void gs4_destroy(gs4_sim *sim)
@@ -13455,7 +13583,7 @@ GS4_API void gs4_destroy(gs4_sim *sim)
 
 GS4_API const char *gs4_last_error(const gs4_sim *sim)
 {
-    return sim ? sim->error : gs4i_create_error;
+    return sim ? sim->error.text : gs4i_last_error;
 }
 
 GS4_API gs4_sim_desc gs4_get_desc(const gs4_sim *sim)
@@ -13542,7 +13670,7 @@ static int gs4i_grow(gs4_sim *sim, void **data, int count, int *capacity, size_t
     if (count < *capacity) return GS4_OK;
     wanted = *capacity ? 2 * *capacity : 4;
     grown = gs4i_alloc(&sim->memory, (size_t)wanted, size);
-    if (!grown) return gs4i_fail_memory(sim);
+    if (!grown) return gs4i_fail_memory(&sim->error);
     if (*data) memcpy(grown, *data, (size_t)count * size);
     gs4i_free(&sim->memory, *data, (size_t)*capacity, size);
     *data = grown;
@@ -13683,16 +13811,19 @@ static void gs4i_copy_members(gs4_material *to, const gs4_material *m)
 
 GS4_API int gs4_add_material(gs4_sim *sim, const gs4_material *material)
 {
+    gs4i_scene scene;
     if (!sim) return GS4_ERROR_ARGUMENT;
-    if (!material) return gs4i_bad_argument(sim, "material is NULL");
-    GS4I_TRY(gs4i_check_material(sim, material));
+    if (!material) return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT, "material is NULL");
+    scene = gs4i_scene_of(sim);
+    GS4I_TRY(gs4i_check_material(&sim->error, &scene, material));
     if (sim->material_count == 256)
-        return gs4i_bad_argument(sim, "there are 256 materials already, which is all there can be");
+        return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT,
+                         "there are 256 materials already, which is all there can be");
     GS4I_TRY(gs4i_grow(sim, (void **)&sim->constants, sim->material_count, &sim->material_capacity,
                        sizeof *sim->constants));
     GS4I_TRY(gs4i_grow(sim, (void **)&sim->solid_phase, sim->material_count,
                        &sim->solid_phase_capacity, sizeof *sim->solid_phase));
-    if (gs4i_make_history(sim, material) != GS4_OK) return gs4i_fail_memory(sim);
+    if (gs4i_make_history(sim, material) != GS4_OK) return gs4i_fail_memory(&sim->error);
     memset(&sim->constants[sim->material_count].is, 0, sizeof *material);
     gs4i_copy_members(&sim->constants[sim->material_count++].is, material);
     gs4i_set_constants(sim);
@@ -13705,12 +13836,13 @@ static int gs4i_make_room(gs4_sim *sim, int64_t n)
     const int64_t wanted = sim->particles.count + n,
                   limit = sim->desc.max_particles ? sim->desc.max_particles : GS4I_MAX_PARTICLES;
     if (wanted > limit)
-        return gs4i_fail_value(sim, GS4_ERROR_MEMORY, "this needs room for ", (double)wanted,
+        return gs4i_fail_value(&sim->error, GS4_ERROR_MEMORY, "this needs room for ",
+                               (double)wanted,
                                " particles, more than max_particles; nothing was added");
     if ((uint64_t)sim->next_id + (uint64_t)n >= UINT32_MAX)
-        return gs4i_fail(sim, GS4_ERROR_MEMORY, "all 2^32 particle ids are used up");
+        return gs4i_fail(&sim->error, GS4_ERROR_MEMORY, "all 2^32 particle ids are used up");
     if (gs4i_particles_reserve(&sim->memory, &sim->particles, (int)wanted) != GS4_OK)
-        return gs4i_fail_memory(sim);
+        return gs4i_fail_memory(&sim->error);
     return GS4_OK;
 }
 
@@ -13849,7 +13981,7 @@ static int gs4i_make_collider(gs4_sim *sim, gs4i_collider *b, const gs4_collider
     gs4i_collider_orient(b);
     if (is->shape.kind == GS4_SHAPE_MESH
         && gs4i_field_create(&sim->memory, &b->field, &is->shape, spacing) != GS4_OK)
-        return gs4i_fail_memory(sim);
+        return gs4i_fail_memory(&sim->error);
     return GS4_OK;
 }
 
@@ -13863,24 +13995,26 @@ static int64_t gs4i_collect_points(gs4_sim *sim, const gs4_shape *shape, const g
     int64_t from[3], to[3], n;
     int low[3], cells[3], overlap;
     if (!gs4i_clip_shape(sim, shape, (double)f->spacing, from, to, low, cells))
-        return gs4i_bad_argument(sim, "shape lies outside of the grid: nothing was added");
+        return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT,
+                         "shape lies outside of the grid: nothing was added");
     if ((double)(to[0] - from[0]) * (double)(to[1] - from[1]) * (double)(to[2] - from[2]) > 16e9)
         return gs4i_fail(
-            sim, GS4_ERROR_MEMORY,
+            &sim->error, GS4_ERROR_MEMORY,
             "shape spans more than 1.6e10 particles; a larger spacing would do; nothing was added");
     memset(&as_body, 0, sizeof as_body);
     as_body.shape = *shape;
     GS4I_TRY(gs4i_make_collider(sim, &collider, &as_body, (double)f->spacing));
     n = gs4i_lattice(sim, &collider, f, from, to, NULL);
     if (n < 0)
-        n = gs4i_fail(sim, GS4_ERROR_MEMORY,
+        n = gs4i_fail(&sim->error, GS4_ERROR_MEMORY,
                       "shape holds more particles than there is room for (max_particles); a larger "
                       "spacing would do; nothing was added");
     else if (n == 0)
-        n = gs4i_bad_argument(sim, "shape holds no particle: it is thinner than fill.spacing, "
-                                   "outside of the grid, or inside out");
+        n = gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT,
+                      "shape holds no particle: it is thinner than fill.spacing, "
+                      "outside of the grid, or inside out");
     else if (!(*points = (gs4_real *)gs4i_alloc(&sim->memory, (size_t)n, 3 * sizeof **points)))
-        n = gs4i_fail_memory(sim);
+        n = gs4i_fail_memory(&sim->error);
     else {
         gs4i_lattice(sim, &collider, f, from, to, *points);
         overlap =
@@ -13888,9 +14022,9 @@ static int64_t gs4i_collect_points(gs4_sim *sim, const gs4_shape *shape, const g
         if (overlap) {
             gs4i_free(&sim->memory, *points, (size_t)n, 3 * sizeof **points);
             n = overlap < 0
-                    ? gs4i_fail_memory(sim)
-                    : gs4i_bad_argument(
-                        sim, "shape overlaps material that is there already: nothing was added");
+                    ? gs4i_fail_memory(&sim->error)
+                    : gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT,
+                                "shape overlaps material that is there already: nothing was added");
         }
     }
     gs4i_field_free(&sim->memory, &collider.field);
@@ -13925,7 +14059,7 @@ static int gs4i_check_edit(gs4_sim *sim)
         if (p->with_heat) good = good && gs4i_abs(p->heat[4 * (size_t)i]) < GS4I_HUGE;
         if (!good)
             return gs4i_fail_value(
-                sim, GS4_ERROR_ARGUMENT, "an edit has left particle ", (double)p->id[i],
+                &sim->error, GS4_ERROR_ARGUMENT, "an edit has left particle ", (double)p->id[i],
                 " outside of the grid or with a number that is not finite; edit it again");
     }
     for (i = 0; i < p->count && p->with_heat; i++)
@@ -13943,11 +14077,11 @@ GS4_API int gs4_add_particles(gs4_sim *sim, gs4_shape shape, const gs4_fill *fil
     int64_t n, i;
     int result;
     if (!sim) return GS4_ERROR_ARGUMENT;
-    if (!fill) return gs4i_bad_argument(sim, "fill is NULL");
+    if (!fill) return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT, "fill is NULL");
     f = *fill;
     GS4I_TRY(gs4i_check_edit(sim));
     GS4I_TRY(gs4i_check_fill(sim, &f));
-    GS4I_TRY(gs4i_check_shape(sim, &shape));
+    GS4I_TRY(gs4i_check_shape(&sim->error, &sim->memory, &shape));
     lo = hi = shape.a;
     gs4i_shape_bounds(&shape, &lo, &hi);
     centre = gs4i_scale(gs4i_add(lo, hi), GS4I_C(0.5));
@@ -13956,8 +14090,9 @@ GS4_API int gs4_add_particles(gs4_sim *sim, gs4_shape shape, const gs4_fill *fil
     mass = sim->constants[f.material].density * f.spacing * f.spacing * f.spacing;
     result = mass > GS4I_TINY / GS4I_EPSILON
                  ? gs4i_make_room(sim, n)
-                 : gs4i_bad_argument(sim, "a particle would be lighter than gs4_real can tell from "
-                                          "nothing; use other units, or define GS4_DOUBLE");
+                 : gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT,
+                             "a particle would be lighter than gs4_real can tell from "
+                             "nothing; use other units, or define GS4_DOUBLE");
     for (i = 0; i < n && result == GS4_OK; i++)
         gs4i_fill_one(sim, gs4i_vec3(points[3 * i], points[3 * i + 1], points[3 * i + 2]), centre,
                       &f, mass);
@@ -13975,29 +14110,32 @@ GS4_API int gs4_add_points(gs4_sim *sim, const gs4_real *xyz, int count, gs4_rea
     gs4_real mass;
     int i, a;
     if (!sim) return GS4_ERROR_ARGUMENT;
-    if (!fill || (!xyz && count > 0)) return gs4i_bad_argument(sim, "xyz or fill is NULL");
+    if (!fill || (!xyz && count > 0))
+        return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT, "xyz or fill is NULL");
     if (count < 0)
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "count is ", count,
+        return gs4i_fail_value(&sim->error, GS4_ERROR_ARGUMENT, "count is ", count,
                                "; it must be 0 or above");
     f = *fill;
     GS4I_TRY(gs4i_check_edit(sim));
     GS4I_TRY(gs4i_check_fill(sim, &f));
-    GS4I_TRY(gs4i_check(sim, "volume_each", volume_each, GS4I_POSITIVE));
+    GS4I_TRY(gs4i_check(&sim->error, "volume_each", volume_each, GS4I_POSITIVE));
     if (volume_each > 8 * sim->grid.h * sim->grid.h * sim->grid.h)
-        return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "volume_each is ", (double)volume_each,
+        return gs4i_fail_value(&sim->error, GS4_ERROR_ARGUMENT, "volume_each is ",
+                               (double)volume_each,
                                "; above eight cells there would be holes in the material");
     for (i = 0; i < count; i++) {
         const gs4_real *x = xyz + 3 * (size_t)i;
-        for (a = 0; a < 3; a++) GS4I_TRY(gs4i_check(sim, "xyz", x[a], GS4I_FINITE));
+        for (a = 0; a < 3; a++) GS4I_TRY(gs4i_check(&sim->error, "xyz", x[a], GS4I_FINITE));
         if (!gs4i_inside_domain(&sim->grid, gs4i_vec3(x[0], x[1], x[2])))
-            return gs4i_fail_value(sim, GS4_ERROR_ARGUMENT, "point ", i,
+            return gs4i_fail_value(&sim->error, GS4_ERROR_ARGUMENT, "point ", i,
                                    " lies outside of the grid: nothing was added");
         centre = gs4i_add(centre, gs4i_scale(gs4i_vec3(x[0], x[1], x[2]), 1 / GS4I_C(count)));
     }
     mass = sim->constants[f.material].density * volume_each;
     if (!(mass > GS4I_TINY / GS4I_EPSILON))
-        return gs4i_bad_argument(sim, "a particle would be lighter than gs4_real can tell from "
-                                      "nothing; use other units, or define GS4_DOUBLE");
+        return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT,
+                         "a particle would be lighter than gs4_real can tell from "
+                         "nothing; use other units, or define GS4_DOUBLE");
     GS4I_TRY(gs4i_make_room(sim, count));
     for (i = 0; i < count; i++)
         gs4i_fill_one(sim,
@@ -14007,25 +14145,11 @@ GS4_API int gs4_add_points(gs4_sim *sim, const gs4_real *xyz, int count, gs4_rea
     return count;
 }
 
-static int gs4i_check_collider(gs4_sim *sim, gs4_collider *c)
-{
-    GS4I_TRY(gs4i_check_shape(sim, &c->shape));
-    if ((int)c->contact < 0 || c->contact > GS4_WALL_SEPARATE)
-        return gs4i_bad_argument(sim, "contact of a collider must be stick, slip or separate");
-    GS4I_TRY(gs4i_check(sim, "friction", c->friction, GS4I_NOT_NEGATIVE));
-    if (c->friction > 0 && c->contact != GS4_WALL_SEPARATE)
-        return gs4i_bad_argument(sim, "friction is for contact GS4_WALL_SEPARATE, leave it 0");
-    GS4I_TRY(gs4i_check3(sim, "velocity", c->velocity));
-    GS4I_TRY(gs4i_check3(sim, "angular_velocity", c->angular_velocity));
-    GS4I_TRY(gs4i_check3(sim, "pivot", c->pivot));
-    return gs4i_check(sim, "temperature", c->temperature, GS4I_FINITE);
-}
-
 GS4_API int gs4_add_collider(gs4_sim *sim, const gs4_collider *collider)
 {
     gs4_collider c;
     if (!sim) return GS4_ERROR_ARGUMENT;
-    if (!collider) return gs4i_bad_argument(sim, "collider is NULL");
+    if (!collider) return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT, "collider is NULL");
     c = *collider;
     GS4I_TRY(gs4i_check_collider(sim, &c));
     GS4I_TRY(gs4i_grow(sim, (void **)&sim->boundary.colliders, sim->boundary.collider_count,
@@ -14041,32 +14165,16 @@ GS4_API int gs4_move_collider(gs4_sim *sim, int collider, gs4_vec3 velocity,
                               gs4_vec3 angular_velocity)
 {
     if (!sim) return GS4_ERROR_ARGUMENT;
-    GS4I_TRY(gs4i_check_id(sim, "collider", collider, sim->boundary.collider_count));
+    GS4I_TRY(gs4i_check_id(&sim->error, "collider", collider, sim->boundary.collider_count));
     if (sim->boundary.colliders[collider].is_emitter)
-        return gs4i_bad_argument(sim,
-                                 "that id belongs to the mouth of an emitter, not to a collider");
-    GS4I_TRY(gs4i_check3(sim, "velocity", velocity));
-    GS4I_TRY(gs4i_check3(sim, "angular_velocity", angular_velocity));
+        return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT,
+                         "that id belongs to the mouth of an emitter, not to a collider");
+    GS4I_TRY(gs4i_check3(&sim->error, "velocity", velocity));
+    GS4I_TRY(gs4i_check3(&sim->error, "angular_velocity", angular_velocity));
     sim->boundary.colliders[collider].is.velocity = velocity;
     sim->boundary.colliders[collider].is.angular_velocity = angular_velocity;
     gs4i_note_speed(sim, gs4i_length(velocity));
     sim->limits_stale = 1;
-    return GS4_OK;
-}
-
-static int gs4i_check_emitter(gs4_sim *sim, gs4_emitter *e)
-{
-    GS4I_TRY(gs4i_check_shape(sim, &e->shape));
-    if (e->shape.kind == GS4_SHAPE_PLANE)
-        return gs4i_bad_argument(sim, "shape: a plane has no volume to emit from");
-    GS4I_TRY(gs4i_check_fill(sim, &e->fill));
-    if (gs4i_length(e->fill.angular_velocity) > 0)
-        return gs4i_bad_argument(sim, "fill.angular_velocity: a nozzle does not spin, leave it 0");
-    GS4I_TRY(gs4i_check3(sim, "travel", e->travel));
-    GS4I_TRY(gs4i_check(sim, "start", e->start, GS4I_NOT_NEGATIVE));
-    GS4I_TRY(gs4i_check(sim, "stop", e->stop, GS4I_NOT_NEGATIVE));
-    if (e->stop > 0 && e->stop <= e->start)
-        return gs4i_bad_argument(sim, "stop must be later than start, or 0 for never");
     return GS4_OK;
 }
 
@@ -14078,11 +14186,11 @@ GS4_API int gs4_add_emitter(gs4_sim *sim, const gs4_emitter *emitter)
     int64_t from[3], to[3];
     int low[3], n[3];
     if (!sim) return GS4_ERROR_ARGUMENT;
-    if (!emitter) return gs4i_bad_argument(sim, "emitter is NULL");
+    if (!emitter) return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT, "emitter is NULL");
     e = *emitter;
     GS4I_TRY(gs4i_check_emitter(sim, &e));
     if (!gs4i_clip_shape(sim, &e.shape, (double)e.fill.spacing, from, to, low, n))
-        return gs4i_bad_argument(sim, "shape lies outside of the grid");
+        return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT, "shape lies outside of the grid");
     memset(&held, 0, sizeof held);
     held.shape = e.shape;
     held.velocity = e.travel;
@@ -14107,8 +14215,8 @@ GS4_API int gs4_add_emitter(gs4_sim *sim, const gs4_emitter *emitter)
 GS4_API int gs4_move_emitter(gs4_sim *sim, int emitter, gs4_vec3 travel)
 {
     if (!sim) return GS4_ERROR_ARGUMENT;
-    GS4I_TRY(gs4i_check_id(sim, "emitter", emitter, sim->emitter_count));
-    GS4I_TRY(gs4i_check3(sim, "travel", travel));
+    GS4I_TRY(gs4i_check_id(&sim->error, "emitter", emitter, sim->emitter_count));
+    GS4I_TRY(gs4i_check3(&sim->error, "travel", travel));
     sim->emitters[emitter].is.travel = travel;
     sim->boundary.colliders[sim->emitters[emitter].collider].is.velocity = travel;
     gs4i_note_speed(sim, gs4i_length(travel));
@@ -14145,16 +14253,13 @@ static int gs4i_try_step(gs4_sim *sim, gs4_real dt)
     }
     limit = gs4i_limit_now(sim);
     if (dt > limit * (1 + 8 * GS4I_EPSILON)) {
-        char line[320];
-        gs4i_text t;
-        t.at = line;
-        t.left = sizeof line;
+        gs4i_text t = gs4i_begin_error(&sim->error);
         gs4i_put(&t, "dt is ");
         gs4i_put_real(&t, (double)dt);
         gs4i_put(&t, " s; the largest stable step is now ");
         gs4i_put_real(&t, (double)limit);
         gs4i_put(&t, " s (gs4_stable_dt); the step was not taken");
-        return gs4i_fail(sim, GS4_ERROR_UNSTABLE, line);
+        return gs4i_end_error(&sim->error, GS4_ERROR_UNSTABLE);
     }
     return gs4i_step(sim, dt);
 }
@@ -14162,7 +14267,7 @@ static int gs4i_try_step(gs4_sim *sim, gs4_real dt)
 GS4_API int gs4_step(gs4_sim *sim, gs4_real dt)
 {
     if (!sim) return GS4_ERROR_ARGUMENT;
-    GS4I_TRY(gs4i_check(sim, "dt", dt, GS4I_POSITIVE));
+    GS4I_TRY(gs4i_check(&sim->error, "dt", dt, GS4I_POSITIVE));
     return gs4i_try_step(sim, dt);
 }
 
@@ -14180,7 +14285,7 @@ GS4_API int gs4_advance(gs4_sim *sim, gs4_real duration)
 {
     double left;
     if (!sim) return GS4_ERROR_ARGUMENT;
-    GS4I_TRY(gs4i_check(sim, "duration", duration, GS4I_NOT_NEGATIVE));
+    GS4I_TRY(gs4i_check(&sim->error, "duration", duration, GS4I_NOT_NEGATIVE));
     GS4I_TRY(gs4i_check_edit(sim));
     for (left = (double)duration; left > 0;) {
         double fraction = (double)sim->desc.cfl, dt, steps;
@@ -14193,7 +14298,7 @@ GS4_API int gs4_advance(gs4_sim *sim, gs4_real duration)
             steps = ceil(left / dt * (1 - 1e-9));
             if (!(steps < GS4I_MAX_STEPS))
                 return gs4i_fail_value(
-                    sim, GS4_ERROR_UNSTABLE, "the stable step is ", dt,
+                    &sim->error, GS4_ERROR_UNSTABLE, "the stable step is ", dt,
                     " s, so short that the rest would take more than 1e8 steps; a larger "
                     "cell_size, or less viscosity, sound_speed or speed, would do");
             dt = left / steps;
@@ -14256,8 +14361,8 @@ GS4_API gs4_edit gs4_edit_particles(gs4_sim *sim, gs4_field field)
     e.components = e.data ? components : 0;
     e.stride = e.data ? 4 : 0;
     if (sim && !e.data)
-        gs4i_bad_argument(
-            sim, "only position, velocity and, in a scene with heat, temperature can be edited");
+        gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT,
+                  "only position, velocity and, in a scene with heat, temperature can be edited");
     if (e.data && field == GS4_FIELD_VELOCITY) {
         sim->needs_spin = 1;
         gs4i_forget_spin(sim);
@@ -14408,13 +14513,6 @@ GS4_API int gs4_load(gs4_sim *sim, const char *path)
 
 /* --- one material point ----------------------------------------------------------------------- */
 
-/* The sentence of a call without a simulation. */
-static int gs4i_say(const gs4_sim *fake, int result)
-{
-    memcpy(gs4i_create_error, fake->error, sizeof gs4i_create_error);
-    return result;
-}
-
 /* A batch whose particles are all this point. */
 typedef struct gs4i_point_batch {
     gs4i_batch_constants constants;
@@ -14428,19 +14526,19 @@ typedef struct gs4i_point_batch {
 
 /* F of a solid point: zero means identity. Its determinant must be above 0 by more than
  * rounding. */
-static int gs4i_load_point_deformation(gs4_sim *fake, const gs4_real given[9], gs4i_point_batch *q)
+static int gs4i_load_point_deformation(gs4i_error *e, const gs4_real given[9], gs4i_point_batch *q)
 {
     double F[3][3], U[3][3], s[3], V[3][3];
     int i, n, zero = 1;
     for (i = 0; i < 9; i++) {
-        GS4I_TRY(gs4i_check(fake, "deformation", given[i], GS4I_FINITE));
+        GS4I_TRY(gs4i_check(e, "deformation", given[i], GS4I_FINITE));
         zero &= given[i] == 0;
     }
     for (i = 0; i < 9; i++) F[i / 3][i % 3] = zero ? i % 4 == 0 : (double)given[i];
     gs4i_svd(F, U, s, V);
     if (!(s[2] > 4 * (double)GS4I_EPSILON * s[0]) || !(s[0] * s[0] < (double)GS4I_HUGE)
         || !(s[0] * s[1] * s[2] > 1 / (double)GS4I_HUGE))
-        return gs4i_fail_value(fake, GS4_ERROR_ARGUMENT, "deformation has the determinant ",
+        return gs4i_fail_value(e, GS4_ERROR_ARGUMENT, "deformation has the determinant ",
                                s[0] * s[1] * s[2],
                                "; it must be above 0 by more than rounding: neither flat nor "
                                "turned inside out (all zero: identity)");
@@ -14451,22 +14549,23 @@ static int gs4i_load_point_deformation(gs4_sim *fake, const gs4_real given[9], g
     return GS4_OK;
 }
 
-static int gs4i_make_point_batch(gs4_sim *fake, const gs4_material *material,
+static int gs4i_make_point_batch(gs4i_error *e, const gs4_material *material,
                                  const gs4_point *point, const gs4_real L[9], gs4i_point_batch *q)
 {
+    gs4i_scene alone;
     int i, n;
-    memset(fake, 0, sizeof *fake);
     memset(q, 0, sizeof *q);
-    fake->grid.h = 1;
-    if (!material || !point || !L)
-        return gs4i_bad_argument(fake, "material, point or velocity_gradient is NULL");
-    GS4I_TRY(gs4i_check(fake, "temperature", point->temperature, GS4I_FINITE));
-    fake->desc.ambient_temperature = point->temperature;
-    GS4I_TRY(gs4i_check_material(fake, material));
-    for (i = 0; i < 9; i++) GS4I_TRY(gs4i_check(fake, "velocity_gradient", L[i], GS4I_FINITE));
+    memset(&alone, 0, sizeof alone);
+    GS4I_TRY(
+        gs4i_require(e, material && point && L, "material, point or velocity_gradient is NULL"));
+    alone.cell_size = 1;
+    alone.temperature = point->temperature;
+    GS4I_TRY(gs4i_check(e, "temperature", point->temperature, GS4I_FINITE));
+    GS4I_TRY(gs4i_check_material(e, &alone, material));
+    for (i = 0; i < 9; i++) GS4I_TRY(gs4i_check(e, "velocity_gradient", L[i], GS4I_FINITE));
     for (i = 0; i < 6; i++) {
-        GS4I_TRY(gs4i_check(fake, "stress", point->stress[i], GS4I_FINITE));
-        GS4I_TRY(gs4i_check(fake, "stress_rate", point->stress_rate[i], GS4I_FINITE));
+        GS4I_TRY(gs4i_check(e, "stress", point->stress[i], GS4I_FINITE));
+        GS4I_TRY(gs4i_check(e, "stress_rate", point->stress_rate[i], GS4I_FINITE));
     }
     q->mat.is = *material;
     gs4i_set_material_constants(&q->mat, point->temperature);
@@ -14485,18 +14584,18 @@ static int gs4i_make_point_batch(gs4_sim *fake, const gs4_material *material,
         const gs4_real mu = gs4i_viscosity_of(&q->mat, point->temperature, q->L, 0);
         if (!(mu >= 0 && mu < GS4I_HUGE))
             return gs4i_fail_value(
-                fake, GS4_ERROR_ARGUMENT, "the viscosity at this temperature and shear rate is ",
+                e, GS4_ERROR_ARGUMENT, "the viscosity at this temperature and shear rate is ",
                 (double)mu, "; it must be 0 or a finite number above that is not absurdly large");
     }
     gs4i_load_elastic_constants(&q->constants, &q->past.elastic);
     return gs4i_load_solid_constants(&q->constants, &q->past.solid)
-               ? gs4i_load_point_deformation(fake, point->deformation, q)
+               ? gs4i_load_point_deformation(e, point->deformation, q)
                : GS4_OK;
 }
 
 /* F of a point in a flow that is steady over the step: no rates are needed, and the same for
  * every member of the family. */
-static int gs4i_step_solid_point(gs4_sim *fake, gs4i_point_batch *q, gs4i_integrator *integrator,
+static int gs4i_step_solid_point(gs4i_error *e, gs4i_point_batch *q, gs4i_integrator *integrator,
                                  gs4_point *point)
 {
     gs4i_solid_count count = { 0, 0, 0 };
@@ -14510,90 +14609,102 @@ static int gs4i_step_solid_point(gs4_sim *fake, gs4i_point_batch *q, gs4i_integr
     for (i = 0; i < 9; i++)
         count.failed |= !(gs4i_abs(GS4I_NTH(q->d.F[i / 3][i % 3], 0)) < GS4I_HUGE);
     if (count.failed)
-        return gs4i_fail(fake, GS4_ERROR_UNSTABLE,
+        return gs4i_fail(e, GS4_ERROR_UNSTABLE,
                          "the solid would be stretched, sheared or turned by more than a factor of "
                          "e^8 in one step; nothing has changed; a smaller dt would do");
     for (i = 0; i < 9; i++) point->deformation[i] = GS4I_NTH(q->d.F[i / 3][i % 3], 0);
     return GS4_OK;
 }
 
-GS4_API int gs4_point_step(const gs4_material *material, gs4_point *point,
-                           const gs4_real velocity_gradient[9], gs4_real dt, gs4_real rho_inf,
-                           gs4_real rho_inf_spurious)
+/* The non-local stress of a point; rates start anew where there are none. */
+static int gs4i_step_liquid_point(gs4i_error *e, gs4i_point_batch *q, gs4i_integrator *integrator,
+                                  const gs4_real rho[2], gs4_point *point)
 {
-    gs4_sim fake;
-    gs4i_point_batch q;
-    gs4i_integrator integrator;
     gs4i_elastic_count count = { 0, 0, 0 };
-    int i, restart = 1, r = gs4i_make_point_batch(&fake, material, point, velocity_gradient, &q);
-    if (r == GS4_OK) r = gs4i_check(&fake, "dt", dt, GS4I_POSITIVE);
-    if (r == GS4_OK) r = gs4i_check(&fake, "rho_inf", rho_inf, GS4I_FRACTION);
-    if (r == GS4_OK) r = gs4i_check(&fake, "rho_inf_spurious", rho_inf_spurious, GS4I_FRACTION);
-    if (r == GS4_OK && rho_inf_spurious > rho_inf)
-        r = gs4i_fail_value(&fake, GS4_ERROR_ARGUMENT, "rho_inf_spurious is ",
-                            (double)rho_inf_spurious, ", which is more than rho_inf");
-    if (r != GS4_OK) return gs4i_say(&fake, r);
-    memset(&integrator, 0, sizeof integrator);
-    integrator.dt = dt;
-    if (q.mat.shear_modulus > 0)
-        return gs4i_say(&fake, gs4i_step_solid_point(&fake, &q, &integrator, point));
-    if (!(q.mat.inv_lambda > 0)) return GS4_OK;
+    int i, restart = 1;
     for (i = 0; i < 6; i++) restart &= point->stress_rate[i] == 0;
-    gs4i_family(&integrator, rho_inf, rho_inf_spurious, restart);
-    integrator.restart = restart;
-    gs4i_correct_elastic(&q.past.elastic, &q.e, &integrator, q.L, 1, &count);
+    gs4i_family(integrator, rho[0], rho[1], restart);
+    integrator->restart = restart;
+    gs4i_correct_elastic(&q->past.elastic, &q->e, integrator, q->L, 1, &count);
     for (i = 0; i < 6; i++)
-        count.failed |= !(gs4i_abs(GS4I_NTH(q.e.s[i], 0)) < GS4I_HUGE
-                          && gs4i_abs(GS4I_NTH(q.e.rate[i], 0)) < GS4I_HUGE);
+        count.failed |= !(gs4i_abs(GS4I_NTH(q->e.s[i], 0)) < GS4I_HUGE
+                          && gs4i_abs(GS4I_NTH(q->e.rate[i], 0)) < GS4I_HUGE);
     if (count.failed)
-        return gs4i_say(&fake,
-                        gs4i_fail(&fake, GS4_ERROR_UNSTABLE,
-                                  "the non-local stress would overflow, or swings faster than it "
-                                  "can be followed; nothing has changed; a smaller dt would do"));
+        return gs4i_fail(e, GS4_ERROR_UNSTABLE,
+                         "the non-local stress would overflow, or swings faster than it can be "
+                         "followed; nothing has changed; a smaller dt would do");
     for (i = 0; i < 6; i++) {
-        point->stress[i] = GS4I_NTH(q.e.s[i], 0);
-        point->stress_rate[i] = GS4I_NTH(q.e.rate[i], 0);
+        point->stress[i] = GS4I_NTH(q->e.s[i], 0);
+        point->stress_rate[i] = GS4I_NTH(q->e.rate[i], 0);
     }
     return GS4_OK;
 }
 
-GS4_API int gs4_point_stress(const gs4_material *material, const gs4_point *point,
-                             const gs4_real velocity_gradient[9], gs4_real cauchy[6])
+static int gs4i_point_step(gs4i_error *e, const gs4_material *material, gs4_point *point,
+                           const gs4_real L[9], gs4_real dt, const gs4_real rho[2])
 {
-    gs4_sim fake;
     gs4i_point_batch q;
-    int i, j, r = gs4i_make_point_batch(&fake, material, point, velocity_gradient, &q);
+    gs4i_integrator integrator;
+    GS4I_TRY(gs4i_make_point_batch(e, material, point, L, &q));
+    GS4I_TRY(gs4i_check(e, "dt", dt, GS4I_POSITIVE));
+    GS4I_TRY(gs4i_check(e, "rho_inf", rho[0], GS4I_FRACTION));
+    GS4I_TRY(gs4i_check(e, "rho_inf_spurious", rho[1], GS4I_FRACTION));
+    GS4I_TRY(gs4i_require_value(e, rho[1] <= rho[0], "rho_inf_spurious is ", (double)rho[1],
+                                ", which is more than rho_inf"));
+    memset(&integrator, 0, sizeof integrator);
+    integrator.dt = dt;
+    if (q.mat.shear_modulus > 0) return gs4i_step_solid_point(e, &q, &integrator, point);
+    return q.mat.inv_lambda > 0 ? gs4i_step_liquid_point(e, &q, &integrator, rho, point) : GS4_OK;
+}
+
+GS4_API int gs4_point_step(const gs4_material *material, gs4_point *point,
+                           const gs4_real velocity_gradient[9], gs4_real dt, gs4_real rho_inf,
+                           gs4_real rho_inf_spurious)
+{
+    const gs4_real rho[2] = { rho_inf, rho_inf_spurious };
+    gs4i_error e;
+    memset(&e, 0, sizeof e);
+    return gs4i_tell(&e, gs4i_point_step(&e, material, point, velocity_gradient, dt, rho));
+}
+
+static int gs4i_point_stress(gs4i_error *e, const gs4_material *material, const gs4_point *point,
+                             const gs4_real L[9], gs4_real cauchy[6])
+{
+    gs4i_point_batch q;
     gs4i_symmetric solid;
     gs4i_lanes stiffness;
     gs4_real mu;
-    if (r == GS4_OK && !cauchy) r = gs4i_bad_argument(&fake, "cauchy is NULL");
-    if (r != GS4_OK) return gs4i_say(&fake, r);
+    int i, j;
+    GS4I_TRY(gs4i_make_point_batch(e, material, point, L, &q));
+    GS4I_TRY(gs4i_require(e, cauchy != NULL, "cauchy is NULL"));
     mu = q.mat.local * gs4i_viscosity_of(&q.mat, q.mat.temperature, q.L, 0);
     memset(solid, 0, sizeof solid);
     if (q.mat.shear_modulus > 0) gs4i_solid_stress(&q.past.solid, q.d.F, q.J, solid, stiffness);
     for (i = 0; i < 3; i++)
         for (j = i; j < 3; j++)
             cauchy[gs4i_place[i][j]] =
-                mu * (velocity_gradient[3 * i + j] + velocity_gradient[3 * j + i])
+                mu * (L[3 * i + j] + L[3 * j + i])
                 + (q.mat.inv_lambda > 0 ? point->stress[gs4i_place[i][j]] : 0)
                 + GS4I_NTH(solid[gs4i_place[i][j]], 0);
     return GS4_OK;
 }
 
-GS4_API int gs4_material_preset(const char *name, gs4_material *material)
+GS4_API int gs4_point_stress(const gs4_material *material, const gs4_point *point,
+                             const gs4_real velocity_gradient[9], gs4_real cauchy[6])
 {
-    gs4_sim fake;
+    gs4i_error e;
+    memset(&e, 0, sizeof e);
+    return gs4i_tell(&e, gs4i_point_stress(&e, material, point, velocity_gradient, cauchy));
+}
+
+static int gs4i_find_preset(gs4i_error *e, const char *name, gs4_material *material)
+{
     gs4i_text t;
-    char line[320];
     size_t i;
-    memset(&fake, 0, sizeof fake);
-    if (!name || !material)
-        return gs4i_say(
-            &fake, gs4i_bad_argument(
-                       &fake, "gs4_material_preset needs a name and a place for the material"));
+    GS4I_TRY(gs4i_require(e, name && material,
+                          "gs4_material_preset needs a name and a place for the material"));
     if (gs4i_preset(name, material) == GS4_OK) return GS4_OK;
-    t.at = line;
-    t.left = sizeof line;
+    t = gs4i_begin_error(e);
     gs4i_put(&t, "there is no such preset; there are");
     for (i = 0; i < sizeof gs4i_presets / sizeof gs4i_presets[0]; i++) {
         gs4i_put(&t, i ? ", " : " ");
@@ -14603,7 +14714,14 @@ GS4_API int gs4_material_preset(const char *name, gs4_material *material)
         gs4i_put(&t, ", ");
         gs4i_put(&t, gs4i_melts[i].name);
     }
-    return gs4i_say(&fake, gs4i_bad_argument(&fake, line));
+    return gs4i_end_error(e, GS4_ERROR_ARGUMENT);
+}
+
+GS4_API int gs4_material_preset(const char *name, gs4_material *material)
+{
+    gs4i_error e;
+    memset(&e, 0, sizeof e);
+    return gs4i_tell(&e, gs4i_find_preset(&e, name, material));
 }
 
 #if defined(__clang__)
@@ -14627,133 +14745,106 @@ static double gs4i_poisson_now(const gs4_poisson *p)
     return p->desc.now ? p->desc.now(p->desc.now_user) : 0;
 }
 
-/* All but the arrays' contents; fills in the defaults. */
-static int gs4i_check_poisson(gs4_sim *fake, gs4_poisson_desc *d)
+/* All but the arrays' contents. */
+static int gs4i_check_poisson(gs4i_error *e, const gs4_poisson_desc *d)
 {
-    static const char *const cells[3] = { "cells[0] is ", "cells[1] is ", "cells[2] is " };
-    int a;
-    for (a = 0; a < 3; a++)
-        if (d->cells[a] < 1 || d->cells[a] > 1 << 21)
-            return gs4i_fail_value(fake, GS4_ERROR_ARGUMENT, cells[a], d->cells[a],
-                                   "; it must be from 1 to 2097152");
-    if ((double)d->cells[1] * d->cells[2] > INT32_MAX
-        || (double)d->cells[0] * d->cells[1] * d->cells[2] > 16.0 * INT32_MAX)
-        return gs4i_bad_argument(fake, "cells: more than 2^31 rows or 2^35 cells in all");
-    GS4I_TRY(gs4i_check(fake, "cell_size", d->cell_size, GS4I_POSITIVE));
-    if (d->cell_size < GS4I_C(1e-9) || d->cell_size > GS4I_C(1e9))
-        return gs4i_fail_value(fake, GS4_ERROR_ARGUMENT, "cell_size is ", (double)d->cell_size,
-                               "; it must be from 1e-9 to 1e9");
-    if (!d->kind) return gs4i_bad_argument(fake, "kind is NULL; it must be an array of gs4_cell");
-    GS4I_TRY(gs4i_check(fake, "tolerance", d->tolerance, GS4I_FRACTION));
-    if (d->max_iterations < 0)
-        return gs4i_fail_value(fake, GS4_ERROR_ARGUMENT, "max_iterations is ", d->max_iterations,
-                               "; it must be 0 or above");
-    if (d->threads < 0 || d->threads > 1024)
-        return gs4i_fail_value(fake, GS4_ERROR_ARGUMENT, "threads is ", d->threads,
-                               "; it must be from 0 to 1024");
-#ifndef GS4_PTHREADS
-    if (d->threads > 1 && !d->parallel_for)
-        return gs4i_fail_value(
-            fake, GS4_ERROR_ARGUMENT, "threads is ", d->threads,
-            "; more than 1 needs GS4_PTHREADS defined with the implementation, or parallel_for");
-#endif
-    if (!d->allocator.alloc_fn != !d->allocator.free_fn)
-        return gs4i_bad_argument(fake, "allocator: both functions or neither");
-    if (d->threads == 0) d->threads = 1;
-    if (d->tolerance == 0) d->tolerance = sizeof(gs4_real) == 8 ? GS4I_C(1e-6) : GS4I_C(1e-4);
-    if (d->max_iterations == 0) d->max_iterations = 200;
-    return GS4_OK;
+    const double rows = (double)d->cells[1] * d->cells[2], cells = d->cells[0] * rows;
+    GS4I_TRY(gs4i_check_cells(e, d->cells, 1, 1 << 21, "; it must be from 1 to 2097152"));
+    GS4I_TRY(gs4i_require(e, rows <= INT32_MAX && cells <= 16.0 * INT32_MAX,
+                          "cells: more than 2^31 rows or 2^35 cells in all"));
+    GS4I_TRY(gs4i_check_cell_size(e, d->cell_size));
+    GS4I_TRY(gs4i_require(e, d->kind != NULL, "kind is NULL; it must be an array of gs4_cell"));
+    GS4I_TRY(gs4i_check(e, "tolerance", d->tolerance, GS4I_FRACTION));
+    GS4I_TRY(gs4i_require_value(e, d->max_iterations >= 0, "max_iterations is ", d->max_iterations,
+                                "; it must be 0 or above"));
+    GS4I_TRY(gs4i_check_threads(e, d->threads, d->parallel_for));
+    return gs4i_check_allocator(e, &d->allocator);
 }
 
-static int gs4i_init_poisson(gs4_sim *fake, gs4_poisson *p)
+static void gs4i_set_poisson_defaults(gs4_poisson_desc *d)
+{
+    if (d->threads == 0) d->threads = 1;
+    if (d->tolerance == 0) d->tolerance = GS4I_DEFAULT_TOLERANCE;
+    if (d->max_iterations == 0) d->max_iterations = GS4I_DEFAULT_ITERATIONS;
+}
+
+static int gs4i_init_poisson(gs4i_error *e, gs4_poisson *p)
 {
     const gs4_poisson_desc *d = &p->desc;
     const double start = gs4i_poisson_now(p);
     int r;
-    p->tasks.parallel_for = d->parallel_for;
-    p->tasks.user = d->parallel_user;
     p->solver.memory = &p->memory;
     p->solver.tasks = &p->tasks;
-#ifdef GS4_PTHREADS
-    if (d->threads > 1 && !d->parallel_for) {
-        p->tasks.pool = gs4i_pool_create(&p->memory, d->threads - 1);
-        if (!p->tasks.pool)
-            return gs4i_fail(fake, GS4_ERROR_MEMORY, "the threads could not be started");
-    }
-#endif
+    if (gs4i_start_tasks(&p->memory, &p->tasks, d->threads, d->parallel_for, d->parallel_user)
+        != GS4_OK)
+        return gs4i_fail(e, GS4_ERROR_MEMORY, "the threads could not be started");
     r = gs4i_solver_setup(&p->solver, d);
     p->setup_seconds = gs4i_poisson_now(p) - start;
     p->desc.kind = NULL;
     p->desc.diagonal = p->desc.coefficient[0] = p->desc.coefficient[1] = p->desc.coefficient[2] =
         NULL;
-    if (r == GS4_ERROR_MEMORY) return gs4i_fail_memory(fake);
-    return r == GS4_OK ? r
-                       : gs4i_fail_value(fake, r, p->solver.fault, p->solver.fault_value,
-                                         p->solver.accepted);
+    if (r == GS4_OK) return GS4_OK;
+    return r == GS4_ERROR_MEMORY
+               ? gs4i_fail_memory(e)
+               : gs4i_fail_value(e, r, p->solver.fault, p->solver.fault_value, p->solver.accepted);
+}
+
+static int gs4i_poisson_create(gs4i_error *e, const gs4_poisson_desc *desc, gs4_poisson **out)
+{
+    gs4_poisson *p;
+    gs4i_memory memory;
+    int result;
+    GS4I_TRY(gs4i_require(e, desc && out,
+                          "gs4_poisson_create needs a description and a place for the solver"));
+    GS4I_TRY(gs4i_check_poisson(e, desc));
+    memory = gs4i_memory_with(desc->allocator);
+    p = (gs4_poisson *)gs4i_alloc(&memory, 1, sizeof *p);
+    if (!p) return gs4i_fail_memory(e);
+    p->memory = memory;
+    p->desc = *desc;
+    gs4i_set_poisson_defaults(&p->desc);
+    result = gs4i_init_poisson(e, p);
+    if (result == GS4_OK)
+        *out = p;
+    else
+        gs4_poisson_destroy(p);
+    return result;
 }
 
 GS4_API int gs4_poisson_create(const gs4_poisson_desc *desc, gs4_poisson **out)
 {
-    gs4_sim fake;
-    gs4_poisson_desc d;
-    gs4_poisson *p;
-    gs4i_memory memory;
-    int result;
-    memset(&fake, 0, sizeof fake);
-    memset(&memory, 0, sizeof memory);
+    gs4i_error e;
+    memset(&e, 0, sizeof e);
     if (out) *out = NULL;
-    if (!desc || !out)
-        return gs4i_say(
-            &fake, gs4i_bad_argument(
-                       &fake, "gs4_poisson_create needs a description and a place for the solver"));
-    d = *desc;
-    result = gs4i_check_poisson(&fake, &d);
-    if (result != GS4_OK) return gs4i_say(&fake, result);
-    memory.hook = d.allocator;
-    if (!memory.hook.alloc_fn) {
-        memory.hook.alloc_fn = gs4i_default_alloc;
-        memory.hook.free_fn = gs4i_default_free;
-    }
-    p = (gs4_poisson *)gs4i_alloc(&memory, 1, sizeof *p);
-    if (!p) return gs4i_say(&fake, gs4i_fail_memory(&fake));
-    p->memory = memory;
-    p->desc = d;
-    result = gs4i_init_poisson(&fake, p);
-    if (result == GS4_OK) {
-        *out = p;
-        return GS4_OK;
-    }
-    gs4_poisson_destroy(p);
-    return gs4i_say(&fake, result);
+    return gs4i_tell(&e, gs4i_poisson_create(&e, desc, out));
+}
+
+static int gs4i_poisson_solve(gs4i_error *e, gs4_poisson *p, const gs4_real *rhs, gs4_real *x,
+                              gs4_solve_stats *stats)
+{
+    double start;
+    int r;
+    memset(stats, 0, sizeof *stats);
+    GS4I_TRY(gs4i_require(e, p && rhs && x, "gs4_poisson_solve needs a solver, rhs and x"));
+    start = gs4i_poisson_now(p);
+    r = gs4i_solver_solve(&p->solver, rhs, x, (double)p->desc.tolerance, p->desc.max_iterations,
+                          stats);
+    stats->setup_seconds = p->setup_seconds;
+    stats->solve_seconds = gs4i_poisson_now(p) - start;
+    stats->memory_bytes = p->memory.bytes;
+    if (r == GS4_OK) return GS4_OK;
+    return gs4i_fail_value(e, r, p->solver.fault,
+                           r == GS4_ERROR_ARGUMENT ? p->solver.fault_value : stats->residual,
+                           p->solver.accepted);
 }
 
 GS4_API int gs4_poisson_solve(gs4_poisson *p, const gs4_real *rhs, gs4_real *x,
                               gs4_solve_stats *stats)
 {
-    gs4_sim fake;
-    gs4_solve_stats local;
-    double start;
-    int r;
-    memset(&fake, 0, sizeof fake);
-    memset(&local, 0, sizeof local);
-    if (stats) *stats = local;
-    if (!p || !rhs || !x)
-        return gs4i_say(&fake,
-                        gs4i_bad_argument(&fake, "gs4_poisson_solve needs a solver, rhs and x"));
-    start = gs4i_poisson_now(p);
-    r = gs4i_solver_solve(&p->solver, rhs, x, (double)p->desc.tolerance, p->desc.max_iterations,
-                          &local);
-    local.setup_seconds = p->setup_seconds;
-    local.solve_seconds = gs4i_poisson_now(p) - start;
-    local.memory_bytes = p->memory.bytes;
-    if (stats) *stats = local;
-    if (r == GS4_ERROR_ARGUMENT)
-        return gs4i_say(&fake, gs4i_fail_value(&fake, r, p->solver.fault, p->solver.fault_value,
-                                               p->solver.accepted));
-    if (r != GS4_OK)
-        return gs4i_say(
-            &fake, gs4i_fail_value(&fake, r, p->solver.fault, local.residual, p->solver.accepted));
-    return r;
+    gs4_solve_stats unread;
+    gs4i_error e;
+    memset(&e, 0, sizeof e);
+    return gs4i_tell(&e, gs4i_poisson_solve(&e, p, rhs, x, stats ? stats : &unread));
 }
 
 GS4_API void gs4_poisson_destroy(gs4_poisson *p)
@@ -14776,6 +14867,8 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_CHOOSE_INT
 #undef GS4I_CHUNK
 #undef GS4I_CONDUCTS
+#undef GS4I_DEFAULT_ITERATIONS
+#undef GS4I_DEFAULT_TOLERANCE
 #undef GS4I_DESTINATION
 #undef GS4I_DIFFERENCE
 #undef GS4I_DENSE
@@ -14817,7 +14910,10 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_MUL
 #undef GS4I_NEIGHBOURS
 #undef GS4I_NODE_REALS
+#undef GS4I_NEVER_MELTS
 #undef GS4I_NO_HEAT
+#undef GS4I_NO_POM_POM
+#undef GS4I_NO_SOLID_PHASE
 #undef GS4I_NTH
 #undef GS4I_NTH_CONST
 #undef GS4I_PAIRS

@@ -4540,13 +4540,53 @@ GS4I_INLINE void gs4i_gradient_squared(gs4i_gradient L, gs4i_lanes squared)
 
 /* ==== [[grid]] blocks of nodes where there is material ========================================= *
  *
- * Nodes -4 .. n+3 exist along each axis (images of the walls live outside 0 .. n-1). One number
- * per block of the domain says where its nodes are; only blocks within reach of particles have
- * any: time and memory follow the material, not the domain. Per node: (momentum, mass) ->
- * (velocity, mass); (force, -) -> (acceleration, -); and, for GS4, the acceleration it remembers
- * from step to step (`memory`, fourth number: 1 where there is one). */
+ * Nodes -4 .. n+3 exist along each axis; the mirror nodes of the walls are those outside 0 .. n-1.
+ * One number per block of the domain says where its nodes are. Only blocks within reach of
+ * particles have any: time and memory follow the material, not the domain.
+ *
+ * A block with nodes has a slot. Node i of it, x fastest, is number 64 slot + i, and has four reals
+ * of each field: (momentum, mass) -> (velocity, mass); (force, -) -> (acceleration, -); for GS4
+ * the acceleration ag that it remembers from step to step; and a byte of flags.
+ *
+ * A block and its tile, the 8^3 nodes that its particles touch. They may be a cell outside of it:
+ *
+ *         -2  -1 | 0   1   2   3 | 4   5          o  nodes of the block (one layer of four)
+ *      -2  .   . | .   .   .   . | .   .          .  nodes of its neighbours
+ *      -1  .   . | .   .   .   . | .   .          w  reach of the particle x: 3 nodes an axis
+ *         -------+---------------+-------
+ *       0  .   . | o   w   w   w | .   .
+ *       1  .   . | o   w   wx  w | .   .
+ *       2  .   . | o   w   w   w | .   .
+ *       3  .   . | o   o   o   o | .   .
+ *         -------+---------------+-------
+ *       4  .   . | .   .   .   . | .   .
+ *       5  .   . | .   .   .   . | .   . */
 
 #define GS4I_NODE_REALS (4 * GS4I_BLOCK_NODES)
+
+/* Flags of a node. Those of the last step belong to the state; the others are made anew. */
+enum {
+    GS4I_FOLDS = 7,   /* bit a: a mirror node of axis a whose wall is in contact */
+    GS4I_PRESSED = 8, /* material presses on the wall there */
+    GS4I_IMAGED = 16, /* image particles behind a sticky collider reach it */
+    GS4I_LACKS_IMAGE =
+        32,              /* a particle reaches it that is near a sticky collider and has no image */
+    GS4I_REMEMBERS = 64, /* ag holds an acceleration */
+    GS4I_WAS_PRESSED = 128,
+    GS4I_LASTS = GS4I_REMEMBERS | GS4I_WAS_PRESSED
+};
+
+/* Where data lives on the grid of cells: a bit for each axis along which it is staggered by half
+ * a cell to the low side. Bit patterns of one axis are faces, of two are edges. */
+enum {
+    GS4I_AT_CELL = 0,
+    GS4I_AT_FACE_X = 1,
+    GS4I_AT_FACE_Y = 2,
+    GS4I_AT_FACE_Z = 4,
+    GS4I_AT_EDGE_XY = 3,
+    GS4I_AT_EDGE_XZ = 5,
+    GS4I_AT_EDGE_YZ = 6
+};
 
 typedef struct gs4i_grid {
     /* domain in cells; table in blocks, one block more on every side */
@@ -4561,9 +4601,11 @@ typedef struct gs4i_grid {
     /* per slot: its number; which occupied block it is, or -1 */
     uint32_t *block;
     int32_t *occupant;
-    gs4_real *momentum, *force,
-        *remembered;                 /* GS4I_NODE_REALS per slot; memory NULL when not needed */
-    int occupied, occupied_capacity; /* blocks with particles, ascending */
+    /* GS4I_NODE_REALS per slot: see gs4i_velocity, gs4i_acceleration; ag, NULL for Euler */
+    gs4_real *momentum, *force, *remembered;
+    uint8_t *flags; /* GS4I_BLOCK_NODES per slot, bits GS4I_FOLDS ... */
+    /* blocks with particles, ascending */
+    int occupied, occupied_capacity;
     uint32_t *occupied_block;
     /* per occupied block: its first particle; one more at the end */
     int32_t *first;
@@ -4576,7 +4618,6 @@ typedef struct gs4i_grid {
     int32_t *jump_of;
     gs4_real *jump;
     int jump_count, jump_capacity;
-    uint8_t *contact; /* of the nodes in `jump`, see [[boundary]] */
     /* 4 a slot: mean velocity of its nodes, how far they are from it, see [[step]] */
     gs4_real *spread;
     int with_deconvolution; /* sharpened gradients: */
@@ -4598,14 +4639,152 @@ GS4I_INLINE uint32_t gs4i_block_number(const gs4i_grid *g, int x, int y, int z)
            + (uint32_t)x;
 }
 
-/* Where node (x, y, z), each from -4, is in the arrays of four numbers; -1: it does not exist
- * now. */
-GS4I_INLINE ptrdiff_t gs4i_node_at(const gs4i_grid *g, int x, int y, int z)
+/* Block that cell or node x of an axis, from -4, is in; the table begins a block before the domain. */
+GS4I_INLINE int gs4i_block_at(int x) { return (x + 4) >> 2; }
+
+/* Place of node (x, y, z) in its block; only the last two bits count. */
+GS4I_INLINE int gs4i_place_of(int x, int y, int z) { return (z & 3) << 4 | (y & 3) << 2 | (x & 3); }
+
+GS4I_INLINE int gs4i_slot_of(uint32_t node) { return (int)(node / GS4I_BLOCK_NODES); }
+GS4I_INLINE uint32_t gs4i_first_node(int slot) { return (uint32_t)slot * GS4I_BLOCK_NODES; }
+
+/* The four reals of a node. */
+GS4I_INLINE gs4_real *gs4i_of_node(gs4_real *field, uint32_t node)
 {
-    int32_t slot = g->table[gs4i_block_number(g, (x + 4) >> 2, (y + 4) >> 2, (z + 4) >> 2)];
-    if (!slot) return -1;
-    return (ptrdiff_t)(slot - 1) * GS4I_NODE_REALS
-           + 4 * ((((z & 3) << 2 | (y & 3)) << 2) | (x & 3));
+    return field + 4 * (size_t)node;
+}
+
+/* The nodes of a block. */
+GS4I_INLINE gs4_real *gs4i_of_slot(gs4_real *field, int slot)
+{
+    return field + (size_t)GS4I_NODE_REALS * (size_t)slot;
+}
+
+/* Slot of block (x, y, z), -1: it has no nodes. */
+GS4I_INLINE int gs4i_slot_of_block(const gs4i_grid *g, int x, int y, int z)
+{
+    if (x < 0 || y < 0 || z < 0 || x >= g->blocks[0] || y >= g->blocks[1] || z >= g->blocks[2])
+        return -1;
+    return g->table[gs4i_block_number(g, x, y, z)] - 1;
+}
+
+/* Number of node (x, y, z), each from -4 to n + 3; -1: it does not exist now. */
+GS4I_INLINE int64_t gs4i_node_at(const gs4i_grid *g, int x, int y, int z)
+{
+    const int slot =
+        g->table[gs4i_block_number(g, gs4i_block_at(x), gs4i_block_at(y), gs4i_block_at(z))] - 1;
+    return slot < 0 ? -1 : (int64_t)gs4i_first_node(slot) + gs4i_place_of(x, y, z);
+}
+
+/* Coordinates of the first node of a block, in cells. */
+GS4I_INLINE void gs4i_block_origin(const gs4i_grid *g, uint32_t block, int first[3])
+{
+    int a;
+    gs4i_block_coordinates(g, block, first);
+    for (a = 0; a < 3; a++) first[a] = 4 * first[a] - 4;
+}
+
+/* Coordinates of node i of the block that begins at `first`. */
+GS4I_INLINE void gs4i_node_coordinates(const int first[3], int i, int x[3])
+{
+    x[0] = first[0] + (i & 3);
+    x[1] = first[1] + (i >> 2 & 3);
+    x[2] = first[2] + (i >> 4);
+}
+
+/* World position of the data of cell x that lives at `place`: of its centre, low face or edge. */
+GS4I_INLINE gs4_vec3 gs4i_place_position(const gs4i_grid *g, const int x[3], int place)
+{
+    return gs4i_add(g->origin, gs4i_scale(gs4i_vec3(GS4I_C(x[0]) + GS4I_C(place & 1 ? 0 : 0.5),
+                                                    GS4I_C(x[1]) + GS4I_C(place & 2 ? 0 : 0.5),
+                                                    GS4I_C(x[2]) + GS4I_C(place & 4 ? 0 : 0.5)),
+                                          g->h));
+}
+
+GS4I_INLINE gs4_vec3 gs4i_node_position(const gs4i_grid *g, uint32_t node)
+{
+    int first[3], x[3];
+    gs4i_block_origin(g, g->block[gs4i_slot_of(node)], first);
+    gs4i_node_coordinates(first, (int)(node % GS4I_BLOCK_NODES), x);
+    return gs4i_place_position(g, x, GS4I_AT_CELL);
+}
+
+static gs4_vec3 gs4i_block_centre(const gs4i_grid *g, uint32_t block)
+{
+    int first[3];
+    gs4i_block_origin(g, block, first);
+    return gs4i_add(g->origin, gs4i_scale(gs4i_vec3(GS4I_C(first[0] + 2), GS4I_C(first[1] + 2),
+                                                    GS4I_C(first[2] + 2)),
+                                          g->h));
+}
+
+/* Slot of the block that p is in, -1: it has no nodes. */
+static int gs4i_slot_at(const gs4i_grid *g, const gs4_real p[3])
+{
+    const gs4_real origin[3] = { g->origin.x, g->origin.y, g->origin.z };
+    int at[3], a;
+    for (a = 0; a < 3; a++) {
+        const gs4_real t = (p[a] - origin[a]) * g->inv_h + 4;
+        if (!(t >= 0 && t < GS4I_C(g->cells[a]) + 8)) return -1;
+        at[a] = gs4i_block_at((int)t - 4);
+    }
+    return gs4i_slot_of_block(g, at[0], at[1], at[2]);
+}
+
+/* The tile of a block, for the kernels: it begins two nodes before the block. */
+GS4I_INLINE gs4i_frame gs4i_tile_frame(const gs4i_grid *g, uint32_t block)
+{
+    gs4i_frame f;
+    int first[3], a;
+    gs4i_block_origin(g, block, first);
+    for (a = 0; a < 3; a++) f.first[a] = GS4I_C(first[a] - 2);
+    f.origin[0] = g->origin.x;
+    f.origin[1] = g->origin.y;
+    f.origin[2] = g->origin.z;
+    f.inv_h = g->inv_h;
+    return f;
+}
+
+/* Does the tile of occupied block o reach over the edge of the domain? */
+static int gs4i_at_edge(const gs4i_grid *g, int o)
+{
+    int first[3], a, edge = 0;
+    gs4i_block_origin(g, g->occupied_block[o], first);
+    for (a = 0; a < 3; a++) edge |= first[a] == 0 || first[a] + 6 > g->cells[a];
+    return edge;
+}
+
+/* Fields of a step by what they hold at its stages; what is scattered is made into it in place:
+ * momentum into velocity when S3 ends, force into acceleration in S6. */
+GS4I_INLINE gs4_real *gs4i_velocity(const gs4i_grid *g) { return g->momentum; }
+GS4I_INLINE gs4_real *gs4i_acceleration(const gs4i_grid *g) { return g->force; }
+
+/* The velocity whose gradients particles see. */
+GS4I_INLINE gs4_real *gs4i_gradient_velocity(const gs4i_grid *g)
+{
+    return g->with_deconvolution ? g->deconvolved : g->momentum;
+}
+
+/* Velocity jumps by contact exist in blocks near walls and colliders: see [[boundary]]. */
+GS4I_INLINE int gs4i_has_jumps(const gs4i_grid *g, int slot) { return g->jump_of[slot] > 0; }
+
+/* Jumps of the nodes of a block, NULL: it has none. */
+GS4I_INLINE gs4_real *gs4i_jumps_of(const gs4i_grid *g, int slot)
+{
+    return g->jump_of[slot] ? gs4i_of_slot(g->jump, g->jump_of[slot] - 1) : NULL;
+}
+
+GS4I_INLINE gs4_real *gs4i_jump_of_node(const gs4i_grid *g, uint32_t node)
+{
+    return gs4i_jumps_of(g, gs4i_slot_of(node)) + 4 * (node % GS4I_BLOCK_NODES);
+}
+
+/* Has any block that the tile of occupied block o reaches jumps? */
+static int gs4i_jumps_are_near(const gs4i_grid *g, int o)
+{
+    int i, any = 0;
+    for (i = 0; i < 27; i++) any |= g->jump_of[g->neighbour[27 * (size_t)o + (size_t)i]];
+    return any != 0;
 }
 
 /* Block that holds the particles of cell (x, y, z). Cells beyond the domain belong to the
@@ -4615,7 +4794,7 @@ GS4I_INLINE uint32_t gs4i_home_block(const gs4i_grid *g, const int cell[3])
     int at[3], a;
     for (a = 0; a < 3; a++) {
         int c = cell[a] < 0 ? 0 : cell[a] >= g->cells[a] ? g->cells[a] - 1 : cell[a];
-        at[a] = (c >> 2) + 1;
+        at[a] = gs4i_block_at(c);
     }
     return gs4i_block_number(g, at[0], at[1], at[2]);
 }
@@ -4638,7 +4817,7 @@ static void gs4i_grid_free(gs4i_memory *m, gs4i_grid *g)
     gs4i_free(m, g->neighbour, o, 27 * sizeof *g->neighbour);
     gs4i_free(m, g->by_colour, o, sizeof *g->by_colour);
     gs4i_free(m, g->jump, (size_t)g->jump_capacity, GS4I_NODE_REALS * sizeof(gs4_real));
-    gs4i_free(m, g->contact, (size_t)g->jump_capacity, GS4I_BLOCK_NODES);
+    gs4i_free(m, g->flags, c, GS4I_BLOCK_NODES);
     gs4i_free(m, g->lists[0].data, g->lists[0].bytes, 1);
     gs4i_free(m, g->lists[1].data, g->lists[1].bytes, 1);
     gs4i_free(m, g->histogram.data, g->histogram.bytes, 1);
@@ -4659,10 +4838,11 @@ static int gs4i_grid_reserve(gs4i_memory *m, gs4i_grid *g, int count, int with_r
     n.spread = (gs4_real *)gs4i_alloc(m, c, 4 * sizeof *n.spread);
     n.momentum = (gs4_real *)gs4i_alloc(m, c, node);
     n.force = (gs4_real *)gs4i_alloc(m, c, node);
+    n.flags = (uint8_t *)gs4i_alloc(m, c, GS4I_BLOCK_NODES);
     n.remembered = with_remembered ? (gs4_real *)gs4i_alloc(m, c, node) : NULL;
     n.deconvolved = g->with_deconvolution ? (gs4_real *)gs4i_alloc(m, c, node) : NULL;
     n.fill_fraction = g->with_deconvolution ? (gs4_real *)gs4i_alloc(m, c, one) : NULL;
-    if (!n.block || !n.occupant || !n.jump_of || !n.spread || !n.momentum || !n.force
+    if (!n.block || !n.occupant || !n.jump_of || !n.spread || !n.momentum || !n.force || !n.flags
         || (with_remembered && !n.remembered)
         || (g->with_deconvolution && (!n.deconvolved || !n.fill_fraction))) {
         gs4i_free(m, n.block, c, sizeof *n.block);
@@ -4674,9 +4854,11 @@ static int gs4i_grid_reserve(gs4i_memory *m, gs4i_grid *g, int count, int with_r
         gs4i_free(m, n.remembered, c, node);
         gs4i_free(m, n.deconvolved, c, node);
         gs4i_free(m, n.fill_fraction, c, one);
+        gs4i_free(m, n.flags, c, GS4I_BLOCK_NODES);
         return GS4_ERROR_MEMORY;
     }
     if (g->block) memcpy(n.block, g->block, keep * sizeof *n.block);
+    if (g->flags) memcpy(n.flags, g->flags, keep * GS4I_BLOCK_NODES);
     if (g->remembered) memcpy(n.remembered, g->remembered, keep * node);
     gs4i_free(m, g->block, old, sizeof *g->block);
     gs4i_free(m, g->occupant, old, sizeof *g->occupant);
@@ -4687,6 +4869,7 @@ static int gs4i_grid_reserve(gs4i_memory *m, gs4i_grid *g, int count, int with_r
     gs4i_free(m, g->remembered, old, node);
     gs4i_free(m, g->deconvolved, old, node);
     gs4i_free(m, g->fill_fraction, old, one);
+    gs4i_free(m, g->flags, old, GS4I_BLOCK_NODES);
     *g = n;
     return GS4_OK;
 }
@@ -4740,7 +4923,7 @@ static int gs4i_axis_reach(const gs4i_grid *g, int axis, int b, int out[6])
             int wrapped = node < 0          ? node + n_cells
                           : node >= n_cells ? node - n_cells
                                             : node,
-                at = (wrapped >> 2) + 1;
+                at = gs4i_block_at(wrapped);
             if (wrapped == node) continue;
             for (i = 0; i < n && out[i] != at; i++) {
             }
@@ -4756,10 +4939,10 @@ static int gs4i_axis_reach(const gs4i_grid *g, int axis, int b, int out[6])
 /* Does any node of this slot remember something? */
 static int gs4i_slot_remembers(const gs4i_grid *g, int slot)
 {
-    const gs4_real *ag = g->remembered + (size_t)slot * GS4I_NODE_REALS;
+    const uint8_t *flags = g->flags + gs4i_first_node(slot);
     int i, any = 0;
-    for (i = 3; i < GS4I_NODE_REALS; i += 4) any |= ag[i] > 0;
-    return any;
+    for (i = 0; i < GS4I_BLOCK_NODES; i++) any |= flags[i] & GS4I_LASTS;
+    return any != 0;
 }
 
 /* Make the list of blocks that need nodes in lists[1]: all that the occupied ones reach, and
@@ -4855,12 +5038,38 @@ static int gs4i_grid_is_complete(const gs4i_grid *g)
     return 1;
 }
 
+/* What nodes remember, moved to the slots of the n blocks of `list`. Between steps `force` and
+ * `momentum` are free: they take the new order. */
+static void gs4i_grid_carry(gs4i_grid *g, const uint32_t *list, int n, int with_remembered)
+{
+    uint8_t *flags = (uint8_t *)g->momentum;
+    gs4_real *before = g->remembered;
+    int s;
+    for (s = 0; s < n; s++) {
+        const int old = g->table[list[s]] - 1;
+        uint8_t *to = flags + gs4i_first_node(s);
+        if (old >= 0)
+            memcpy(to, g->flags + gs4i_first_node(old), GS4I_BLOCK_NODES);
+        else
+            memset(to, 0, GS4I_BLOCK_NODES);
+        if (!with_remembered) continue;
+        if (old >= 0)
+            memcpy(gs4i_of_slot(g->force, s), gs4i_of_slot(before, old),
+                   GS4I_NODE_REALS * sizeof(gs4_real));
+        else
+            memset(gs4i_of_slot(g->force, s), 0, GS4I_NODE_REALS * sizeof(gs4_real));
+    }
+    memcpy(g->flags, flags, (size_t)n * GS4I_BLOCK_NODES);
+    if (!with_remembered) return;
+    g->remembered = g->force;
+    g->force = before;
+}
+
 /* Give nodes to the occupied blocks and all within their reach; what nodes remember moves with
  * them. `occupied` ascending. Nothing changes when memory is refused. */
 static int gs4i_grid_occupy(gs4i_memory *m, gs4i_grid *g, const uint32_t *occupied, int count,
                             int with_remembered)
 {
-    const size_t node = GS4I_NODE_REALS;
     uint32_t *list;
     int n = gs4i_grid_collect(m, g, occupied, count), s;
     if (n < 0) return n;
@@ -4869,20 +5078,7 @@ static int gs4i_grid_occupy(gs4i_memory *m, gs4i_grid *g, const uint32_t *occupi
         return GS4_ERROR_MEMORY;
     list = (uint32_t *)g->lists[1].data;
     gs4i_sort(list, n);
-    /* `force` is free between steps: fill it, then swap */
-    for (s = 0; with_remembered && s < n; s++) {
-        int32_t old = g->table[list[s]];
-        if (old)
-            memcpy(g->force + node * (size_t)s, g->remembered + node * (size_t)(old - 1),
-                   node * sizeof(gs4_real));
-        else
-            memset(g->force + node * (size_t)s, 0, node * sizeof(gs4_real));
-    }
-    if (with_remembered) {
-        gs4_real *t = g->force;
-        g->force = g->remembered;
-        g->remembered = t;
-    }
+    gs4i_grid_carry(g, list, n, with_remembered);
     for (s = 0; s < g->active; s++) g->table[g->block[s]] = 0;
     for (s = 0; s < n; s++) {
         g->table[list[s]] = s + 1;
@@ -4900,7 +5096,8 @@ static int gs4i_grid_occupy(gs4i_memory *m, gs4i_grid *g, const uint32_t *occupi
 GS4I_INLINE void gs4i_tile_row(const gs4i_grid *g, int o, int y, int z, ptrdiff_t at[3])
 {
     const int32_t *nb = g->neighbour + 27 * (size_t)o;
-    int by = (y + 2) >> 2, bz = (z + 2) >> 2, row = ((((z + 2) & 3) << 2) | ((y + 2) & 3)) << 4, i;
+    const int by = (y + 2) >> 2, bz = (z + 2) >> 2, row = 4 * gs4i_place_of(0, y + 2, z + 2);
+    int i;
     for (i = 0; i < 3; i++) at[i] = (ptrdiff_t)nb[(bz * 3 + by) * 3 + i] * GS4I_NODE_REALS + row;
 }
 
@@ -7374,7 +7571,7 @@ static void gs4i_begin_heat(const gs4i_particles *p, size_t i, const gs4i_materi
  * jump, which goes to the velocity of the particles directly and never into their rates (METHOD:
  * "contact stays out of the rates"). */
 
-/* node numbers: 64 slot + place in the block */
+/* Numbers of a mirror node and of the node inside whose field it continues. */
 typedef struct gs4i_mirror_pair {
     uint32_t mirror, inner;
 } gs4i_mirror_pair;
@@ -7802,50 +7999,49 @@ GS4I_INLINE int gs4i_mirrored(gs4_wall wall, int at, int n)
     return at < 0 ? -1 - at : 2 * n - 1 - at;
 }
 
+/* The mirror nodes of a wall in a block, behind what `list` has already; NULL: they are counted. */
+static int gs4i_mirror_nodes_of(const gs4i_boundary *b, const gs4i_grid *g, int wall, int slot,
+                                gs4i_mirror_pair *list)
+{
+    const int axis = wall / 2, n = g->cells[axis];
+    int first[3], x[3], i, count = 0;
+    gs4i_block_origin(g, g->block[slot], first);
+    if (wall & 1 ? first[axis] + 3 < n : first[axis] >= 0) return 0;
+    for (i = 0; i < GS4I_BLOCK_NODES; i++) {
+        int64_t inner;
+        gs4i_node_coordinates(first, i, x);
+        if (wall & 1 ? x[axis] < n || x[axis] > n + 1 : x[axis] > -1 || x[axis] < -2) continue;
+        x[axis] = gs4i_mirrored(b->walls[wall], x[axis], n);
+        inner = gs4i_node_at(g, x[0], x[1], x[2]);
+        if (inner < 0) continue;
+        if (list) {
+            list[count].mirror = gs4i_first_node(slot) + (uint32_t)i;
+            list[count].inner = (uint32_t)inner;
+        }
+        count++;
+    }
+    return count;
+}
+
 /* List the pairs of every wall; called when the blocks have changed. */
 static int gs4i_list_mirror_nodes(gs4i_memory *m, gs4i_boundary *b, const gs4i_grid *g)
 {
-    int wall, s, pass, i;
+    int wall, s;
     for (wall = 0; wall < 6; wall++) {
-        int axis = wall / 2, n = g->cells[axis], count = 0;
+        int count = 0;
         if (b->walls[wall] == GS4_WALL_OPEN) continue;
-        for (pass = 0; pass < 2; pass++) { /* count, then fill */
-            if (pass && count > b->mirror_capacity[wall]) {
-                int wanted = count + count / 4;
-                gs4i_mirror_pair *list =
-                    (gs4i_mirror_pair *)gs4i_alloc(m, (size_t)wanted, sizeof *list);
-                if (!list) return GS4_ERROR_MEMORY;
-                gs4i_free(m, b->mirrors[wall], (size_t)b->mirror_capacity[wall], sizeof *list);
-                b->mirrors[wall] = list;
-                b->mirror_capacity[wall] = wanted;
-            }
-            count = 0;
-            for (s = 0; s < g->active; s++) {
-                int at[3], first;
-                gs4i_block_coordinates(g, g->block[s], at);
-                first = 4 * (at[axis] - 1);
-                if (wall & 1 ? first + 3 < n : first >= 0) continue;
-                for (i = 0; i < GS4I_BLOCK_NODES; i++) {
-                    int x[3], inner;
-                    ptrdiff_t to;
-                    x[0] = 4 * (at[0] - 1) + (i & 3);
-                    x[1] = 4 * (at[1] - 1) + (i >> 2 & 3);
-                    x[2] = 4 * (at[2] - 1) + (i >> 4);
-                    if (wall & 1 ? x[axis] < n || x[axis] > n + 1 : x[axis] > -1 || x[axis] < -2)
-                        continue;
-                    inner = gs4i_mirrored(b->walls[wall], x[axis], n);
-                    x[axis] = inner;
-                    to = gs4i_node_at(g, x[0], x[1], x[2]);
-                    if (to < 0) continue;
-                    if (pass) {
-                        gs4i_mirror_pair *p = &b->mirrors[wall][count];
-                        p->mirror = (uint32_t)(64 * s + i);
-                        p->inner = (uint32_t)(to / 4);
-                    }
-                    count++;
-                }
-            }
+        for (s = 0; s < g->active; s++) count += gs4i_mirror_nodes_of(b, g, wall, s, NULL);
+        if (count > b->mirror_capacity[wall]) {
+            int wanted = count + count / 4;
+            gs4i_mirror_pair *list =
+                (gs4i_mirror_pair *)gs4i_alloc(m, (size_t)wanted, sizeof *list);
+            if (!list) return GS4_ERROR_MEMORY;
+            gs4i_free(m, b->mirrors[wall], (size_t)b->mirror_capacity[wall], sizeof *list);
+            b->mirrors[wall] = list;
+            b->mirror_capacity[wall] = wanted;
         }
+        for (count = 0, s = 0; s < g->active; s++)
+            count += gs4i_mirror_nodes_of(b, g, wall, s, b->mirrors[wall] + count);
         b->mirror_count[wall] = count;
     }
     return GS4_OK;
@@ -7859,32 +8055,23 @@ static int gs4i_list_mirror_nodes(gs4i_memory *m, gs4i_boundary *b, const gs4i_g
 #define GS4I_IMAGE_REACH GS4I_C(3)
 #define GS4I_IMAGE_NODES GS4I_C(1.5)
 
-static gs4_vec3 gs4i_block_midst(const gs4i_grid *g, uint32_t block)
-{
-    int at[3];
-    gs4i_block_coordinates(g, block, at);
-    return gs4i_add(g->origin, gs4i_scale(gs4i_vec3(GS4I_C(4 * at[0] - 2), GS4I_C(4 * at[1] - 2),
-                                                    GS4I_C(4 * at[2] - 2)),
-                                          g->h));
-}
-
 /* Can a body hold any node of a block? By its distance from the midst: half the diagonal of the
  * block's nodes, and its reach. */
 static int gs4i_collider_is_near(const gs4i_collider *b, const gs4i_grid *g, int slot)
 {
-    return gs4i_collider_distance(b, gs4i_block_midst(g, g->block[slot]))
+    return gs4i_collider_distance(b, gs4i_block_centre(g, g->block[slot]))
            < (GS4I_C(2.7) + GS4I_IMAGE_NODES) * g->h;
 }
 
-/* Give a place for jumps to the blocks that touch a wall or a body. */
+/* Give a place for jumps to the blocks that touch a wall or a collider. */
 static int gs4i_place_jumps(gs4i_memory *m, const gs4i_boundary *b, gs4i_grid *g)
 {
     int wall, i, s, n = 0;
     memset(g->jump_of, 0, (size_t)g->active * sizeof *g->jump_of);
     for (wall = 0; wall < 6; wall++)
         for (i = 0; i < b->mirror_count[wall] && b->walls[wall] < GS4_WALL_OPEN; i++) {
-            g->jump_of[b->mirrors[wall][i].mirror / 64] = 1;
-            g->jump_of[b->mirrors[wall][i].inner / 64] = 1;
+            g->jump_of[gs4i_slot_of(b->mirrors[wall][i].mirror)] = 1;
+            g->jump_of[gs4i_slot_of(b->mirrors[wall][i].inner)] = 1;
         }
     for (i = 0; i < b->collider_count; i++)
         for (s = 0; s < g->active; s++)
@@ -7895,149 +8082,176 @@ static int gs4i_place_jumps(gs4i_memory *m, const gs4i_boundary *b, gs4i_grid *g
     if (n > g->jump_capacity) {
         int wanted = n + n / 4;
         gs4_real *jump = (gs4_real *)gs4i_alloc(m, (size_t)wanted, GS4I_NODE_REALS * sizeof *jump);
-        uint8_t *contact = (uint8_t *)gs4i_alloc(m, (size_t)wanted, GS4I_BLOCK_NODES);
-        if (!jump || !contact) {
-            gs4i_free(m, jump, (size_t)wanted, GS4I_NODE_REALS * sizeof *jump);
-            gs4i_free(m, contact, (size_t)wanted, GS4I_BLOCK_NODES);
-            return GS4_ERROR_MEMORY;
-        }
+        if (!jump) return GS4_ERROR_MEMORY;
         gs4i_free(m, g->jump, (size_t)g->jump_capacity, GS4I_NODE_REALS * sizeof *jump);
-        gs4i_free(m, g->contact, (size_t)g->jump_capacity, GS4I_BLOCK_NODES);
         g->jump = jump;
-        g->contact = contact;
         g->jump_capacity = wanted;
     }
     return GS4_OK;
 }
 
-GS4I_INLINE gs4_real *gs4i_jump_at(const gs4i_grid *g, uint32_t node)
+/* How a field continues behind a wall, number c of a node:
+ *     mirror[c] = sign[c] inner[c] + shift[c] inner[by]       (by -1: + shift[c])
+ * and how what was scattered to mirror nodes is folded back: inner[c] += the same of mirror. */
+typedef struct gs4i_parity {
+    gs4_real sign[4], shift[4];
+    int by, reals; /* of the 4 numbers of a node the first `reals` continue */
+    int always;    /* also where a separating wall is not in contact */
+} gs4i_parity;
+
+/* Parities of vectors at the six walls. Stick: odd; slip and separate: odd along the normal, even
+ * along the wall; periodic: the same a period away. A fourth number is even. */
+static void gs4i_vector_parity(const gs4i_boundary *b, int reals, gs4i_parity parity[6])
 {
-    return g->jump + GS4I_NODE_REALS * (size_t)(g->jump_of[node / 64] - 1)
-           + 4 * (size_t)(node % 64);
+    int wall, c;
+    memset(parity, 0, 6 * sizeof *parity);
+    for (wall = 0; wall < 6; wall++) {
+        const gs4_wall kind = b->walls[wall];
+        for (c = 0; c < 4; c++)
+            parity[wall].sign[c] = GS4I_C(c == 3 || kind == GS4_WALL_PERIODIC
+                                                  || (kind != GS4_WALL_STICK && c != wall / 2)
+                                              ? 1
+                                              : -1);
+        parity[wall].reals = reals;
+        parity[wall].by = -1;
+    }
 }
 
-/* Contact of a node: bit a: an image that folds along axis a; and those below. */
-GS4I_INLINE uint8_t *gs4i_contact_at(const gs4i_grid *g, uint32_t node)
+/* Does this mirror node act in this step? */
+GS4I_INLINE int gs4i_in_contact(const gs4i_boundary *b, const gs4i_grid *g,
+                                const gs4i_mirror_pair *pair, int wall)
 {
-    return g->contact + (size_t)GS4I_BLOCK_NODES * (size_t)(g->jump_of[node / 64] - 1) + node % 64;
+    return b->walls[wall] == GS4_WALL_PERIODIC || (g->flags[pair->mirror] >> (wall / 2) & 1);
 }
 
-#define GS4I_PRESSED 8 /* material pressed on the wall there */
-/* images of particles behind a sticky body reach the node */
-#define GS4I_IMAGED 16
-#define GS4I_UNIMAGED 32 /* a particle near a sticky body does, that has none */
-
-GS4I_INLINE void gs4i_reflection(gs4_wall wall, int axis, gs4_real sign[3])
+GS4I_INLINE gs4_real gs4i_continued(const gs4i_parity *p, const gs4_real *from, int c)
 {
-    int a;
-    for (a = 0; a < 3; a++)
-        sign[a] =
-            GS4I_C(wall == GS4_WALL_PERIODIC || (wall != GS4_WALL_STICK && a != axis) ? 1 : -1);
+    const gs4_real own = p->sign[c] * from[c];
+    return p->shift[c] != 0 ? own + (p->by < 0 ? p->shift[c] : p->shift[c] * from[p->by]) : own;
 }
 
-/* Is this image of a separating wall in contact? While material moves into the wall, or pressed
- * on it in the last step. */
-static int gs4i_wall_touches(const gs4i_grid *g, const gs4i_mirror_pair *pair, int wall)
+/* Fold what reached the mirror nodes of one wall back. */
+static void gs4i_fold_wall(const gs4i_boundary *b, const gs4i_grid *g, gs4_real *field, int wall,
+                           const gs4i_parity *p)
 {
-    int axis = wall / 2;
-    gs4_real outward = wall & 1 ? GS4I_C(1) : GS4I_C(-1);
-    gs4_real into = (g->momentum[4 * (size_t)pair->mirror + (size_t)axis]
-                     + g->momentum[4 * (size_t)pair->inner + (size_t)axis])
-                    * outward;
-    return into > 0 || (g->remembered && g->remembered[4 * (size_t)pair->mirror + 3] >= 2);
+    int i, c;
+    for (i = 0; i < b->mirror_count[wall]; i++) {
+        const gs4i_mirror_pair *pair = &b->mirrors[wall][i];
+        const gs4_real *from = gs4i_of_node(field, pair->mirror);
+        gs4_real *to = gs4i_of_node(field, pair->inner);
+        if (!p->always && !gs4i_in_contact(b, g, pair, wall)) continue;
+        for (c = 0; c < p->reals; c++) to[c] += gs4i_continued(p, from, c);
+    }
 }
 
-/* Fold mass and momentum back from images; the fourth number of the jump is 1 where one did,
- * `contact` has along which axes. */
+/* Fold at all walls. */
+static void gs4i_fold(const gs4i_boundary *b, const gs4i_grid *g, gs4_real *field,
+                      const gs4i_parity parity[6])
+{
+    int wall;
+    for (wall = 0; wall < 6; wall++) gs4i_fold_wall(b, g, field, wall, &parity[wall]);
+}
+
+/* Let mirror nodes continue a field; axes in the reverse order of folding. */
+static void gs4i_fill(const gs4i_boundary *b, const gs4i_grid *g, gs4_real *field,
+                      const gs4i_parity parity[6])
+{
+    int wall, i, c;
+    for (wall = 5; wall >= 0; wall--)
+        for (i = 0; i < b->mirror_count[wall]; i++) {
+            const gs4i_parity *p = &parity[wall];
+            const gs4i_mirror_pair *pair = &b->mirrors[wall][i];
+            const gs4_real *from = gs4i_of_node(field, pair->inner);
+            gs4_real *to = gs4i_of_node(field, pair->mirror);
+            if (!p->always && !gs4i_in_contact(b, g, pair, wall)) continue;
+            for (c = 0; c < p->reals; c++) to[c] = gs4i_continued(p, from, c);
+        }
+}
+
+/* Find the mirror nodes of a wall that are in contact: all, but of a separating wall those where
+ * material moves into it or pressed on it in the last step. Their jump has 1 as fourth number. */
+static void gs4i_find_contact(const gs4i_boundary *b, const gs4i_grid *g, int wall)
+{
+    const int axis = wall / 2;
+    const gs4_real outward = wall & 1 ? GS4I_C(1) : GS4I_C(-1);
+    int i;
+    if (b->walls[wall] == GS4_WALL_PERIODIC) return;
+    for (i = 0; i < b->mirror_count[wall]; i++) {
+        const gs4i_mirror_pair *pair = &b->mirrors[wall][i];
+        const gs4_real into = (gs4i_of_node(g->momentum, pair->mirror)[axis]
+                               + gs4i_of_node(g->momentum, pair->inner)[axis])
+                              * outward;
+        if (b->walls[wall] == GS4_WALL_SEPARATE && !(into > 0)
+            && !(g->flags[pair->mirror] & GS4I_WAS_PRESSED))
+            continue;
+        gs4i_jump_of_node(g, pair->mirror)[3] = 1;
+        g->flags[pair->mirror] |= (uint8_t)(1 << axis);
+    }
+}
+
+/* Fold mass and momentum; what is in contact is found on the way. */
 static void gs4i_fold_momentum(const gs4i_boundary *b, const gs4i_grid *g)
 {
-    int wall, i, a;
+    gs4i_parity parity[6];
+    int wall;
+    gs4i_vector_parity(b, 4, parity);
     for (wall = 0; wall < 6; wall++) {
-        gs4_real sign[3];
-        gs4i_reflection(b->walls[wall], wall / 2, sign);
-        for (i = 0; i < b->mirror_count[wall]; i++) {
-            const gs4i_mirror_pair *pair = &b->mirrors[wall][i];
-            const gs4_real *from = g->momentum + 4 * (size_t)pair->mirror;
-            gs4_real *to = g->momentum + 4 * (size_t)pair->inner;
-            if (b->walls[wall] == GS4_WALL_SEPARATE && !gs4i_wall_touches(g, pair, wall)) continue;
-            if (b->walls[wall] != GS4_WALL_PERIODIC) {
-                gs4i_jump_at(g, pair->mirror)[3] = 1;
-                *gs4i_contact_at(g, pair->mirror) |= (uint8_t)(1 << wall / 2);
-            }
-            for (a = 0; a < 3; a++) to[a] += sign[a] * from[a];
-            to[3] += from[3];
-        }
+        gs4i_find_contact(b, g, wall);
+        gs4i_fold_wall(b, g, g->momentum, wall, &parity[wall]);
     }
 }
 
-GS4I_INLINE int gs4i_is_folded(const gs4i_boundary *b, const gs4i_grid *g,
-                               const gs4i_mirror_pair *pair, int wall)
+/* Fold forces of stress: what pushes out of the domain presses on a separating wall. */
+static void gs4i_fold_force(const gs4i_boundary *b, const gs4i_grid *g)
 {
-    return b->walls[wall] == GS4_WALL_PERIODIC
-           || (*gs4i_contact_at(g, pair->mirror) >> (wall / 2) & 1);
-}
-
-/* Fold forces; where `stress` is among them, what pushes out presses on the wall. */
-static void gs4i_fold_force(const gs4i_boundary *b, const gs4i_grid *g, int stress)
-{
-    int wall, i, a;
+    gs4i_parity parity[6];
+    int wall, i;
+    gs4i_vector_parity(b, 3, parity);
     for (wall = 0; wall < 6; wall++) {
-        gs4_real sign[3], outward = wall & 1 ? GS4I_C(1) : GS4I_C(-1);
-        gs4i_reflection(b->walls[wall], wall / 2, sign);
-        for (i = 0; i < b->mirror_count[wall]; i++) {
-            const gs4i_mirror_pair *pair = &b->mirrors[wall][i];
-            const gs4_real *from = g->force + 4 * (size_t)pair->mirror;
-            gs4_real *to = g->force + 4 * (size_t)pair->inner;
-            int folded = gs4i_is_folded(b, g, pair, wall);
-            if (stress && b->walls[wall] == GS4_WALL_SEPARATE && from[wall / 2] * outward > 0)
-                *gs4i_contact_at(g, pair->mirror) |= GS4I_PRESSED;
-            if (folded)
-                for (a = 0; a < 3; a++) to[a] += sign[a] * from[a];
+        const gs4_real outward = wall & 1 ? GS4I_C(1) : GS4I_C(-1);
+        for (i = 0; i < b->mirror_count[wall] && b->walls[wall] == GS4_WALL_SEPARATE; i++) {
+            const uint32_t mirror = b->mirrors[wall][i].mirror;
+            if (gs4i_of_node(g->force, mirror)[wall / 2] * outward > 0)
+                g->flags[mirror] |= GS4I_PRESSED;
         }
+        gs4i_fold_wall(b, g, g->force, wall, &parity[wall]);
     }
 }
 
-/* Images take S times the field of their mirror nodes; axes in the reverse order of folding. */
+/* Let mirror nodes continue a field of vectors; the mass beside velocities behind periodic walls
+ * too. */
 static void gs4i_fill_mirror_nodes(const gs4i_boundary *b, const gs4i_grid *g, gs4_real *field)
 {
-    int wall, i, a;
-    for (wall = 5; wall >= 0; wall--) {
-        gs4_real sign[3];
-        gs4i_reflection(b->walls[wall], wall / 2, sign);
-        for (i = 0; i < b->mirror_count[wall]; i++) {
-            const gs4i_mirror_pair *pair = &b->mirrors[wall][i];
-            if (!gs4i_is_folded(b, g, pair, wall)) continue;
-            for (a = 0; a < 3; a++)
-                field[4 * (size_t)pair->mirror + (size_t)a] =
-                    sign[a] * field[4 * (size_t)pair->inner + (size_t)a];
-            if (b->walls[wall] == GS4_WALL_PERIODIC && field == g->momentum)
-                field[4 * (size_t)pair->mirror + 3] = field[4 * (size_t)pair->inner + 3];
-        }
-    }
+    gs4i_parity parity[6];
+    int wall;
+    gs4i_vector_parity(b, 3, parity);
+    for (wall = 0; wall < 6 && field == g->momentum; wall++)
+        if (b->walls[wall] == GS4_WALL_PERIODIC) parity[wall].reals = 4;
+    gs4i_fill(b, g, field, parity);
 }
 
-/* The same of one number a node. */
+/* Let mirror nodes be as full as the nodes inside. */
 static void gs4i_fill_mirror_fractions(const gs4i_boundary *b, const gs4i_grid *g)
 {
     int wall, i;
     for (wall = 5; wall >= 0; wall--)
         for (i = 0; i < b->mirror_count[wall]; i++) {
             const gs4i_mirror_pair *pair = &b->mirrors[wall][i];
-            if (gs4i_is_folded(b, g, pair, wall))
+            if (gs4i_in_contact(b, g, pair, wall))
                 g->fill_fraction[pair->mirror] = g->fill_fraction[pair->inner];
         }
 }
 
-/* Images that fold carry their weight alone: their other forces are folded already. The fourth
- * number of a force is the mass. */
+/* Mirror nodes in contact carry their weight alone: their other forces are folded already. The
+ * fourth number of a force is the mass. */
 static void gs4i_weigh_mirror_nodes(const gs4i_boundary *b, const gs4i_grid *g, gs4_vec3 gravity)
 {
     int wall, i;
     for (wall = 0; wall < 6; wall++)
         for (i = 0; i < b->mirror_count[wall]; i++) {
             const gs4i_mirror_pair *pair = &b->mirrors[wall][i];
-            gs4_real *f = g->force + 4 * (size_t)pair->mirror;
-            if (!gs4i_is_folded(b, g, pair, wall)) continue;
+            gs4_real *f = gs4i_of_node(g->force, pair->mirror);
+            if (!gs4i_in_contact(b, g, pair, wall)) continue;
             f[0] = f[3] * gravity.x;
             f[1] = f[3] * gravity.y;
             f[2] = f[3] * gravity.z;
@@ -8309,12 +8523,6 @@ GS4I_INLINE const gs4i_material_constants *gs4i_constants_of(const gs4_sim *sim,
 
 /* --- passes over nodes ------------------------------------------------------------------------ */
 
-/* The velocities of nodes whose gradients particles see. */
-GS4I_INLINE const gs4_real *gs4i_seen_nodes(const gs4i_grid *g)
-{
-    return g->with_deconvolution ? g->deconvolved : g->momentum;
-}
-
 enum {
     GS4I_GROUP = 16
 }; /* blocks a task */
@@ -8357,19 +8565,6 @@ typedef struct gs4i_pass {
     const int32_t *blocks;
     int count;
 } gs4i_pass;
-
-GS4I_INLINE gs4i_frame gs4i_tile_frame(const gs4i_grid *g, uint32_t block)
-{
-    gs4i_frame f;
-    int at[3], a;
-    gs4i_block_coordinates(g, block, at);
-    for (a = 0; a < 3; a++) f.first[a] = GS4I_C(4 * at[a] - 6);
-    f.origin[0] = g->origin.x;
-    f.origin[1] = g->origin.y;
-    f.origin[2] = g->origin.z;
-    f.inv_h = g->inv_h;
-    return f;
-}
 
 /* S2: a batch and its weights at the predicted positions. */
 GS4I_INLINE void gs4i_stage_batch(const gs4i_particles *p, size_t i, int n,
@@ -8977,19 +9172,6 @@ static const gs4i_collider *gs4i_nearest_sticky(const gs4i_boundary *b, gs4_vec3
     return found;
 }
 
-/* Slot of the block that p is in, -1: it has no nodes. */
-static int gs4i_slot_of(const gs4i_grid *g, const gs4_real p[3])
-{
-    const gs4_real origin[3] = { g->origin.x, g->origin.y, g->origin.z };
-    int at[3], a;
-    for (a = 0; a < 3; a++) {
-        const gs4_real t = (p[a] - origin[a]) * g->inv_h + 4;
-        if (!(t >= 0 && t < GS4I_C(g->cells[a]) + 8)) return -1;
-        at[a] = (int)t >> 2;
-    }
-    return g->table[gs4i_block_number(g, at[0], at[1], at[2])] - 1;
-}
-
 /* A flat surface near a block: all of the sticky bodies that its particles are near. */
 /* distance d at the midst of the block; body NULL: none */
 typedef struct gs4i_face {
@@ -9007,7 +9189,7 @@ static gs4i_face gs4i_find_face(const gs4_sim *sim, int o)
     gs4i_face f;
     int i, near = 0;
     memset(&f, 0, sizeof f); /* gs4i_place_image_particle reads d and n */
-    f.at = gs4i_block_midst(&sim->grid, sim->grid.occupied_block[o]);
+    f.at = gs4i_block_centre(&sim->grid, sim->grid.occupied_block[o]);
     for (i = 0; i < sim->boundary.collider_count; i++) {
         const gs4i_collider *b = &sim->boundary.colliders[i];
         const gs4_real d = gs4i_is_sticky(b) ? gs4i_collider_distance(b, f.at) : GS4I_HUGE;
@@ -9077,9 +9259,9 @@ static void gs4i_place_image_particle(const gs4_sim *sim, gs4_vec3 p, const gs4i
                         + deep)
                    < GS4I_C(0.25) * h)) {
         const gs4_real nearer[3] = { image.x + h * n.x, image.y + h * n.y, image.z + h * n.z };
-        g->slot = gs4i_slot_of(&sim->grid, g->x);
+        g->slot = gs4i_slot_at(&sim->grid, g->x);
         /* a tile has room for a cell around its block */
-        if (g->slot < 0) g->slot = gs4i_slot_of(&sim->grid, nearer);
+        if (g->slot < 0) g->slot = gs4i_slot_at(&sim->grid, nearer);
         if (g->slot >= 0 && (flat || d < deep || gs4i_collider_distance(collider, image) < 0))
             g->kind = GS4I_HAS_IMAGE;
         return;
@@ -9089,7 +9271,7 @@ static void gs4i_place_image_particle(const gs4_sim *sim, gs4_vec3 p, const gs4i
     g->x[0] = p.x;
     g->x[1] = p.y;
     g->x[2] = p.z;
-    g->slot = gs4i_slot_of(&sim->grid, g->x);
+    g->slot = gs4i_slot_at(&sim->grid, g->x);
     if (g->slot >= 0) g->kind = GS4I_HOLDS_NODES;
 }
 
@@ -9182,10 +9364,11 @@ static int gs4i_find_image_particles(gs4_sim *sim)
     if (!of) return gs4i_fail_memory(&sim->error);
     for (o = 0; o < grid->occupied; o++) {
         gs4_real d;
-        of[o] = gs4i_nearest_sticky(&sim->boundary, gs4i_block_midst(grid, grid->occupied_block[o]),
-                                    (GS4I_BLOCK_REACH + GS4I_IMAGE_REACH) * grid->h, &d)
-                    ? g->count
-                    : -1;
+        of[o] =
+            gs4i_nearest_sticky(&sim->boundary, gs4i_block_centre(grid, grid->occupied_block[o]),
+                                (GS4I_BLOCK_REACH + GS4I_IMAGE_REACH) * grid->h, &d)
+                ? g->count
+                : -1;
         if (of[o] >= 0) g->count += grid->first[o + 1] - grid->first[o];
     }
     if (!g->count) return GS4_OK;
@@ -9200,10 +9383,9 @@ static int gs4i_find_image_particles(gs4_sim *sim)
     return gs4i_sort_image_particles(sim);
 }
 
-/* Where the nodes of the 27 blocks around a slot are, negative where there are none; and its
- * frame. */
+/* Slots of the 27 blocks around a slot, -1 where there are no nodes; and the frame of its tile. */
 typedef struct gs4i_sticky_tile {
-    ptrdiff_t at[27];
+    int slot[27];
     gs4i_frame frame;
 } gs4i_sticky_tile;
 
@@ -9211,21 +9393,17 @@ static void gs4i_sticky_tile_of(const gs4i_grid *g, int slot, gs4i_sticky_tile *
 {
     int at[3], i;
     gs4i_block_coordinates(g, g->block[slot], at);
-    for (i = 0; i < 27; i++) {
-        const int x = at[0] + i % 3 - 1, y = at[1] + i / 3 % 3 - 1, z = at[2] + i / 9 - 1;
-        const int there =
-            x >= 0 && y >= 0 && z >= 0 && x < g->blocks[0] && y < g->blocks[1] && z < g->blocks[2];
-        t->at[i] =
-            there ? (ptrdiff_t)(g->table[gs4i_block_number(g, x, y, z)] - 1) * GS4I_NODE_REALS : -1;
-    }
+    for (i = 0; i < 27; i++)
+        t->slot[i] =
+            gs4i_slot_of_block(g, at[0] + i % 3 - 1, at[1] + i / 3 % 3 - 1, at[2] + i / 9 - 1);
     t->frame = gs4i_tile_frame(g, g->block[slot]);
 }
 
-/* Where node (x, y, z) of a tile is, negative where it does not exist. */
-GS4I_INLINE ptrdiff_t gs4i_sticky_tile_node(const gs4i_sticky_tile *t, int x, int y, int z)
+/* Number of node (x, y, z) of a tile, -1 where it does not exist. */
+GS4I_INLINE int64_t gs4i_sticky_tile_node(const gs4i_sticky_tile *t, int x, int y, int z)
 {
-    const ptrdiff_t at = t->at[(((z + 2) >> 2) * 3 + ((y + 2) >> 2)) * 3 + ((x + 2) >> 2)];
-    return at < 0 ? -1 : at + 4 * ((((z + 2) & 3) << 4) | (((y + 2) & 3) << 2) | ((x + 2) & 3));
+    const int slot = t->slot[(((z + 2) >> 2) * 3 + ((y + 2) >> 2)) * 3 + ((x + 2) >> 2)];
+    return slot < 0 ? -1 : (int64_t)gs4i_first_node(slot) + gs4i_place_of(x + 2, y + 2, z + 2);
 }
 
 /* The next n ghosts of a slot and their weights. */
@@ -9245,15 +9423,15 @@ static void gs4i_load_image_particles(gs4i_image_particle *all, const int32_t *o
 }
 
 /* Mark the nodes that a particle reaches which has no image. */
-static void gs4i_mark_unimaged(const gs4i_grid *grid, const gs4i_sticky_tile *t, int base)
+static void gs4i_mark_lacking_images(const gs4i_grid *grid, const gs4i_sticky_tile *t, int base)
 {
     int i;
     for (i = 0; i < 27; i++) {
-        const ptrdiff_t at = gs4i_sticky_tile_node(t, base % GS4I_TILE + i % 3,
+        const int64_t node = gs4i_sticky_tile_node(t, base % GS4I_TILE + i % 3,
                                                    base / GS4I_TILE % GS4I_TILE + i / 3 % 3,
                                                    base / (GS4I_TILE * GS4I_TILE) + i / 9);
-        if (at >= 0 && grid->jump_of[at / GS4I_NODE_REALS])
-            *gs4i_contact_at(grid, (uint32_t)(at / 4)) |= GS4I_UNIMAGED;
+        if (node >= 0 && gs4i_has_jumps(grid, gs4i_slot_of((uint32_t)node)))
+            grid->flags[node] |= GS4I_LACKS_IMAGE;
     }
 }
 
@@ -9276,13 +9454,14 @@ static void gs4i_sticky_tile_add(const gs4i_grid *grid, const gs4i_sticky_tile *
     for (z = 0; z < GS4I_TILE; z++)
         for (y = 0; y < GS4I_TILE; y++)
             for (x = 0; x < GS4I_TILE; x++, tile += 4) {
-                const ptrdiff_t at = gs4i_sticky_tile_node(t, x, y, z);
-                uint8_t *contact = at >= 0 && grid->jump_of[at / GS4I_NODE_REALS]
-                                       ? gs4i_contact_at(grid, (uint32_t)(at / 4))
-                                       : NULL;
-                if (at < 0 || (contact && (*contact & GS4I_UNIMAGED))) continue;
-                for (c = 0; c < 4; c++) field[at + c] += tile[c];
-                if (contact && field == grid->momentum && tile[3] > 0) *contact |= GS4I_IMAGED;
+                const int64_t node = gs4i_sticky_tile_node(t, x, y, z);
+                gs4_real *to;
+                if (node < 0 || (grid->flags[node] & GS4I_LACKS_IMAGE)) continue;
+                to = gs4i_of_node(field, (uint32_t)node);
+                for (c = 0; c < 4; c++) to[c] += tile[c];
+                if (field == grid->momentum && tile[3] > 0
+                    && gs4i_has_jumps(grid, gs4i_slot_of((uint32_t)node)))
+                    grid->flags[node] |= GS4I_IMAGED;
             }
 }
 
@@ -9310,7 +9489,7 @@ static void gs4i_scatter_image_block(const gs4i_pass *pass, int index, int what)
             const size_t four = 4 * sizeof *tile;
             if (s.base[b] < 0) continue;
             if (what == GS4I_IMAGE_MARKS && g[b]->kind == GS4I_HOLDS_NODES)
-                gs4i_mark_unimaged(&sim->grid, &t, s.base[b]);
+                gs4i_mark_lacking_images(&sim->grid, &t, s.base[b]);
             if (what == GS4I_IMAGE_MARKS) g[b]->whole = gs4i_is_whole(&t, s.base[b]);
             if (what == GS4I_IMAGE_MARKS || g[b]->kind == GS4I_HOLDS_NODES) continue;
             if (what == GS4I_IMAGE_MOMENTUM)
@@ -9380,7 +9559,7 @@ static void gs4i_gather_image_block(const gs4i_pass *pass, int index, int what)
     const int slot = pass->blocks[index];
     const int32_t *first = (const int32_t *)sim->image_particles.first.data,
                   *order = (const int32_t *)sim->image_particles.order.data;
-    const gs4_real *field = what ? sim->grid.force : gs4i_seen_nodes(&sim->grid);
+    const gs4_real *field = what ? sim->grid.force : gs4i_gradient_velocity(&sim->grid);
     gs4_real tile[GS4I_TILE_REALS], *to = tile;
     gs4i_sticky_tile t;
     int x, y, z, k, b, c;
@@ -9388,8 +9567,8 @@ static void gs4i_gather_image_block(const gs4i_pass *pass, int index, int what)
     for (z = 0; z < GS4I_TILE; z++)
         for (y = 0; y < GS4I_TILE; y++)
             for (x = 0; x < GS4I_TILE; x++, to += 4) {
-                const ptrdiff_t at = gs4i_sticky_tile_node(&t, x, y, z);
-                for (c = 0; c < 4; c++) to[c] = at < 0 ? 0 : field[at + c];
+                const int64_t node = gs4i_sticky_tile_node(&t, x, y, z);
+                for (c = 0; c < 4; c++) to[c] = node < 0 ? 0 : field[4 * node + c];
             }
     memset(to, 0, 16 * sizeof *to);
     for (k = first[slot]; k < first[slot + 1]; k += GS4I_BATCH) {
@@ -9648,7 +9827,7 @@ static void gs4i_scatter_stage(const gs4i_pass *pass, int index, gs4i_heat_pass 
     gs4i_image_particle *image_particles = gs4i_image_particles_of(sim, o);
     int row = 0;
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
-    gs4i_tile_load(&sim->grid, o, report->rows, gs4i_seen_nodes(&sim->grid), nodes);
+    gs4i_tile_load(&sim->grid, o, report->rows, gs4i_gradient_velocity(&sim->grid), nodes);
     if (deconvolved && p.with_subgrid)
         gs4i_tile_load(&sim->grid, o, report->rows, sim->grid.momentum, plain);
     memset(tile, 0, sizeof tile);
@@ -9665,7 +9844,7 @@ static void gs4i_scatter_stage(const gs4i_pass *pass, int index, gs4i_heat_pass 
         gs4i_lanes J, mu;
         gs4i_forces f;
         int b;
-        gs4i_tile_prefetch(&sim->grid, next, row, gs4i_seen_nodes(&sim->grid));
+        gs4i_tile_prefetch(&sim->grid, next, row, gs4i_gradient_velocity(&sim->grid));
         gs4i_tile_prefetch(&sim->grid, o, row, sim->grid.force);
         gs4i_stage_batch(&p, i, n, integrator.prediction, &frame, &q, &s);
         for (b = 0; b < n; b++) {
@@ -9709,36 +9888,26 @@ static void gs4i_scatter_forces_and_heat(int index, void *context)
 
 /* --- S7 --------------------------------------------------------------------------------------- */
 
-/* Whether any block around occupied block o has jumps; then their tile; the fourth number is 1
- * in images that fold, else 0. */
+/* The jumps around occupied block o; the fourth number is 1 in mirror nodes in contact, else 0.
+ * Returns 0, and nothing, where there are none. */
 static int gs4i_load_jumps(const gs4i_grid *g, int o, uint64_t rows, gs4_real *tile)
 {
-    const int32_t *nb = g->neighbour + 27 * (size_t)o;
-    int any = 0, i, row;
-    for (i = 0; i < 27; i++) any |= g->jump_of[nb[i]];
-    if (!any) return 0;
+    static const int from[3] = { 8, 0, 0 }, to[3] = { 0, 8, 24 }, count[3] = { 8, 16, 8 };
+    int i, row;
+    if (!gs4i_jumps_are_near(g, o)) return 0;
     memset(tile, 0, GS4I_TILE_REALS * sizeof *tile);
-    for (row = 0; row < 64; row++, tile += 4 * GS4I_TILE) {
+    for (row = 0; row < GS4I_TILE * GS4I_TILE; row++, tile += 4 * GS4I_TILE) {
         ptrdiff_t at[3];
         if (!(rows >> row & 1)) continue;
         gs4i_tile_row(g, o, row & 7, row >> 3, at);
         for (i = 0; i < 3; i++) {
-            static const int from[3] = { 8, 0, 0 }, to[3] = { 0, 8, 24 }, count[3] = { 8, 16, 8 };
-            if (!g->jump_of[at[i] / GS4I_NODE_REALS]) continue;
-            memcpy(tile + to[i], gs4i_jump_at(g, (uint32_t)(at[i] / 4)) + from[i],
-                   (size_t)count[i] * sizeof *tile);
+            const uint32_t node = (uint32_t)(at[i] / 4);
+            if (gs4i_has_jumps(g, gs4i_slot_of(node)))
+                memcpy(tile + to[i], gs4i_jump_of_node(g, node) + from[i],
+                       (size_t)count[i] * sizeof *tile);
         }
     }
     return 1;
-}
-
-/* Does the tile of occupied block o reach over the edge of the domain? */
-static int gs4i_at_edge(const gs4i_grid *g, int o)
-{
-    int at[3], a, edge = 0;
-    gs4i_block_coordinates(g, g->occupied_block[o], at);
-    for (a = 0; a < 3; a++) edge |= at[a] == 1 || 4 * at[a] + 2 > g->cells[a];
-    return edge;
 }
 
 /* How little the grid sees of a particle among few others, by how full its nodes are: 1 below 8
@@ -10054,7 +10223,7 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_heat
     int row = 0;
     size_t i = (size_t)grid->first[o], end = (size_t)grid->first[o + 1];
     if (!commit && gs4i_is_safe(pass, index)) return;
-    gs4i_tile_load(grid, o, report->rows, gs4i_seen_nodes(grid), u_nodes);
+    gs4i_tile_load(grid, o, report->rows, gs4i_gradient_velocity(grid), u_nodes);
     gs4i_tile_load(grid, o, report->rows, grid->force, a_nodes);
     gs4i_see_nothing(&seen);
     memset(&constants, 0, sizeof constants);
@@ -10067,7 +10236,7 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_heat
         gs4i_stencils s;
         gs4i_gathered acc, jump;
         int b, solids = 0;
-        gs4i_tile_prefetch(grid, next, row, gs4i_seen_nodes(grid));
+        gs4i_tile_prefetch(grid, next, row, gs4i_gradient_velocity(grid));
         gs4i_tile_prefetch(grid, next, row, grid->force);
         if (p.deformation_reals) {
             gs4i_load_constants(sim->constants, sim->solid_phase, &p, i, n, &constants);
@@ -10283,14 +10452,14 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, gs4i
     gs4i_history_constants past;
     gs4i_seen seen;
     gs4_real nodes[GS4I_TILE_REALS];
-    int edge = gs4i_at_edge(grid, o), c;
+    const int edge = gs4i_at_edge(grid, o) || gs4i_jumps_are_near(grid, o);
     const gs4i_image_particle *image_particles = gs4i_image_particles_of(sim, o);
     gs4i_gathered u;
     gs4i_stored out;
     int row = 0;
     size_t i = (size_t)grid->first[o], end = (size_t)grid->first[o + 1];
     if (!commit && gs4i_is_safe(pass, index)) return;
-    for (c = 0; c < 27; c++) edge |= grid->jump_of[grid->neighbour[27 * (size_t)o + (size_t)c]];
+
     gs4i_tile_load(grid, o, report->rows, grid->momentum, nodes);
     gs4i_see_nothing(&seen);
     memset(&constants, 0, sizeof constants);
@@ -11383,64 +11552,55 @@ static void gs4i_clear_nodes(int index, void *context)
 {
     const gs4_sim *sim = ((const gs4i_node_pass *)context)->sim;
     const gs4i_grid *g = &sim->grid;
-    int begin = index * GS4I_GROUP, end = gs4i_group_end(g, index);
-    size_t bytes = (size_t)(end - begin) * GS4I_NODE_REALS * sizeof(gs4_real);
-    memset(g->momentum + (size_t)begin * GS4I_NODE_REALS, 0, bytes);
-    memset(g->force + (size_t)begin * GS4I_NODE_REALS, 0, bytes);
-    if (sim->particles.with_heat)
-        memset(sim->conduction.heat_nodes + (size_t)begin * GS4I_NODE_REALS, 0, bytes);
+    const int begin = index * GS4I_GROUP, end = gs4i_group_end(g, index);
+    const size_t bytes = (size_t)(end - begin) * GS4I_NODE_REALS * sizeof(gs4_real);
+    memset(gs4i_of_slot(g->momentum, begin), 0, bytes);
+    memset(gs4i_of_slot(g->force, begin), 0, bytes);
+    if (sim->particles.with_heat) memset(gs4i_of_slot(sim->conduction.heat_nodes, begin), 0, bytes);
     if (sim->conduction.heat_sources)
-        memset(sim->conduction.heat_sources + (size_t)begin * GS4I_NODE_REALS, 0, bytes);
+        memset(gs4i_of_slot(sim->conduction.heat_sources, begin), 0, bytes);
 }
 
+/* Jumps, and the flags of this step. */
 static void gs4i_clear_jumps(int index, void *context)
 {
     const gs4i_grid *g = &((const gs4i_node_pass *)context)->sim->grid;
-    int s;
-    for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++)
-        if (g->jump_of[s]) {
-            memset(gs4i_jump_at(g, (uint32_t)(64 * s)), 0, GS4I_NODE_REALS * sizeof(gs4_real));
-            memset(gs4i_contact_at(g, (uint32_t)(64 * s)), 0, GS4I_BLOCK_NODES);
-        }
+    int s, i;
+    for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
+        uint8_t *flags = g->flags + gs4i_first_node(s);
+        for (i = 0; i < GS4I_BLOCK_NODES; i++) flags[i] &= GS4I_LASTS;
+        if (gs4i_has_jumps(g, s))
+            memset(gs4i_jumps_of(g, s), 0, GS4I_NODE_REALS * sizeof(gs4_real));
+    }
 }
 
-GS4I_INLINE gs4_vec3 gs4i_node_position(const gs4i_grid *g, int slot, int i)
-{
-    int at[3];
-    gs4i_block_coordinates(g, g->block[slot], at);
-    return gs4i_add(g->origin,
-                    gs4i_scale(gs4i_vec3(GS4I_C(4 * at[0] - 4 + (i & 3)) + GS4I_C(0.5),
-                                         GS4I_C(4 * at[1] - 4 + (i >> 2 & 3)) + GS4I_C(0.5),
-                                         GS4I_C(4 * at[2] - 4 + (i >> 4)) + GS4I_C(0.5)),
-                               g->h));
-}
-
-/* All bodies on the nodes of one block; what they take from the velocity at once is added to the
- * jumps where `jump` is given. */
+/* All colliders on the nodes of one block. What they take from the velocity at once is added to
+ * the jumps where `jump` is given. */
 static void gs4i_hold_nodes(const gs4_sim *sim, int slot, gs4_real *velocity,
                             gs4_real *acceleration, gs4_real *jump)
 {
+    const gs4i_grid *g = &sim->grid;
     gs4_real none[3], before[3];
-    int b, i, c;
-    if (!sim->grid.jump_of[slot]) return;
+    int first[3], x[3], b, i, c;
+    if (!gs4i_has_jumps(g, slot)) return;
+    gs4i_block_origin(g, g->block[slot], first);
     for (b = 0; b < sim->boundary.collider_count; b++) {
         const gs4i_collider *collider = &sim->boundary.colliders[b];
-        if (collider->asleep || !gs4i_collider_is_near(collider, &sim->grid, slot)) continue;
+        if (collider->asleep || !gs4i_collider_is_near(collider, g, slot)) continue;
         for (i = 0; i < GS4I_BLOCK_NODES; i++) {
+            const int imaged = g->flags[gs4i_first_node(slot) + (uint32_t)i] & GS4I_IMAGED;
             gs4_real *v = velocity + 4 * i;
+            gs4_vec3 p;
             if (!(v[3] > 0)) continue; /* no particle sees it */
+            gs4i_node_coordinates(first, i, x);
+            p = gs4i_place_position(g, x, GS4I_AT_CELL);
             none[0] = none[1] = none[2] = 0;
-            if (gs4i_is_sticky(collider)
-                && *gs4i_contact_at(&sim->grid, (uint32_t)(64 * slot + i)) & GS4I_IMAGED) {
-                if (jump
-                    && gs4i_collider_distance(collider, gs4i_node_position(&sim->grid, slot, i))
-                           < 0)
-                    jump[4 * i + 3] = 1;
+            if (gs4i_is_sticky(collider) && imaged) {
+                if (jump && gs4i_collider_distance(collider, p) < 0) jump[4 * i + 3] = 1;
                 continue;
             }
             for (c = 0; c < 3; c++) before[c] = v[c];
-            if (!gs4i_collider_hold(collider, gs4i_node_position(&sim->grid, slot, i), sim->grid.h,
-                                    sim->integrator.dt, v,
+            if (!gs4i_collider_hold(collider, p, g->h, sim->integrator.dt, v,
                                     acceleration ? acceleration + 4 * i : none))
                 continue;
             for (c = 0; c < 3 && jump; c++) jump[4 * i + c] += v[c] - before[c];
@@ -11455,8 +11615,8 @@ static void gs4i_node_velocities(int index, void *context)
     const gs4i_grid *g = &pass->sim->grid;
     int s, i;
     for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
-        gs4_real *q = g->momentum + (size_t)s * GS4I_NODE_REALS;
-        for (i = 0; i < 4 * GS4I_BLOCK_NODES; i += 4) {
+        gs4_real *q = gs4i_of_slot(g->momentum, s);
+        for (i = 0; i < GS4I_NODE_REALS; i += 4) {
             const gs4_real m = q[i + 3];
             gs4i_quad v;
             GS4I_LOAD(v, q + i);
@@ -11464,20 +11624,19 @@ static void gs4i_node_velocities(int index, void *context)
             GS4I_LANE(v, 3) = m;
             GS4I_STORE(q + i, v);
         }
-        gs4i_hold_nodes(pass->sim, s, q, NULL,
-                        g->jump_of[s] ? gs4i_jump_at(g, (uint32_t)(64 * s)) : NULL);
+        gs4i_hold_nodes(pass->sim, s, q, NULL, gs4i_jumps_of(g, s));
     }
 }
 
 /* What a node remembered before this step. A node that was empty takes ag_i = acc_i; where rates
- * start afresh ag_i = 0, as the particles' are. */
-GS4I_INLINE void gs4i_remembered_before(const gs4i_integrator *integrator, const gs4_real *ag,
-                                        const gs4i_quad *acc, gs4i_quad *before)
+ * start anew ag_i = 0, as the particles' are. */
+GS4I_INLINE void gs4i_remembered_before(const gs4i_integrator *integrator, int flags,
+                                        const gs4_real *ag, const gs4i_quad *acc, gs4i_quad *before)
 {
     const gs4i_quad zero = { GS4I_LANES(0, 0, 0, 0) };
     if (integrator->restart)
         *before = zero;
-    else if ((int)ag[3] & 1)
+    else if (flags & GS4I_REMEMBERS)
         GS4I_LOAD(*before, ag);
     else
         *before = *acc;
@@ -11493,7 +11652,7 @@ GS4I_INLINE gs4_real gs4i_node_weight(const gs4i_integrator *integrator, gs4_rea
     return integrator->restart || t >= 1 ? GS4I_C(1) : t <= 0 ? GS4I_C(0) : t * t * (3 - 2 * t);
 }
 
-/* S6: acc_i = f_i / m_i; u_i = v_i + s (acc_i - ag_i). Then bodies. */
+/* S6: acc_i = f_i / m_i; u_i = v_i + s (acc_i - ag_i). Then colliders. */
 static void gs4i_node_accelerations(int index, void *context)
 {
     const gs4i_node_pass *pass = (const gs4i_node_pass *)context;
@@ -11501,30 +11660,30 @@ static void gs4i_node_accelerations(int index, void *context)
     const gs4i_integrator *integrator = &pass->sim->integrator;
     int s, i;
     for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
-        gs4_real *q = g->momentum + (size_t)s * GS4I_NODE_REALS,
-                 *f = g->force + (size_t)s * GS4I_NODE_REALS;
-        const gs4_real *ag = g->remembered + (size_t)s * GS4I_NODE_REALS;
-        for (i = 0; i < 4 * GS4I_BLOCK_NODES; i += 4) {
-            const gs4_real inverse = q[i + 3] > pass->lightest ? 1 / q[i + 3] : GS4I_C(0);
-            const gs4_real share =
-                integrator->s * gs4i_node_weight(integrator, q[i + 3] * integrator->inv_node_mass);
-            const gs4i_quad some = { GS4I_LANES(share, share, share, 0) };
+        gs4_real *velocity = gs4i_of_slot(g->momentum, s), *force = gs4i_of_slot(g->force, s);
+        const gs4_real *ag = gs4i_of_slot(g->remembered, s);
+        const uint8_t *flags = g->flags + gs4i_first_node(s);
+        for (i = 0; i < GS4I_NODE_REALS; i += 4) {
+            const gs4_real m = velocity[i + 3], inverse = m > pass->lightest ? 1 / m : GS4I_C(0);
+            const gs4_real weight =
+                integrator->s * gs4i_node_weight(integrator, m * integrator->inv_node_mass);
+            const gs4i_quad some = { GS4I_LANES(weight, weight, weight, 0) };
             gs4i_quad acc, before, u;
-            GS4I_LOAD(acc, f + i);
-            GS4I_LOAD(u, q + i);
+            GS4I_LOAD(acc, force + i);
+            GS4I_LOAD(u, velocity + i);
             GS4I_SPLAT_MUL(acc, inverse, acc);
-            GS4I_STORE(f + i, acc);
-            gs4i_remembered_before(integrator, ag + i, &acc, &before);
+            GS4I_STORE(force + i, acc);
+            gs4i_remembered_before(integrator, flags[i / 4], ag + i, &acc, &before);
             GS4I_DIFFERENCE(acc, acc, before);
             GS4I_MAD(u, some, acc);
-            GS4I_STORE(q + i, u);
+            GS4I_STORE(velocity + i, u);
         }
-        gs4i_hold_nodes(pass->sim, s, q, f, NULL);
+        gs4i_hold_nodes(pass->sim, s, velocity, force, NULL);
     }
 }
 
-/* ag_i += (acc_i - ag_i) / alpha_m, once the step is certain: it belongs to the state. Images in
- * contact have none. */
+/* ag_i += (acc_i - ag_i) / alpha_m, once the step is certain: it belongs to the state. Mirror
+ * nodes in contact have none. */
 static void gs4i_remember_accelerations(int index, void *context)
 {
     const gs4i_node_pass *pass = (const gs4i_node_pass *)context;
@@ -11532,20 +11691,22 @@ static void gs4i_remember_accelerations(int index, void *context)
     const gs4i_integrator *integrator = &pass->sim->integrator;
     int s, i;
     for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
-        const gs4_real *q = g->momentum + (size_t)s * GS4I_NODE_REALS,
-                       *f = g->force + (size_t)s * GS4I_NODE_REALS;
-        gs4_real *ag = g->remembered + (size_t)s * GS4I_NODE_REALS;
-        for (i = 0; i < 4 * GS4I_BLOCK_NODES; i += 4) {
-            const int flags = g->jump_of[s] ? *gs4i_contact_at(g, (uint32_t)(64 * s + i / 4)) : 0;
-            const int there = q[i + 3] > pass->lightest && !(flags & 7);
+        const gs4_real *velocity = gs4i_of_slot(gs4i_velocity(g), s),
+                       *acceleration = gs4i_of_slot(gs4i_acceleration(g), s);
+        gs4_real *ag = gs4i_of_slot(g->remembered, s);
+        uint8_t *flags = g->flags + gs4i_first_node(s);
+        for (i = 0; i < GS4I_NODE_REALS; i += 4, flags++) {
+            const int there = velocity[i + 3] > pass->lightest && !(*flags & GS4I_FOLDS);
             gs4i_quad acc, before;
-            GS4I_LOAD(acc, f + i);
-            gs4i_remembered_before(integrator, ag + i, &acc, &before);
+            GS4I_LOAD(acc, acceleration + i);
+            gs4i_remembered_before(integrator, *flags, ag + i, &acc, &before);
             GS4I_DIFFERENCE(acc, acc, before);
             GS4I_SPLAT_MAD(before, integrator->inv_alpha_m, acc);
             GS4I_SPLAT_MUL(before, GS4I_C(there), before);
             GS4I_STORE(ag + i, before);
-            ag[i + 3] = GS4I_C(there + (flags & 8 ? 2 : 0));
+            ag[i + 3] = 0;
+            *flags = (uint8_t)((*flags & ~GS4I_LASTS) | (there ? GS4I_REMEMBERS : 0)
+                               | (*flags & GS4I_PRESSED ? GS4I_WAS_PRESSED : 0));
         }
     }
 }
@@ -11560,7 +11721,7 @@ static void gs4i_node_spreads(int index, void *context)
     const gs4i_quad zero = { GS4I_LANES(0, 0, 0, 0) };
     int s, i;
     for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
-        const gs4_real *u = gs4i_seen_nodes(g) + (size_t)s * GS4I_NODE_REALS;
+        const gs4_real *u = gs4i_of_slot(gs4i_gradient_velocity(g), s);
         gs4i_quad sum = zero, worst = zero, total = zero, q;
         gs4_real mass = 0, *spread = g->spread + 4 * (size_t)s;
         for (i = 0; i < 4 * GS4I_BLOCK_NODES; i += 4) {
@@ -11617,7 +11778,7 @@ static void gs4i_deconvolve_forces(int index, void *context)
                                            sim->desc.gravity.z, 0) };
     int s, i;
     for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
-        gs4_real *f = g->deconvolved + (size_t)GS4I_NODE_REALS * (size_t)s;
+        gs4_real *f = gs4i_of_slot(g->deconvolved, s);
         gs4i_deconvolve_block(g, s, g->force, 1);
         for (i = 0; i < GS4I_NODE_REALS; i += 4) {
             gs4i_quad sum;
@@ -11708,20 +11869,29 @@ static void gs4i_set_velocities(gs4_sim *sim, gs4i_node_pass *nodes)
     gs4i_gather_image_particles(sim, gs4i_gather_image_velocity);
 }
 
-/* Forces on nodes, whole. */
+/* The deconvolved forces become the forces. */
+static void gs4i_copy_deconvolved(int index, void *context)
+{
+    const gs4i_grid *g = &((const gs4i_node_pass *)context)->sim->grid;
+    const int begin = index * GS4I_GROUP, end = gs4i_group_end(g, index);
+    memcpy(gs4i_of_slot(g->force, begin), gs4i_of_slot(g->deconvolved, begin),
+           (size_t)(end - begin) * GS4I_NODE_REALS * sizeof(gs4_real));
+}
+
+/* S5 on nodes: forces of image particles, mirror nodes, deconvolution. */
 static void gs4i_finish_forces(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     gs4i_grid *g = &sim->grid;
-    gs4_real *force = g->force;
+    gs4i_parity parity[6];
     gs4i_scatter_image_particles(sim, gs4i_scatter_image_force);
-    gs4i_fold_force(&sim->boundary, g, 1);
+    gs4i_fold_force(&sim->boundary, g);
     if (!g->with_deconvolution) return;
     gs4i_fill_mirror_nodes(&sim->boundary, g, g->force);
     gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_deconvolve_forces, nodes);
-    g->force = g->deconvolved;
-    g->deconvolved = force;
+    gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_copy_deconvolved, nodes);
     gs4i_weigh_mirror_nodes(&sim->boundary, g, sim->desc.gravity);
-    gs4i_fold_force(&sim->boundary, g, 0);
+    gs4i_vector_parity(&sim->boundary, 3, parity);
+    gs4i_fold(&sim->boundary, g, g->force, parity);
 }
 
 /* Is what the particles have seen so far acceptable, and is dt still within the limit that
@@ -12425,9 +12595,11 @@ static int gs4i_save(gs4_sim *sim, const char *path)
                   (size_t)sim->grid.occupied * sizeof *sim->grid.occupied_block);
     gs4i_file_put(&f, sim->grid.first, ((size_t)sim->grid.occupied + 1) * sizeof *sim->grid.first);
     gs4i_file_put(&f, sim->grid.block, (size_t)sim->grid.active * sizeof *sim->grid.block);
-    if (sim->grid.remembered)
+    if (sim->grid.remembered) {
         gs4i_file_put(&f, sim->grid.remembered,
                       (size_t)sim->grid.active * GS4I_NODE_REALS * sizeof(gs4_real));
+        gs4i_file_put(&f, sim->grid.flags, (size_t)sim->grid.active * GS4I_BLOCK_NODES);
+    }
     hash = f.hash;
     gs4i_file_put(&f, &hash, sizeof hash);
     return gs4i_file_close(sim, &f);
@@ -12483,20 +12655,21 @@ static int gs4i_check_head(gs4_sim *sim, const gs4i_head *h)
 
 /* The pieces of a checkpoint in the order of the file, and where they are in memory. */
 enum {
-    GS4I_PIECES = GS4I_STATE_ARRAYS + 8
+    GS4I_PIECES = GS4I_STATE_ARRAYS + 9
 };
 typedef struct gs4i_pieces {
     size_t size[GS4I_PIECES];
     const unsigned char *at[GS4I_PIECES];
 } gs4i_pieces;
 enum {
-    GS4I_PIECE_LAWS,
-    GS4I_PIECE_BODIES,
+    GS4I_PIECE_CONSTANTS,
+    GS4I_PIECE_COLLIDERS,
     GS4I_PIECE_EMITTERS,
     GS4I_PIECE_OCCUPIED,
     GS4I_PIECE_FIRST,
     GS4I_PIECE_BLOCKS,
-    GS4I_PIECE_MEMORY,
+    GS4I_PIECE_REMEMBERED,
+    GS4I_PIECE_FLAGS,
     GS4I_PIECE_PARTICLES
 };
 
@@ -12511,14 +12684,16 @@ static size_t gs4i_piece_sizes(gs4_sim *sim, const gs4i_head *h, gs4i_pieces *p)
     store.elastic_reals = h->elastic_reals;
     store.deformation_reals = h->deformation_reals;
     gs4i_particle_arrays(&store, a);
-    p->size[GS4I_PIECE_LAWS] = (size_t)h->materials * sizeof(gs4i_material_constants);
-    p->size[GS4I_PIECE_BODIES] = (size_t)h->colliders * sizeof(gs4i_collider);
+    p->size[GS4I_PIECE_CONSTANTS] = (size_t)h->materials * sizeof(gs4i_material_constants);
+    p->size[GS4I_PIECE_COLLIDERS] = (size_t)h->colliders * sizeof(gs4i_collider);
     p->size[GS4I_PIECE_EMITTERS] = (size_t)h->emitters * sizeof(gs4i_emitter);
     p->size[GS4I_PIECE_OCCUPIED] = (size_t)h->occupied * 4;
     p->size[GS4I_PIECE_FIRST] = (size_t)h->occupied * 4 + 4;
     p->size[GS4I_PIECE_BLOCKS] = (size_t)h->active * 4;
-    if (sim->particles.with_rates)
-        p->size[GS4I_PIECE_MEMORY] = (size_t)h->active * GS4I_NODE_REALS * sizeof(gs4_real);
+    if (sim->particles.with_rates) {
+        p->size[GS4I_PIECE_REMEMBERED] = (size_t)h->active * GS4I_NODE_REALS * sizeof(gs4_real);
+        p->size[GS4I_PIECE_FLAGS] = (size_t)h->active * GS4I_BLOCK_NODES;
+    }
     for (k = 0; k < GS4I_STATE_ARRAYS; k++)
         if (a[k].wanted) p->size[GS4I_PIECE_PARTICLES + k] = (size_t)h->particles * a[k].size;
     for (k = 0; k < GS4I_PIECES; k++) sum += p->size[k];
@@ -12532,14 +12707,14 @@ static int gs4i_same_scene(const gs4_sim *sim, const gs4i_pieces *p)
     int i;
     for (i = 0; i < sim->material_count; i++) {
         gs4i_material_constants there, here = sim->constants[i];
-        memcpy(&there, p->at[GS4I_PIECE_LAWS] + (size_t)i * sizeof there, sizeof there);
+        memcpy(&there, p->at[GS4I_PIECE_CONSTANTS] + (size_t)i * sizeof there, sizeof there);
         there.is.viscosity_fn = here.is.viscosity_fn;
         there.is.viscosity_user = here.is.viscosity_user;
         if (memcmp(&there.is, &here.is, sizeof here.is) != 0) return 0;
     }
     for (i = 0; i < sim->boundary.collider_count; i++) {
         gs4i_collider there, here = sim->boundary.colliders[i];
-        memcpy(&there, p->at[GS4I_PIECE_BODIES] + (size_t)i * sizeof there, sizeof there);
+        memcpy(&there, p->at[GS4I_PIECE_COLLIDERS] + (size_t)i * sizeof there, sizeof there);
         gs4i_forget_pointers(&there.is.shape);
         gs4i_forget_pointers(&here.is.shape);
         if (memcmp(&there.is.shape, &here.is.shape, sizeof here.is.shape)
@@ -12566,7 +12741,7 @@ static void gs4i_restore_scene(gs4_sim *sim, const gs4i_pieces *p)
     int i;
     for (i = 0; i < sim->material_count; i++) {
         gs4i_material_constants here = sim->constants[i], *l = &sim->constants[i];
-        memcpy(l, p->at[GS4I_PIECE_LAWS] + (size_t)i * sizeof *l, sizeof *l);
+        memcpy(l, p->at[GS4I_PIECE_CONSTANTS] + (size_t)i * sizeof *l, sizeof *l);
         l->viscosity_fn = here.viscosity_fn;
         l->viscosity_user = here.viscosity_user;
         l->is.viscosity_fn = here.is.viscosity_fn;
@@ -12576,7 +12751,7 @@ static void gs4i_restore_scene(gs4_sim *sim, const gs4i_pieces *p)
     }
     for (i = 0; i < sim->boundary.collider_count; i++) {
         gs4i_collider here = sim->boundary.colliders[i], *b = &sim->boundary.colliders[i];
-        memcpy(b, p->at[GS4I_PIECE_BODIES] + (size_t)i * sizeof *b, sizeof *b);
+        memcpy(b, p->at[GS4I_PIECE_COLLIDERS] + (size_t)i * sizeof *b, sizeof *b);
         b->is.shape = here.is.shape;
         b->field = here.field;
     }
@@ -12634,7 +12809,10 @@ static int gs4i_rebuild(gs4_sim *next, const gs4i_head *h, const gs4i_pieces *p)
     g->active = h->active;
     g->occupied = h->occupied;
     for (k = 0; k < g->active; k++) g->table[g->block[k]] = k + 1;
-    if (g->remembered) memcpy(g->remembered, p->at[GS4I_PIECE_MEMORY], p->size[GS4I_PIECE_MEMORY]);
+    if (g->remembered) {
+        memcpy(g->remembered, p->at[GS4I_PIECE_REMEMBERED], p->size[GS4I_PIECE_REMEMBERED]);
+        memcpy(g->flags, p->at[GS4I_PIECE_FLAGS], p->size[GS4I_PIECE_FLAGS]);
+    }
     if (!gs4i_grid_is_complete(g)) return GS4_ERROR_FORMAT;
     gs4i_grid_link(g);
     if (gs4i_after_occupy(next) != GS4_OK) return GS4_ERROR_MEMORY;
@@ -12733,9 +12911,9 @@ static int gs4i_restore(gs4_sim *sim, const gs4i_head *h, const gs4i_pieces *p)
 static int gs4i_load_body(gs4_sim *sim, FILE *f, const gs4i_head *h, unsigned char *data,
                           size_t size, gs4i_pieces *p)
 {
-    static const int order[] = { GS4I_PIECE_LAWS, GS4I_PIECE_BODIES, GS4I_PIECE_EMITTERS };
+    static const int order[] = { GS4I_PIECE_CONSTANTS, GS4I_PIECE_COLLIDERS, GS4I_PIECE_EMITTERS };
     static const int after[] = { GS4I_PIECE_OCCUPIED, GS4I_PIECE_FIRST, GS4I_PIECE_BLOCKS,
-                                 GS4I_PIECE_MEMORY };
+                                 GS4I_PIECE_REMEMBERED, GS4I_PIECE_FLAGS };
     uint64_t hash, stored;
     unsigned char more;
     size_t at = 0;
@@ -12748,7 +12926,7 @@ static int gs4i_load_body(gs4_sim *sim, FILE *f, const gs4i_head *h, unsigned ch
                          "the checkpoint has something behind its end");
     for (k = 0; k < 3; k++) sequence[n++] = order[k];
     for (k = 0; k < GS4I_STATE_ARRAYS; k++) sequence[n++] = GS4I_PIECE_PARTICLES + k;
-    for (k = 0; k < 4; k++) sequence[n++] = after[k];
+    for (k = 0; k < 5; k++) sequence[n++] = after[k];
     hash = gs4i_hash_bytes(0, h, sizeof *h);
     /* over the same pieces as when it was saved */
     for (k = 0; k < n; k++) {
@@ -14468,10 +14646,15 @@ GS4_API uint64_t gs4_state_hash(const gs4_sim *sim)
     }
     for (s = 0; sim->grid.remembered && s < sim->grid.active; s++)
         for (n = 0; n < GS4I_BLOCK_NODES; n++) {
-            const gs4_real *ag = sim->grid.remembered + (size_t)s * GS4I_NODE_REALS + 4 * n;
-            if (ag[3] > 0)
-                sum += gs4i_hash_bytes(gs4i_mix(64 * (uint64_t)sim->grid.block[s] + n), ag,
-                                       4 * sizeof(gs4_real));
+            const uint32_t node = gs4i_first_node(s) + (uint32_t)n;
+            const int flags = sim->grid.flags[node] & GS4I_LASTS;
+            gs4_real ag[4];
+            if (!flags) continue;
+            memcpy(ag, gs4i_of_node(sim->grid.remembered, node), sizeof ag);
+            ag[3] = GS4I_C((flags & GS4I_REMEMBERS ? 1 : 0) + (flags & GS4I_WAS_PRESSED ? 2 : 0));
+            sum += gs4i_hash_bytes(
+                gs4i_mix(GS4I_BLOCK_NODES * (uint64_t)sim->grid.block[s] + (uint64_t)n), ag,
+                sizeof ag);
         }
     for (s = 0; s < sim->boundary.collider_count; s++) {
         sum += gs4i_hash_bytes((uint64_t)s + 1, sim->boundary.colliders[s].at,
@@ -14920,7 +15103,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_PREFETCH
 #undef GS4I_PRESSED
 #undef GS4I_IMAGED
-#undef GS4I_UNIMAGED
+#undef GS4I_LACKS_IMAGE
 #undef GS4I_RESTRICT
 #undef GS4I_ROW_DIFFERENCE
 #undef GS4I_ROW_LOAD

@@ -611,7 +611,7 @@ static void sticky_holds(gs4_sim *sim, gs4_vec3 origin, gs4_vec3 velocity)
     for (s = 0; s < sim->grid.active; s++)
         for (i = 0; i < 64; i++) {
             const gs4_real *u = sim->grid.momentum + 4 * ((size_t)s * 64 + (size_t)i);
-            const gs4_vec3 p = gs4i_node_position(&sim->grid, s, i);
+            const gs4_vec3 p = gs4i_node_position(&sim->grid, gs4i_first_node(s) + (uint32_t)i);
             const double away =
                 ((double)(p.x - origin.x) + (double)(p.y - origin.y) + (double)(p.z - origin.z))
                 / sqrt(3.0) * 24;

@@ -5165,6 +5165,31 @@ static void gs4i_tile_add(const gs4i_grid *g, int o, uint64_t rows,
     }
 }
 
+/* --- the tile of any slot, whether its blocks have nodes or not -------------------------------- */
+
+/* Slots of the 27 blocks around a slot, -1 where there are no nodes; and the frame of its tile. */
+typedef struct gs4i_surroundings {
+    int slot[27];
+    gs4i_frame frame;
+} gs4i_surroundings;
+
+static void gs4i_surroundings_of(const gs4i_grid *g, int slot, gs4i_surroundings *t)
+{
+    int at[3], i;
+    gs4i_block_coordinates(g, g->block[slot], at);
+    for (i = 0; i < 27; i++)
+        t->slot[i] =
+            gs4i_slot_of_block(g, at[0] + i % 3 - 1, at[1] + i / 3 % 3 - 1, at[2] + i / 9 - 1);
+    t->frame = gs4i_tile_frame(g, g->block[slot]);
+}
+
+/* Number of node (x, y, z) of a tile, -1 where it does not exist. */
+GS4I_INLINE int64_t gs4i_surrounding_node(const gs4i_surroundings *t, int x, int y, int z)
+{
+    const int slot = t->slot[(((z + 2) >> 2) * 3 + ((y + 2) >> 2)) * 3 + ((x + 2) >> 2)];
+    return slot < 0 ? -1 : (int64_t)gs4i_first_node(slot) + gs4i_place_of(x + 2, y + 2, z + 2);
+}
+
 /* --- sharpened gradients -------------------------------------------------------------------------
  *
  * Each of the four transfers of a step sees 1 - (k h)^2/8 of a wave exp(ikx). S v = v - sum_a
@@ -5258,30 +5283,23 @@ typedef struct gs4i_prediction {
     gs4_real ahead /* alpha_f dt */, shift /* (gamma - 1/2) dt of the last step */;
 } gs4i_prediction;
 
-/* Rule 1 of the manual for one step of size dt. */
+/* Rule (4) of the manual for one step of size dt, and what goes with the step. */
 typedef struct gs4i_integrator {
-    gs4_real dt, alpha_m, alpha_f, gamma;
-    gs4i_prediction prediction; /* ahead = alpha_f dt: from t_n to the stage */
-    /* alpha_f gamma dt / alpha_m: weight of the new rate at the stage */
-    gs4_real s;
-    /* y** = y + before r: alpha_f dt - s, 0 for symplectic Euler */
-    gs4_real before;
-    gs4_real decay, damped; /* k = 1 / flip_decay_time, 1/s; 1 / (1 + s k) */
-    /* k, where (4) would not be stable with it less: k (1 + x)/(1 + x + x^2), 1/s, x = k over
-     * what would be */
-    gs4_real stable_decay;
-    /* where that is shorter than dt k is 0, and this much of what the grid cannot see goes at
-     * once: a rate of it would be blown up by a longer step, and with rho_inf 1 it would not
-     * fade */
-    gs4_real decayed_at_once;
-    gs4_real mixing;     /* 1/s: at most, of temperatures, see [[heat]] */
-    gs4_real inv_area;   /* 1 / h^2 */
-    gs4_real fast_decay; /* what is added to k where the grid sees little: c0 / h */
-    /* 1 / mass of a node in the midst of the lightest material */
-    gs4_real inv_node_mass;
-    gs4_real inv_densest_node_mass; /* of the densest */
-    gs4_real inv_alpha_m, next_shift;
-    int restart; /* no rates yet: first step, or after an edit */
+    gs4_real dt, alpha_m, alpha_f, gamma, inv_alpha_m;
+    gs4i_prediction prediction;
+    gs4_real s;          /* s = alpha_f gamma dt / alpha_m: weight of the new rate at the stage */
+    gs4_real before;     /* y** = y + before r: alpha_f dt - s; 0 for symplectic Euler */
+    gs4_real next_shift; /* prediction.shift of the next step */
+    int restart;         /* no rates yet: first step, or after an edit */
+    /* Decay of what the grid does not see, at the rate k = 1/flip_decay_time: see
+     * gs4i_set_decay. */
+    gs4_real decay, damped;   /* k, 1/s; 1 / (1 + s k) */
+    gs4_real stable_decay;    /* k as far as (4) is stable with it, 1/s */
+    gs4_real decayed_at_once; /* share that goes in the step itself, where k dt > 1; else 0 */
+    gs4_real fast_decay;      /* c0 / h, 1/s: added to k where the grid sees little */
+    gs4_real mixing;          /* 1/s, at most: of temperatures, see [[heat]] */
+    /* 1/h^2; 1 / mass of a node in the midst of the lightest material, and of the densest */
+    gs4_real inv_area, inv_node_mass, inv_densest_node_mass;
 } gs4i_integrator;
 
 #ifdef GS4_DOUBLE
@@ -9469,33 +9487,10 @@ static int gs4i_find_image_particles(gs4_sim *sim)
     return gs4i_sort_image_particles(sim);
 }
 
-/* Slots of the 27 blocks around a slot, -1 where there are no nodes; and the frame of its tile. */
-typedef struct gs4i_sticky_tile {
-    int slot[27];
-    gs4i_frame frame;
-} gs4i_sticky_tile;
-
-static void gs4i_sticky_tile_of(const gs4i_grid *g, int slot, gs4i_sticky_tile *t)
-{
-    int at[3], i;
-    gs4i_block_coordinates(g, g->block[slot], at);
-    for (i = 0; i < 27; i++)
-        t->slot[i] =
-            gs4i_slot_of_block(g, at[0] + i % 3 - 1, at[1] + i / 3 % 3 - 1, at[2] + i / 9 - 1);
-    t->frame = gs4i_tile_frame(g, g->block[slot]);
-}
-
-/* Number of node (x, y, z) of a tile, -1 where it does not exist. */
-GS4I_INLINE int64_t gs4i_sticky_tile_node(const gs4i_sticky_tile *t, int x, int y, int z)
-{
-    const int slot = t->slot[(((z + 2) >> 2) * 3 + ((y + 2) >> 2)) * 3 + ((x + 2) >> 2)];
-    return slot < 0 ? -1 : (int64_t)gs4i_first_node(slot) + gs4i_place_of(x + 2, y + 2, z + 2);
-}
-
 /* The next n ghosts of a slot and their weights. */
 static void gs4i_load_image_particles(gs4i_image_particle *all, const int32_t *order, int n,
-                                      const gs4i_sticky_tile *t, gs4i_image_particle *g[GS4I_BATCH],
-                                      gs4i_stencils *s)
+                                      const gs4i_surroundings *t,
+                                      gs4i_image_particle *g[GS4I_BATCH], gs4i_stencils *s)
 {
     gs4_real four[4 * GS4I_BATCH];
     gs4i_lanes x[4];
@@ -9509,11 +9504,11 @@ static void gs4i_load_image_particles(gs4i_image_particle *all, const int32_t *o
 }
 
 /* Mark the nodes that a particle reaches which has no image. */
-static void gs4i_mark_lacking_images(const gs4i_grid *grid, const gs4i_sticky_tile *t, int base)
+static void gs4i_mark_lacking_images(const gs4i_grid *grid, const gs4i_surroundings *t, int base)
 {
     int i;
     for (i = 0; i < 27; i++) {
-        const int64_t node = gs4i_sticky_tile_node(t, base % GS4I_TILE + i % 3,
+        const int64_t node = gs4i_surrounding_node(t, base % GS4I_TILE + i % 3,
                                                    base / GS4I_TILE % GS4I_TILE + i / 3 % 3,
                                                    base / (GS4I_TILE * GS4I_TILE) + i / 9);
         if (node >= 0 && gs4i_has_jumps(grid, gs4i_slot_of((uint32_t)node)))
@@ -9522,25 +9517,25 @@ static void gs4i_mark_lacking_images(const gs4i_grid *grid, const gs4i_sticky_ti
 }
 
 /* Do all nodes around a particle exist? Three in a row lie in two blocks at most. */
-static int gs4i_is_whole(const gs4i_sticky_tile *t, int base)
+static int gs4i_is_whole(const gs4i_surroundings *t, int base)
 {
     const int x = base % GS4I_TILE, y = base / GS4I_TILE % GS4I_TILE,
               z = base / (GS4I_TILE * GS4I_TILE);
     int i, whole = 1;
     for (i = 0; i < 8; i++)
-        whole &= gs4i_sticky_tile_node(t, x + 2 * (i & 1), y + (i & 2), z + 2 * (i >> 2)) >= 0;
+        whole &= gs4i_surrounding_node(t, x + 2 * (i & 1), y + (i & 2), z + 2 * (i >> 2)) >= 0;
     return whole;
 }
 
 /* Add the tile to the nodes that exist and are not held; those that get momentum are marked. */
-static void gs4i_sticky_tile_add(const gs4i_grid *grid, const gs4i_sticky_tile *t,
-                                 const gs4_real *tile, gs4_real *field)
+static void gs4i_add_to_surroundings(const gs4i_grid *grid, const gs4i_surroundings *t,
+                                     const gs4_real *tile, gs4_real *field)
 {
     int x, y, z, c;
     for (z = 0; z < GS4I_TILE; z++)
         for (y = 0; y < GS4I_TILE; y++)
             for (x = 0; x < GS4I_TILE; x++, tile += 4) {
-                const int64_t node = gs4i_sticky_tile_node(t, x, y, z);
+                const int64_t node = gs4i_surrounding_node(t, x, y, z);
                 gs4_real *to;
                 if (node < 0 || (grid->flags[node] & GS4I_LACKS_IMAGE)) continue;
                 to = gs4i_of_node(field, (uint32_t)node);
@@ -9558,9 +9553,9 @@ static void gs4i_scatter_image_block(const gs4i_pass *pass, int index, int what)
     const int32_t *first = (const int32_t *)sim->image_particles.first.data,
                   *order = (const int32_t *)sim->image_particles.order.data;
     gs4_real tile[GS4I_TILE_REALS];
-    gs4i_sticky_tile t;
+    gs4i_surroundings t;
     int k, b, c;
-    gs4i_sticky_tile_of(&sim->grid, slot, &t);
+    gs4i_surroundings_of(&sim->grid, slot, &t);
     memset(tile, 0, sizeof tile);
     for (k = first[slot]; k < first[slot + 1]; k += GS4I_BATCH) {
         const int n = first[slot + 1] - k < GS4I_BATCH ? first[slot + 1] - k : GS4I_BATCH;
@@ -9600,8 +9595,8 @@ static void gs4i_scatter_image_block(const gs4i_pass *pass, int index, int what)
         }
     }
     if (what != GS4I_IMAGE_MARKS)
-        gs4i_sticky_tile_add(&sim->grid, &t, tile,
-                             what == GS4I_IMAGE_FORCE ? sim->grid.force : sim->grid.momentum);
+        gs4i_add_to_surroundings(&sim->grid, &t, tile,
+                                 what == GS4I_IMAGE_FORCE ? sim->grid.force : sim->grid.momentum);
 }
 
 static void gs4i_mark_image_nodes(int index, void *context)
@@ -9640,13 +9635,13 @@ static void gs4i_gather_image_block(const gs4i_pass *pass, int index, int what)
                   *order = (const int32_t *)sim->image_particles.order.data;
     const gs4_real *field = what ? sim->grid.force : gs4i_gradient_velocity(&sim->grid);
     gs4_real tile[GS4I_TILE_REALS], *to = tile;
-    gs4i_sticky_tile t;
+    gs4i_surroundings t;
     int x, y, z, k, b, c;
-    gs4i_sticky_tile_of(&sim->grid, slot, &t);
+    gs4i_surroundings_of(&sim->grid, slot, &t);
     for (z = 0; z < GS4I_TILE; z++)
         for (y = 0; y < GS4I_TILE; y++)
             for (x = 0; x < GS4I_TILE; x++, to += 4) {
-                const int64_t node = gs4i_sticky_tile_node(&t, x, y, z);
+                const int64_t node = gs4i_surrounding_node(&t, x, y, z);
                 for (c = 0; c < 4; c++) to[c] = node < 0 ? 0 : field[4 * node + c];
             }
     memset(to, 0, 16 * sizeof *to);
@@ -10113,10 +10108,11 @@ static void gs4i_finish_forces(gs4_sim *sim, gs4i_node_pass *nodes)
 
 /* Solids turn about their particles too: m v~ + m w~ x (x_i - x~) for particles i to i + n. 0
  * where none of them turns. */
-static int gs4i_spin_momentum(const gs4i_particles *p, size_t i, int n, const gs4i_stencils *s,
-                              gs4_real h, const gs4i_integrator *integrator, const gs4i_wide *mass,
-                              gs4i_lanes mv[3], gs4i_affine_forces *f)
+static int gs4i_spin_momentum(const gs4_sim *sim, size_t i, int n, const gs4i_stencils *s,
+                              const gs4i_wide *mass, gs4i_lanes mv[3], gs4i_affine_forces *f)
 {
+    const gs4i_particles *p = &sim->particles;
+    const gs4i_integrator *integrator = &sim->integrator;
     gs4_real own[4 * GS4I_BATCH], any = 0;
     gs4i_lanes w[4], bound;
     gs4i_gradient Q;
@@ -10142,7 +10138,7 @@ static int gs4i_spin_momentum(const gs4i_particles *p, size_t i, int n, const gs
     }
     gs4i_affine_bound(Q, integrator->dt, bound);
     for (a = 0; a < 9; a++)
-        GS4I_BATCH_LOOP(b) Q[a / 3][a % 3][b] *= bound[b] * (h * mass[b]);
+        GS4I_BATCH_LOOP(b) Q[a / 3][a % 3][b] *= bound[b] * (sim->grid.h * mass[b]);
     for (c = 0; c < 3; c++)
         GS4I_BATCH_LOOP(b)
             mv[c][b] -=
@@ -10183,9 +10179,7 @@ static void gs4i_scatter_momentum(int index, void *context)
         for (c = 0; c < 3; c++)
             GS4I_BATCH_LOOP(b) mv[c][b] = q.x[3][b] * (q.v[c][b] + prediction.ahead * q.a[c][b]);
         gs4i_from_lanes(mv[0], mv[1], mv[2], q.x[3], momentum);
-        turns =
-            p.deformation_reals
-            && gs4i_spin_momentum(&p, i, n, &s, sim->grid.h, &sim->integrator, q.x[3], mv, &spin);
+        turns = p.deformation_reals && gs4i_spin_momentum(sim, i, n, &s, q.x[3], mv, &spin);
         for (b = 0; b < n; b++) {
             if (s.base[b] < 0) {
                 left_tile++;
@@ -11016,54 +11010,54 @@ static const gs4i_scheme *gs4i_scheme_of(const gs4_sim *sim)
 
 #define GS4I_SURFACE_DEPTH GS4I_C(0.83)
 
-/* Fold what reached images back: content, and source where there is one. */
+/* How (m c, m c T**, V/k_eff, V) and sources (W, W/K) fold at the walls: evenly where a wall is
+ * insulated, T oddly about its temperature where it is not. */
 static void gs4i_fold_heat(const gs4_sim *sim)
 {
-    const gs4i_boundary *b = &sim->boundary;
     const gs4i_conduction *k = &sim->conduction;
-    int wall, i, a;
+    gs4i_parity nodes[6], sources[6];
+    int wall, c;
+    memset(nodes, 0, sizeof nodes);
     for (wall = 0; wall < 6; wall++) {
         const int odd = sim->desc.wall_is_isothermal[wall];
-        const gs4_real twice = 2 * sim->desc.wall_temperature[wall];
-        for (i = 0; i < b->mirror_count[wall]; i++) {
-            const gs4_real *from = k->heat_nodes + 4 * (size_t)b->mirrors[wall][i].mirror;
-            gs4_real *to = k->heat_nodes + 4 * (size_t)b->mirrors[wall][i].inner;
-            to[1] += odd ? twice * from[0] - from[1] : from[1];
-            for (a = 0; a < 4; a++)
-                if (a != 1) to[a] += from[a];
-            if (k->heat_sources) {
-                from = k->heat_sources + 4 * (size_t)b->mirrors[wall][i].mirror;
-                to = k->heat_sources + 4 * (size_t)b->mirrors[wall][i].inner;
-                to[0] += odd ? -from[0] : from[0];
-                to[1] += from[1];
-            }
-        }
+        for (c = 0; c < 4; c++) nodes[wall].sign[c] = 1;
+        nodes[wall].reals = 4;
+        nodes[wall].always = 1;
+        sources[wall] = nodes[wall];
+        sources[wall].reals = 2;
+        if (!odd) continue;
+        sources[wall].sign[0] = nodes[wall].sign[1] = -1;
+        nodes[wall].shift[1] = 2 * sim->desc.wall_temperature[wall]; /* by m c */
     }
+    gs4i_fold(&sim->boundary, &sim->grid, k->heat_nodes, nodes);
+    if (k->heat_sources) gs4i_fold(&sim->boundary, &sim->grid, k->heat_sources, sources);
 }
 
-/* Images take what particles gather from their mirror nodes. */
+/* How mirror nodes continue what particles gather: (T~ - T**, rate of mixing, rate times the
+ * temperature to mix to, -) and (components of T~, resistance); oddly about its temperature where
+ * a wall is isothermal. */
 static void gs4i_fill_heat(const gs4_sim *sim)
 {
-    const gs4i_boundary *b = &sim->boundary;
     const gs4i_conduction *k = &sim->conduction;
-    int wall, i, a;
-    for (wall = 5; wall >= 0; wall--) {
-        const gs4_real sign = GS4I_C(sim->desc.wall_is_isothermal[wall] ? -1 : 1),
-                       twice = sim->desc.wall_is_isothermal[wall]
-                                   ? 2 * sim->desc.wall_temperature[wall]
-                                   : 0;
-        for (i = 0; i < b->mirror_count[wall]; i++) {
-            const size_t from = 4 * (size_t)b->mirrors[wall][i].inner,
-                         to = 4 * (size_t)b->mirrors[wall][i].mirror;
-            k->heat_nodes[to] = sign * k->heat_nodes[from];
-            k->heat_nodes[to + 1] = k->heat_nodes[from + 1];
-            k->heat_nodes[to + 2] =
-                twice * k->heat_nodes[from + 1] + sign * k->heat_nodes[from + 2];
-            for (a = 0; a < 3 && sim->particles.with_flux; a++)
-                k->heat_sources[to + (size_t)a] = twice + sign * k->heat_sources[from + (size_t)a];
-            if (sim->particles.with_flux) k->heat_sources[to + 3] = k->heat_sources[from + 3];
-        }
+    gs4i_parity nodes[6], flux[6];
+    int wall, c;
+    memset(nodes, 0, sizeof nodes);
+    for (wall = 0; wall < 6; wall++) {
+        const int odd = sim->desc.wall_is_isothermal[wall];
+        const gs4_real twice = odd ? 2 * sim->desc.wall_temperature[wall] : 0;
+        for (c = 0; c < 4; c++) nodes[wall].sign[c] = GS4I_C(odd && c != 1 && c != 3 ? -1 : 1);
+        nodes[wall].reals = 3;
+        nodes[wall].always = 1;
+        flux[wall] = nodes[wall];
+        nodes[wall].shift[2] = twice;
+        nodes[wall].by = 1;
+        flux[wall].reals = 4;
+        flux[wall].by = -1;
+        flux[wall].sign[1] = flux[wall].sign[0];
+        for (c = 0; c < 3; c++) flux[wall].shift[c] = twice;
     }
+    gs4i_fill(&sim->boundary, &sim->grid, k->heat_nodes, nodes);
+    if (sim->particles.with_flux) gs4i_fill(&sim->boundary, &sim->grid, k->heat_sources, flux);
 }
 
 /* Nodes that can be unknown along one axis: those of the domain, and behind an open wall those
@@ -11883,50 +11877,56 @@ static gs4_real gs4i_mixing(const gs4i_integrator *k)
     return k->decayed_at_once > 0 ? most : gs4i_min(k->decay, most);
 }
 
+/* Decay of the sub-grid velocity v~ - V at the rate k = 1/flip_decay_time. In S7 it stands in the
+ * rate of velocity, explicitly, and (4) is stable up to k_max = 4 (1 - r s)/((3 + r + s - r s) dt).
+ * With x = k/(0.8 k_max) the rate taken is k (1 + x)/(1 + x + x^2): k for small x, 0.8 k_max for
+ * large. Where k dt > 1 there is no such rate at all: a longer step after it would blow it up, and
+ * with r = 1 it would not decay. Then the share s k/(1 + s k) goes at once. */
+static void gs4i_set_decay(gs4i_integrator *k, gs4_real decay_time, gs4_real r, gs4_real s)
+{
+    const gs4_real most = GS4I_C(3.2) * (1 - r * s) / ((3 + r + s - r * s) * k->dt);
+    gs4_real y;
+    /* in less than 1e-6 dt makes no difference */
+    k->decay = decay_time > 0 && gs4i_finite(decay_time)
+                   ? 1 / gs4i_max(decay_time, GS4I_C(1e-6) * k->dt)
+                   : GS4I_C(0);
+    k->damped = 1 / (1 + k->s * k->decay);
+    k->decayed_at_once = 0;
+    if (k->decay * k->dt > 1) {
+        k->decayed_at_once = 1 - k->damped;
+        k->decay = 0;
+        k->damped = 1;
+    }
+    y = most / gs4i_max(most + k->decay, GS4I_TINY); /* 1 / (1 + x) */
+    k->stable_decay = k->decay * y / (1 - y + y * y);
+}
+
 static gs4i_integrator gs4i_make_integrator(const gs4_sim *sim, gs4_real dt)
 {
-    const gs4_real r = sim->desc.rho_inf, s = sim->desc.rho_inf_spurious;
-    gs4_real most, y;
+    const gs4_real r = sim->desc.rho_inf, s = sim->desc.rho_inf_spurious, h = sim->grid.h;
+    const int with_rates = sim->particles.with_rates;
     gs4i_integrator k;
     int i;
     k.dt = dt;
     k.restart = sim->restart;
     gs4i_family(&k, r, s, k.restart);
-    k.prediction.ahead = sim->particles.with_rates ? k.alpha_f * dt : GS4I_C(0);
+    k.prediction.ahead = with_rates ? k.alpha_f * dt : GS4I_C(0);
     k.prediction.shift = k.restart ? GS4I_C(0) : sim->shift;
     k.next_shift = (k.gamma - GS4I_C(0.5)) * dt;
-    /* of heat: backward Euler */
-    if (!sim->particles.with_rates) k.alpha_m = k.alpha_f = k.gamma = 1;
-    k.s = k.alpha_f * k.gamma * dt / k.alpha_m;
-    k.before = sim->particles.with_rates ? k.prediction.ahead - k.s : GS4I_C(0);
-    k.decay = sim->desc.flip_decay_time > 0 && gs4i_finite(sim->desc.flip_decay_time)
-                  /* faster makes no difference */
-                  ? 1 / gs4i_max(sim->desc.flip_decay_time, GS4I_C(1e-6) * dt)
-                  : GS4I_C(0);
-    k.damped = 1 / (1 + k.s * k.decay);
-    k.decayed_at_once = 0;
-    if (k.decay * dt > 1) {
-        k.decayed_at_once = 1 - k.damped;
-        k.decay = 0;
-        k.damped = 1;
-    }
-    most = GS4I_C(3.2) * (1 - r * s) / ((3 + r + s - r * s) * dt);
-    y = most / gs4i_max(most + k.decay, GS4I_TINY); /* 1 / (1 + x) */
-    k.stable_decay = k.decay * y / (1 - y + y * y);
-    k.inv_area = sim->grid.inv_h * sim->grid.inv_h;
-    k.mixing = sim->particles.with_rates ? gs4i_mixing(&k) : GS4I_C(0.5) / k.s;
+    if (!with_rates) k.alpha_m = k.alpha_f = k.gamma = 1; /* of heat: backward Euler */
     k.inv_alpha_m = 1 / k.alpha_m;
-    k.fast_decay = 0;
-    k.inv_node_mass = 0;
+    k.s = k.alpha_f * k.gamma * dt / k.alpha_m;
+    k.before = with_rates ? k.prediction.ahead - k.s : GS4I_C(0);
+    gs4i_set_decay(&k, sim->desc.flip_decay_time, r, s);
+    k.mixing = with_rates ? gs4i_mixing(&k) : GS4I_C(0.5) / k.s;
+    k.inv_area = sim->grid.inv_h * sim->grid.inv_h;
+    k.fast_decay = k.inv_node_mass = 0;
     k.inv_densest_node_mass = GS4I_HUGE;
     for (i = 0; i < sim->material_count; i++) {
-        k.fast_decay = gs4i_max(k.fast_decay, sim->constants[i].sound_speed / sim->grid.h);
-        k.inv_node_mass =
-            gs4i_max(k.inv_node_mass,
-                     sim->constants[i].inv_density / (sim->grid.h * sim->grid.h * sim->grid.h));
-        k.inv_densest_node_mass =
-            gs4i_min(k.inv_densest_node_mass,
-                     sim->constants[i].inv_density / (sim->grid.h * sim->grid.h * sim->grid.h));
+        const gs4_real inverse = sim->constants[i].inv_density / (h * h * h);
+        k.fast_decay = gs4i_max(k.fast_decay, sim->constants[i].sound_speed / h);
+        k.inv_node_mass = gs4i_max(k.inv_node_mass, inverse);
+        k.inv_densest_node_mass = gs4i_min(k.inv_densest_node_mass, inverse);
     }
     return k;
 }

@@ -51,6 +51,7 @@
  *                                                    [[sticky]]    image particles behind colliders
  *                                                    [[explicit]]  the scheme: S3 to S7
  *                                                    [[conduction]] heat from node to node
+ *                                                    [[scene]]     what is given to it; emitters
  *                                                    [[step]]      one step: read gs4i_make_step first
  *                                                    [[files]]     frames and checkpoints
  *                                                    [[public]]    every value checked, then the work
@@ -791,6 +792,21 @@ static void *gs4i_scratch_reserve(gs4i_memory *m, gs4i_scratch *s, size_t bytes,
     gs4i_free(m, s->data, s->bytes, 1);
     s->data = grown;
     s->bytes = bytes;
+    return grown;
+}
+
+/* An array of `count` elements with room for one more: itself, or a larger copy. NULL when memory
+ * is refused. */
+static void *gs4i_grow(gs4i_memory *m, void *data, int count, int *capacity, size_t size)
+{
+    const int wanted = *capacity ? 2 * *capacity : 4;
+    void *grown;
+    if (count < *capacity) return data;
+    grown = gs4i_alloc(m, (size_t)wanted, size);
+    if (!grown) return NULL;
+    if (data) memcpy(grown, data, (size_t)count * size);
+    gs4i_free(m, data, (size_t)*capacity, size);
+    *capacity = wanted;
     return grown;
 }
 
@@ -4629,6 +4645,14 @@ typedef struct gs4i_grid {
     gs4i_scratch lists[2], histogram; /* of sorting */
 } gs4i_grid;
 
+/* Walls at the low ends belong to the domain, those at the high ends do not. */
+GS4I_INLINE int gs4i_is_in_domain(const gs4i_grid *g, const gs4_real x[3])
+{
+    return x[0] >= g->origin.x && x[0] < g->origin.x + GS4I_C(g->cells[0]) * g->h
+           && x[1] >= g->origin.y && x[1] < g->origin.y + GS4I_C(g->cells[1]) * g->h
+           && x[2] >= g->origin.z && x[2] < g->origin.z + GS4I_C(g->cells[2]) * g->h;
+}
+
 GS4I_INLINE void gs4i_block_coordinates(const gs4i_grid *g, uint32_t block, int at[3])
 {
     at[0] = (int)(block % (uint32_t)g->blocks[0]);
@@ -7968,7 +7992,7 @@ typedef struct gs4i_collider {
     gs4_real axes[9]; /* R, row-major */
     gs4i_field field; /* for a mesh */
     /* of an emitter: holds what is inside at the velocity `flow`; not in use now */
-    int is_emitter, asleep;
+    int is_emitter, is_off;
     gs4_vec3 flow;
 } gs4i_collider;
 
@@ -8688,14 +8712,7 @@ static int gs4i_collider_hold(const gs4i_collider *b, gs4_vec3 p, gs4_real h, gs
 
 static int gs4i_is_sticky(const gs4i_collider *b)
 {
-    return b->is.contact == GS4_WALL_STICK && !b->is_emitter && !b->asleep;
-}
-
-GS4I_INLINE int gs4i_has_left(const gs4i_grid *g, const gs4_real x[3])
-{
-    return !(x[0] >= g->origin.x && x[0] < g->origin.x + GS4I_C(g->cells[0]) * g->h
-             && x[1] >= g->origin.y && x[1] < g->origin.y + GS4I_C(g->cells[1]) * g->h
-             && x[2] >= g->origin.z && x[2] < g->origin.z + GS4I_C(g->cells[2]) * g->h);
+    return b->is.contact == GS4_WALL_STICK && !b->is_emitter && !b->is_off;
 }
 
 /* Put a particle that ended inside a body, or behind a closed wall, back on its surface; the
@@ -8755,7 +8772,7 @@ static const gs4i_collider *gs4i_hold_in_emitter(const gs4i_boundary *b, const g
     int i;
     for (i = 0; i < b->collider_count; i++) {
         const gs4i_collider *collider = &b->colliders[i];
-        if (collider->is_emitter && !collider->asleep
+        if (collider->is_emitter && !collider->is_off
             && gs4i_collider_distance(collider, gs4i_vec3(x[0], x[1], x[2])) < 0)
             emitter = collider;
     }
@@ -8772,10 +8789,10 @@ static const gs4i_collider *gs4i_hold_in_emitter(const gs4i_boundary *b, const g
 
 typedef struct gs4i_emitter {
     gs4_emitter is;
-    int collider; /* its mouth among the bodies */
-    /* how far the lattice has moved through the mouth; and when last looked at */
-    double drift[3], looked[3];
-    int begun;
+    int collider; /* that holds the particles in it */
+    /* m that the lattice has flowed through it; the same at the last emission, where there was one */
+    double offset[3], emitted_offset[3];
+    int has_emitted;
 } gs4i_emitter;
 
 /* Heat on nodes: only while a step is made, see [[conduction]]. */
@@ -8835,24 +8852,22 @@ struct gs4_sim {
     int emitter_count, emitter_capacity;
     gs4i_report *reports;
     int report_capacity; /* per occupied block */
-    /* extremes of the present state, as far as steps have seen them */
-    gs4i_report worst;
+    gs4i_report limits;  /* extremes of the present state, which set the stable dt */
     gs4i_integrator integrator, heat_integrator; /* of this step; the same for heat */
     double time, last_dt, seconds[GS4I_CLOCKS];
     /* stress integrated robustly, bounded: particles and steps so far */
     uint64_t steps, split, bounded;
     uint32_t next_id;
     gs4_real min_mass; /* of any particle so far */
-    /* any speed that was ever set: chooses a sound speed where none is given */
-    gs4_real fastest;
+    /* m/s, the greatest that was ever set: chooses a sound speed where none is given */
+    gs4_real top_speed;
     gs4_real shift; /* of the rates of positions, left by the last step */
-    /* start rates anew; sort before the next step; `worst` is out of date */
+    /* start rates anew; sort before the next step; `limits` are out of date */
     int restart, needs_sort, limits_stale;
     /* stable dt by what the stage of the last step saw; 0: it did not get there */
     gs4_real stage_limit;
-    int edited; /* by hand, not checked yet */
-    /* velocities were set by hand: how solids turn must be found out */
-    int needs_spin;
+    /* particles were edited by hand: check them; velocities too: find the spin of solids */
+    int needs_check, needs_spin;
     gs4i_error error; /* the last one */
 };
 
@@ -9889,7 +9904,7 @@ static void gs4i_hold_nodes(const gs4_sim *sim, int slot, gs4_real *velocity,
     gs4i_block_origin(g, g->block[slot], first);
     for (b = 0; b < sim->boundary.collider_count; b++) {
         const gs4i_collider *collider = &sim->boundary.colliders[b];
-        if (collider->asleep || !gs4i_collider_is_near(collider, g, slot)) continue;
+        if (collider->is_off || !gs4i_collider_is_near(collider, g, slot)) continue;
         for (i = 0; i < GS4I_BLOCK_NODES; i++) {
             const int imaged = g->flags[gs4i_first_node(slot) + (uint32_t)i] & GS4I_IMAGED;
             gs4_real *v = velocity + 4 * i;
@@ -10469,7 +10484,7 @@ static int gs4i_may_touch(const gs4i_boundary *b, const gs4_real *x, int n, gs4_
     prediction = gs4i_length(gs4i_vec3(high[0] - low[0], high[1] - low[1], high[2] - low[2]))
                  + GS4I_C(0.1) * h;
     for (i = 0; i < b->collider_count; i++)
-        if (!b->colliders[i].asleep
+        if (!b->colliders[i].is_off
             && !(gs4i_collider_distance(&b->colliders[i], midst) > prediction))
             return 1;
     return 0;
@@ -10486,7 +10501,7 @@ static void gs4i_correct_contact(gs4_sim *sim, size_t i, int n, gs4i_stored *o, 
     int b;
     for (b = 0; b < n; b++) {
         const gs4i_collider *emitter;
-        if (!touches && !gs4i_has_left(&sim->grid, o->x + 4 * b)) continue;
+        if (!touches && gs4i_is_in_domain(&sim->grid, o->x + 4 * b)) continue;
         gs4i_put_back(&sim->boundary, &sim->grid, o->x + 4 * b, o->v + 4 * b);
         emitter = gs4i_hold_in_emitter(&sim->boundary, o->x + 4 * b, o->v + 4 * b);
         if (emitter) {
@@ -10504,7 +10519,7 @@ static void gs4i_correct_contact(gs4_sim *sim, size_t i, int n, gs4i_stored *o, 
                 memset(elastic + (size_t)sim->particles.elastic_reals * (size_t)b, 0,
                        (size_t)sim->particles.elastic_reals * sizeof *elastic);
         }
-        report->left += gs4i_has_left(&sim->grid, o->x + 4 * b);
+        report->left += !gs4i_is_in_domain(&sim->grid, o->x + 4 * b);
     }
 }
 
@@ -11751,6 +11766,781 @@ static int gs4i_solve_heat(gs4_sim *sim, gs4i_node_pass *nodes)
     return GS4_OK;
 }
 
+/* ==== [[scene]] materials, particles in shapes, colliders, emitters ============================= *
+ *
+ * What is given to a simulation, once it is checked ([[public]]): a call adds all of it or
+ * nothing. Emitters work within a step: gs4i_prepare_emitters at its begin, gs4i_emit at its end. */
+
+/* --- materials -------------------------------------------------------------------------------- */
+
+/* Speed of sound, m/s. Where none is given: ten times the fastest that anything here moves, falls
+ * or flows down, since compression goes as the Mach number squared: 1 %. Of solids also at least
+ * sqrt(10 G/rho): a bulk modulus of 10 shear moduli, Poisson's ratio 0.45. */
+static double gs4i_sound_speed_of(const gs4_sim_desc *d, const gs4_material *m, gs4_real top_speed)
+{
+    const double size = (double)d->cell_size;
+    const double fall = fabs((double)d->gravity.x) * d->cells[0] * size
+                        + fabs((double)d->gravity.y) * d->cells[1] * size
+                        + fabs((double)d->gravity.z) * d->cells[2] * size;
+    double speed = sqrt(2 * fall + (double)top_speed * (double)top_speed);
+    if (m->sound_speed > 0) return (double)m->sound_speed;
+    if (m->bulk_modulus > 0) return sqrt((double)m->bulk_modulus / (double)m->density);
+    if (speed <= 0) speed = size; /* nothing moves so far: a cell a second is as good as any */
+    return fmax(10 * speed, sqrt(10 * (double)m->shear_modulus / (double)m->density));
+}
+
+/* rho0 c0^2 / 7 of (3), Pa. */
+static gs4_real gs4i_tait_of(const gs4_material *m, double sound_speed)
+{
+    return GS4I_C((double)m->density * sound_speed * sound_speed / 7);
+}
+
+static void gs4i_set_constants(gs4_sim *sim)
+{
+    int i;
+    for (i = 0; i < sim->material_count; i++) {
+        gs4i_material_constants *l = &sim->constants[i];
+        const double c0 = gs4i_sound_speed_of(&sim->desc, &l->is, sim->top_speed);
+        l->sound_speed = GS4I_C(c0);
+        l->tait = gs4i_tait_of(&l->is, c0);
+        gs4i_set_material_constants(l, sim->desc.ambient_temperature);
+        sim->solid_phase[i] = *l;
+        gs4i_set_solid_phase(&sim->solid_phase[i]);
+    }
+    sim->limits_stale = 1;
+}
+
+/* Default speeds of sound follow the greatest speed (m/s) that was ever set. */
+static void gs4i_note_speed(gs4_sim *sim, gs4_real speed)
+{
+    if (speed > sim->top_speed) {
+        sim->top_speed = speed;
+        gs4i_set_constants(sim);
+    }
+}
+
+/* Speed of the fastest particle; one that is not finite does not count. */
+static gs4_real gs4i_top_speed(const gs4i_particles *p)
+{
+    gs4_real top = 0;
+    int i;
+    for (i = 0; i < p->count; i++) {
+        const gs4_real *v = p->velocity + 4 * (size_t)i,
+                       speed = gs4i_length(gs4i_vec3(v[0], v[1], v[2]));
+        if (speed > top && speed < GS4I_HUGE) top = speed;
+    }
+    return top;
+}
+
+/* A scene carries heat from the first material on that conducts it, melts or is heated by
+ * viscosity. */
+static int gs4i_has_heat(const gs4_material *m)
+{
+    return m->conductivity > 0 || m->can_melt || m->viscous_heating;
+}
+
+/* From the first viscoelastic material on particles carry non-local stress. */
+static int gs4i_make_elastic(gs4_sim *sim)
+{
+    gs4i_particles *p = &sim->particles;
+    const int reals = p->with_rates ? 12 : 6;
+    if (p->elastic_reals) return GS4_OK;
+    if (p->capacity
+        && !(p->elastic = (gs4_real *)gs4i_alloc(&sim->memory, (size_t)p->capacity + 1,
+                                                 (size_t)reals * sizeof(gs4_real))))
+        return GS4_ERROR_MEMORY;
+    p->elastic_reals = reals;
+    return GS4_OK;
+}
+
+/* From the first material with heat on particles carry a temperature, those that are there
+ * already that of the air; from the first with a flux relaxation time on, a flux. */
+static int gs4i_make_heat(gs4_sim *sim, const gs4_material *material)
+{
+    gs4i_particles *p = &sim->particles;
+    const size_t room = (size_t)p->capacity + 1, each = 4 * sizeof(gs4_real);
+    const int heat = !p->with_heat, flux = !p->with_flux && material->flux_relaxation_time > 0;
+    gs4_real *made[3] = { NULL, NULL, NULL };
+    uint8_t *liquid = NULL;
+    int i;
+    if (p->capacity) {
+        if (heat) {
+            made[0] = (gs4_real *)gs4i_alloc(&sim->memory, room, each);
+            liquid = (uint8_t *)gs4i_alloc(&sim->memory, room, 1);
+        }
+        if (flux) {
+            made[1] = (gs4_real *)gs4i_alloc(&sim->memory, room, each);
+            made[2] = (gs4_real *)gs4i_alloc(&sim->memory, room, each);
+        }
+        if ((heat && (!made[0] || !liquid)) || (flux && (!made[1] || !made[2]))) {
+            for (i = 0; i < 3; i++) gs4i_free(&sim->memory, made[i], room, each);
+            gs4i_free(&sim->memory, liquid, room, 1);
+            return GS4_ERROR_MEMORY;
+        }
+    }
+    if (heat) {
+        p->heat = made[0];
+        p->liquid = liquid;
+        p->with_heat = 1;
+    }
+    for (i = 0; i < p->count && heat; i++)
+        gs4i_begin_heat(p, (size_t)i, &sim->constants[p->material[i]],
+                        sim->desc.ambient_temperature);
+    if (flux) {
+        p->flux = made[1];
+        p->flux_rate = made[2];
+        p->with_flux = 1;
+    }
+    sim->conduction.heats |= material->viscous_heating != 0;
+    sim->needs_sort = 1; /* nodes need room for it, too */
+    return GS4_OK;
+}
+
+/* From the first solid on particles carry F; those that are there already, the one that their
+ * volume ratio says. */
+static int gs4i_make_deformation(gs4_sim *sim)
+{
+    gs4i_particles *p = &sim->particles;
+    const int reals = p->with_rates ? 24 : 9;
+    int i;
+    if (p->deformation_reals) return GS4_OK;
+    if (p->capacity
+        && !(p->deformation = (gs4_real *)gs4i_alloc(&sim->memory, (size_t)p->capacity + 1,
+                                                     (size_t)reals * sizeof(gs4_real))))
+        return GS4_ERROR_MEMORY;
+    p->deformation_reals = reals;
+    for (i = 0; i < p->count; i++) gs4i_undeform(p, (size_t)i, p->velocity[4 * (size_t)i + 3]);
+    return GS4_OK;
+}
+
+/* All that particles carry from this material on, or nothing of it. */
+static int gs4i_make_history(gs4_sim *sim, const gs4_material *material)
+{
+    gs4i_particles *p = &sim->particles;
+    const gs4i_particles before = *p;
+    int result = material->liquid != GS4_NEWTONIAN ? gs4i_make_elastic(sim) : GS4_OK;
+    if (result == GS4_OK && material->solid != GS4_NO_SOLID) result = gs4i_make_deformation(sim);
+    if (result == GS4_OK && gs4i_has_heat(material)) result = gs4i_make_heat(sim, material);
+    if (result == GS4_OK) return GS4_OK;
+    if (p->elastic != before.elastic)
+        gs4i_free(&sim->memory, p->elastic, (size_t)p->capacity + 1,
+                  (size_t)p->elastic_reals * sizeof(gs4_real));
+    if (p->deformation != before.deformation)
+        gs4i_free(&sim->memory, p->deformation, (size_t)p->capacity + 1,
+                  (size_t)p->deformation_reals * sizeof(gs4_real));
+    *p = before;
+    return result;
+}
+
+/* All members, and nothing of what lies between them: checkpoints compare materials byte by
+ * byte. */
+static void gs4i_copy_members(gs4_material *to, const gs4_material *m)
+{
+    to->density = m->density;
+    to->liquid = m->liquid;
+    to->viscosity = m->viscosity;
+    to->local_fraction = m->local_fraction;
+    to->relaxation_time = m->relaxation_time;
+    to->stretch_time = m->stretch_time;
+    to->anisotropy = m->anisotropy;
+    to->arms = m->arms;
+    to->viscosity_law = m->viscosity_law;
+    to->cross_wlf.a = m->cross_wlf.a;
+    to->cross_wlf.n = m->cross_wlf.n;
+    to->cross_wlf.d1 = m->cross_wlf.d1;
+    to->cross_wlf.a1 = m->cross_wlf.a1;
+    to->cross_wlf.t1 = m->cross_wlf.t1;
+    to->cross_wlf.t2 = m->cross_wlf.t2;
+    to->viscosity_fn = m->viscosity_fn;
+    to->viscosity_user = m->viscosity_user;
+    to->bulk_modulus = m->bulk_modulus;
+    to->sound_speed = m->sound_speed;
+    to->incompressible = m->incompressible;
+    to->solid = m->solid;
+    to->shear_modulus = m->shear_modulus;
+    to->yield_compression = m->yield_compression;
+    to->yield_stretch = m->yield_stretch;
+    to->heat_capacity = m->heat_capacity;
+    to->conductivity = m->conductivity;
+    to->flux_relaxation_time = m->flux_relaxation_time;
+    to->fourier_fraction = m->fourier_fraction;
+    to->melting_temperature = m->melting_temperature;
+    to->latent_heat = m->latent_heat;
+    to->can_melt = m->can_melt;
+    to->viscous_heating = m->viscous_heating;
+}
+
+/* Its id, or an error. */
+static int gs4i_add_material(gs4_sim *sim, const gs4_material *m)
+{
+    gs4i_material_constants *of_liquid, *of_solid;
+    of_liquid =
+        (gs4i_material_constants *)gs4i_grow(&sim->memory, sim->constants, sim->material_count,
+                                             &sim->material_capacity, sizeof *of_liquid);
+    if (!of_liquid) return gs4i_fail_memory(&sim->error);
+    sim->constants = of_liquid;
+    of_solid =
+        (gs4i_material_constants *)gs4i_grow(&sim->memory, sim->solid_phase, sim->material_count,
+                                             &sim->solid_phase_capacity, sizeof *of_solid);
+    if (!of_solid) return gs4i_fail_memory(&sim->error);
+    sim->solid_phase = of_solid;
+    if (gs4i_make_history(sim, m) != GS4_OK) return gs4i_fail_memory(&sim->error);
+    memset(&sim->constants[sim->material_count].is, 0, sizeof *m);
+    gs4i_copy_members(&sim->constants[sim->material_count++].is, m);
+    gs4i_set_constants(sim);
+    return sim->material_count - 1;
+}
+
+/* --- particles -------------------------------------------------------------------------------- */
+
+/* One particle at rest with its surroundings: J 1, no rates, no stress. 0: there is no room. */
+static int gs4i_add_particle(gs4_sim *sim, gs4_vec3 x, gs4_vec3 v, gs4_real mass, const gs4_fill *f)
+{
+    gs4i_particles *p = &sim->particles;
+    const size_t i = (size_t)p->count, real = sizeof(gs4_real);
+    gs4_real *position = p->position + 4 * i, *velocity = p->velocity + 4 * i;
+    int k;
+    if (p->count >= p->capacity || sim->next_id == UINT32_MAX) return 0;
+    position[0] = x.x;
+    position[1] = x.y;
+    position[2] = x.z;
+    position[3] = mass;
+    velocity[0] = v.x;
+    velocity[1] = v.y;
+    velocity[2] = v.z;
+    velocity[3] = 1;
+    if (p->with_rates) {
+        memset(p->rate + 4 * i, 0, 4 * real);
+        memset(p->position_residual + 4 * i, 0, 4 * sizeof(gs4i_half));
+    }
+    for (k = 0; k < 3 && p->affine[k]; k++) memset(p->affine[k] + 4 * i, 0, 4 * real);
+    if (p->elastic_reals)
+        memset(p->elastic + (size_t)p->elastic_reals * i, 0, (size_t)p->elastic_reals * real);
+    if (p->deformation_reals) gs4i_undeform(p, i, 1);
+    if (p->with_heat) gs4i_begin_heat(p, i, &sim->constants[f->material], f->temperature);
+    p->id[i] = sim->next_id++;
+    p->material[i] = (uint8_t)f->material;
+    p->count++;
+    sim->min_mass = sim->min_mass > 0 ? gs4i_min(sim->min_mass, mass) : mass;
+    sim->needs_sort = 1;
+    return 1;
+}
+
+/* The same with the rotation of a filling: v = velocity + omega x (x - centre), C = omega x. */
+static void gs4i_fill_one(gs4_sim *sim, const gs4_real at[3], gs4_vec3 centre, const gs4_fill *f,
+                          gs4_real mass)
+{
+    const gs4_vec3 w = f->angular_velocity, x = gs4i_vec3(at[0], at[1], at[2]);
+    const gs4_real C[3][4] = { { 0, w.z, -w.y, 0 }, { -w.z, 0, w.x, 0 }, { w.y, -w.x, 0, 0 } };
+    const size_t i = (size_t)sim->particles.count;
+    const gs4_vec3 v = gs4i_add(f->velocity, gs4i_cross(w, gs4i_sub(x, centre)));
+    int k;
+    if (!gs4i_add_particle(sim, x, v, mass, f)) return;
+    for (k = 0; k < 3 && sim->particles.affine[k]; k++)
+        memcpy(sim->particles.affine[k] + 4 * i, C[k], sizeof C[k]);
+    if (sim->particles.deformation_reals && !sim->needs_spin)
+        gs4i_set_spin(&sim->particles, i,
+                      gs4i_constants_of(sim, i)->shear_modulus > 0 ? w : gs4i_vec3(0, 0, 0));
+    gs4i_note_speed(sim, gs4i_length(v));
+}
+
+/* Room for n more particles. */
+static int gs4i_make_room(gs4_sim *sim, int64_t n)
+{
+    const int64_t wanted = sim->particles.count + n,
+                  limit = sim->desc.max_particles ? sim->desc.max_particles : GS4I_MAX_PARTICLES;
+    if (wanted > limit)
+        return gs4i_fail_value(&sim->error, GS4_ERROR_MEMORY, "this needs room for ",
+                               (double)wanted,
+                               " particles, more than max_particles; nothing was added");
+    if ((uint64_t)sim->next_id + (uint64_t)n >= UINT32_MAX)
+        return gs4i_fail(&sim->error, GS4_ERROR_MEMORY, "all 2^32 particle ids are used up");
+    if (gs4i_particles_reserve(&sim->memory, &sim->particles, (int)wanted) != GS4_OK)
+        return gs4i_fail_memory(&sim->error);
+    return GS4_OK;
+}
+
+/* Particles of `mass` (kg) at xyz, which turn about `centre`. How many, or an error. */
+static int gs4i_add_points(gs4_sim *sim, const gs4_real *xyz, int64_t count, gs4_real mass,
+                           gs4_vec3 centre, const gs4_fill *f)
+{
+    int64_t i;
+    if (!(mass > GS4I_TINY / GS4I_EPSILON))
+        return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT,
+                         "a particle would be lighter than gs4_real can tell from nothing; use "
+                         "other units, or define GS4_DOUBLE");
+    GS4I_TRY(gs4i_make_room(sim, count));
+    for (i = 0; i < count; i++) gs4i_fill_one(sim, xyz + 3 * i, centre, f, mass);
+    if (count) sim->restart = sim->needs_sort = sim->limits_stale = 1;
+    return (int)count;
+}
+
+/* --- points of a lattice in a shape ----------------------------------------------------------- */
+
+/* Point n of a lattice is at low + (n + 1/2 + jitter) spacing + offset, in coordinates of the
+ * shape, which is `moved` (m) from where it was described. The lattices of all fillings are
+ * aligned with the cells; that of an emitter begins at its shape and flows through it. */
+typedef struct gs4i_lattice {
+    const gs4i_collider *shape;
+    const gs4_fill *fill;
+    double low[3], offset[3], moved[3];
+    int64_t from[3], to[3], n[3]; /* from <= n < to; the present point */
+    uint64_t key[3];              /* n . key is what its jitter is drawn by */
+} gs4i_lattice;
+
+/* Uniform in [-1/2, 1/2): what jitter displaces the point by along an axis, in spacings. */
+static gs4_real gs4i_lattice_noise(const gs4i_lattice *l, int axis)
+{
+    const uint64_t number = (uint64_t)l->n[0] * l->key[0] + (uint64_t)l->n[1] * l->key[1]
+                            + (uint64_t)l->n[2] * l->key[2];
+    const uint64_t u =
+        gs4i_mix(gs4i_mix((uint64_t)l->fill->random_seed << 32 ^ number) + (uint64_t)axis);
+    return GS4I_C((double)(u >> 40) / 16777216.0 - 0.5);
+}
+
+/* Points in the box low..high of the shape, where it meets the domain, and `margin` more at each
+ * end. 0: they do not meet. */
+static int gs4i_lattice_span(gs4i_lattice *l, const gs4i_grid *g, const double low[3],
+                             const double high[3], int margin)
+{
+    const double spacing = (double)l->fill->spacing;
+    double origin[3];
+    int a;
+    gs4i_to_double(g->origin, origin);
+    for (a = 0; a < 3; a++) {
+        const double size = g->cells[a] * (double)g->h,
+                     begin = fmax(low[a], origin[a] - l->moved[a]),
+                     end = fmin(high[a], origin[a] + size - l->moved[a]);
+        if (begin >= end) return 0;
+        l->from[a] = (int64_t)floor((begin - l->low[a] - l->offset[a]) / spacing) - margin;
+        l->to[a] = (int64_t)ceil((end - l->low[a] - l->offset[a]) / spacing) + margin;
+        l->n[a] = a == 0 ? l->from[a] - 1 : l->from[a];
+    }
+    return 1;
+}
+
+/* To the next point; 0 behind the last one. */
+static int gs4i_lattice_next(gs4i_lattice *l)
+{
+    int a;
+    for (a = 0; a < 3; a++) {
+        if (++l->n[a] < l->to[a]) return 1;
+        l->n[a] = l->from[a];
+    }
+    return 0;
+}
+
+/* Where the present point is, displaced by `jitter`. */
+static void gs4i_lattice_point(const gs4i_lattice *l, gs4_real jitter, const double offset[3],
+                               double at[3])
+{
+    int a;
+    for (a = 0; a < 3; a++) {
+        const gs4_real displaced = jitter > 0 ? jitter * gs4i_lattice_noise(l, a) : GS4I_C(0);
+        at[a] = l->low[a] + ((double)l->n[a] + 0.5 + (double)displaced) * (double)l->fill->spacing
+                + offset[a];
+    }
+}
+
+static int gs4i_lattice_is_inside(const gs4i_lattice *l, const double at[3])
+{
+    return gs4i_shape_or_field(l->shape, gs4i_vec3(GS4I_C(at[0]), GS4I_C(at[1]), GS4I_C(at[2])))
+           < 0;
+}
+
+/* Of a particle of a filling, kg: a lattice cell of material. */
+static gs4_real gs4i_mass_of(const gs4_sim *sim, const gs4_fill *f)
+{
+    return sim->constants[f->material].density * f->spacing * f->spacing * f->spacing;
+}
+
+/* Does the box of a shape meet the domain? */
+static int gs4i_meets_domain(const gs4i_grid *g, const gs4_shape *s)
+{
+    gs4_vec3 low, high;
+    double from[3], to[3], origin[3];
+    int a, meets = 1;
+    gs4i_shape_bounds(s, &low, &high);
+    gs4i_to_double(low, from);
+    gs4i_to_double(high, to);
+    gs4i_to_double(g->origin, origin);
+    for (a = 0; a < 3; a++)
+        meets &= fmax(from[a], origin[a]) < fmin(to[a], origin[a] + g->cells[a] * (double)g->h);
+    return meets;
+}
+
+/* --- filling a shape -------------------------------------------------------------------------- */
+
+/* The next point x of a filling that is in the shape; jitter then displaces it, so that it does
+ * not change how many there are, and may take it out of the shape, but not out of the domain. */
+static int gs4i_next_filled(const gs4i_grid *g, gs4i_lattice *l, gs4_real x[3])
+{
+    const gs4_real amount = l->fill->jitter * l->fill->spacing;
+    while (gs4i_lattice_next(l)) {
+        double at[3];
+        int a;
+        gs4i_lattice_point(l, 0, l->offset, at);
+        if (!gs4i_lattice_is_inside(l, at)) continue;
+        for (a = 0; a < 3; a++) {
+            x[a] = GS4I_C(at[a]);
+            if (amount > 0) x[a] += amount * gs4i_lattice_noise(l, a);
+        }
+        if (gs4i_is_in_domain(g, x)) return 1;
+    }
+    return 0;
+}
+
+/* The lattice of a filling; 0 where the shape and the domain do not meet. */
+static int gs4i_fill_lattice(const gs4i_grid *g, const gs4i_collider *shape, const gs4_fill *f,
+                             gs4i_lattice *l)
+{
+    gs4_vec3 low = g->origin, high = g->origin;
+    double from[3], to[3];
+    int a;
+    memset(l, 0, sizeof *l);
+    l->shape = shape;
+    l->fill = f;
+    gs4i_to_double(g->origin, l->low);
+    gs4i_shape_bounds(&shape->is.shape, &low, &high);
+    gs4i_to_double(low, from);
+    gs4i_to_double(high, to);
+    for (a = 0; a < 3; a++) {
+        if (shape->is.shape.kind == GS4_SHAPE_PLANE) to[a] += g->cells[a] * (double)g->h;
+        l->key[a] = (uint64_t)1 << 21 * a;
+    }
+    return gs4i_lattice_span(l, g, from, to, 0);
+}
+
+/* Is there material already where `count` new particles would go? A cell that they fill by a
+ * good half must not be filled by as much before. -1: out of memory. */
+static int gs4i_overlaps(gs4_sim *sim, const gs4i_lattice *l, const gs4_real *points, int count)
+{
+    const gs4i_particles *p = &sim->particles;
+    const gs4_real o[3] = { sim->grid.origin.x, sim->grid.origin.y, sim->grid.origin.z };
+    const gs4_real full = sim->grid.h * sim->grid.h * sim->grid.h,
+                   volume = l->fill->spacing * l->fill->spacing * l->fill->spacing;
+    const double ratio = (double)l->fill->spacing / (double)sim->grid.h;
+    gs4_real *filled; /* of each cell, m^3: by what is there, by what is new */
+    size_t i, cells = 1;
+    int a, pass, overlap = 0, low[3], n[3];
+    if (p->count == 0) return 0;
+    for (a = 0; a < 3; a++) { /* the cells of all points, with one around for jitter */
+        low[a] = (int)floor((double)l->from[a] * ratio) - 1;
+        n[a] = (int)ceil((double)l->to[a] * ratio) + 1 - low[a];
+        cells *= (size_t)n[a];
+    }
+    filled = (gs4_real *)gs4i_alloc(&sim->memory, cells, 2 * sizeof *filled);
+    if (!filled) return -1;
+    for (pass = 0; pass < 2; pass++)
+        for (i = 0; i < (size_t)(pass ? count : p->count); i++) {
+            const gs4_real *x = pass ? points + 3 * i : p->position + 4 * i;
+            size_t at = 0;
+            for (a = 2; a >= 0; a--) {
+                const int c = (int)((x[a] - o[a]) * sim->grid.inv_h) - low[a];
+                if (c < 0 || c >= n[a]) break;
+                at = at * (size_t)n[a] + (size_t)c;
+            }
+            if (a >= 0) continue;
+            filled[2 * at + (size_t)pass] += pass ? volume
+                                                  : p->position[4 * i + 3]
+                                                        * sim->constants[p->material[i]].inv_density
+                                                        * p->velocity[4 * i + 3];
+        }
+    for (i = 0; i < cells; i++)
+        overlap |= filled[2 * i] > GS4I_C(0.6) * full && filled[2 * i + 1] > GS4I_C(0.6) * full;
+    gs4i_free(&sim->memory, filled, cells, 2 * sizeof *filled);
+    return overlap;
+}
+
+/* A shape at rest at its pivot; distances of a mesh are sampled every `spacing` (m). */
+static int gs4i_make_collider(gs4_sim *sim, gs4i_collider *b, const gs4_collider *is,
+                              double spacing)
+{
+    memset(b, 0, sizeof *b);
+    b->is = *is;
+    gs4i_to_double(is->pivot, b->at);
+    b->turn[0] = 1;
+    gs4i_collider_orient(b);
+    if (is->shape.kind == GS4_SHAPE_MESH
+        && gs4i_field_create(&sim->memory, &b->field, &is->shape, spacing) != GS4_OK)
+        return gs4i_fail_memory(&sim->error);
+    return GS4_OK;
+}
+
+/* All points of a filling, checked for overlap, into a list that the caller frees. How many, or
+ * an error. */
+static int64_t gs4i_collect_points(gs4_sim *sim, const gs4i_lattice *l, gs4_real **points)
+{
+    const int64_t room = (sim->desc.max_particles ? sim->desc.max_particles : GS4I_MAX_PARTICLES)
+                         - sim->particles.count;
+    gs4i_lattice at = *l;
+    gs4_real x[3];
+    int64_t n = 0, i;
+    int overlap;
+    while (n <= room && gs4i_next_filled(&sim->grid, &at, x)) n++;
+    if (n > room)
+        return gs4i_fail(&sim->error, GS4_ERROR_MEMORY,
+                         "shape holds more particles than there is room for (max_particles); a "
+                         "larger spacing would do; nothing was added");
+    if (n == 0)
+        return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT,
+                         "shape holds no particle: it is thinner than fill.spacing, outside of the "
+                         "grid, or inside out");
+    *points = (gs4_real *)gs4i_alloc(&sim->memory, (size_t)n, 3 * sizeof **points);
+    if (!*points) return gs4i_fail_memory(&sim->error);
+    for (at = *l, i = 0; i < n; i++) gs4i_next_filled(&sim->grid, &at, *points + 3 * i);
+    overlap = gs4i_overlaps(sim, l, *points, (int)n);
+    if (!overlap) return n;
+    gs4i_free(&sim->memory, *points, (size_t)n, 3 * sizeof **points);
+    return overlap < 0
+               ? gs4i_fail_memory(&sim->error)
+               : gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT,
+                           "shape overlaps material that is there already: nothing was added");
+}
+
+/* Particles in a shape. How many, or an error. */
+static int gs4i_fill_shape(gs4_sim *sim, const gs4_shape *shape, const gs4_fill *f)
+{
+    const gs4_real mass = gs4i_mass_of(sim, f);
+    gs4_vec3 low = shape->a, high = shape->a, centre;
+    gs4_collider described;
+    gs4i_collider placed;
+    gs4i_lattice l;
+    gs4_real *points = NULL;
+    int64_t n;
+    gs4i_shape_bounds(shape, &low, &high);
+    centre = gs4i_scale(gs4i_add(low, high), GS4I_C(0.5));
+    memset(&described, 0, sizeof described);
+    described.shape = *shape;
+    memset(&placed, 0, sizeof placed);
+    placed.is = described;
+    if (!gs4i_fill_lattice(&sim->grid, &placed, f, &l))
+        return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT,
+                         "shape lies outside of the grid: nothing was added");
+    if ((double)(l.to[0] - l.from[0]) * (double)(l.to[1] - l.from[1])
+            * (double)(l.to[2] - l.from[2])
+        > 16e9)
+        return gs4i_fail(
+            &sim->error, GS4_ERROR_MEMORY,
+            "shape spans more than 1.6e10 particles; a larger spacing would do; nothing was added");
+    GS4I_TRY(gs4i_make_collider(sim, &placed, &described, (double)f->spacing));
+    n = gs4i_collect_points(sim, &l, &points);
+    gs4i_field_free(&sim->memory, &placed.field);
+    if (n > 0) {
+        const int added = gs4i_add_points(sim, points, n, mass, centre, f);
+        gs4i_free(&sim->memory, points, (size_t)n, 3 * sizeof *points);
+        n = added;
+    }
+    return (int)n;
+}
+
+/* --- colliders and emitters ------------------------------------------------------------------- */
+
+/* Its id, or an error. */
+static int gs4i_add_collider(gs4_sim *sim, const gs4_collider *c, double spacing)
+{
+    gs4i_boundary *b = &sim->boundary;
+    gs4i_collider *colliders = (gs4i_collider *)gs4i_grow(
+        &sim->memory, b->colliders, b->collider_count, &b->collider_capacity, sizeof *colliders);
+    if (!colliders) return gs4i_fail_memory(&sim->error);
+    b->colliders = colliders;
+    GS4I_TRY(gs4i_make_collider(sim, &colliders[b->collider_count], c, spacing));
+    gs4i_note_speed(sim, gs4i_length(c->velocity));
+    sim->limits_stale = 1;
+    return b->collider_count++;
+}
+
+/* An emitter is a collider too, which holds what is inside at the velocity of its filling. */
+static int gs4i_add_emitter(gs4_sim *sim, const gs4_emitter *is)
+{
+    gs4_collider held;
+    gs4i_collider *collider;
+    gs4i_emitter *emitters, *e;
+    int id;
+    memset(&held, 0, sizeof held);
+    held.shape = is->shape;
+    held.velocity = is->travel;
+    held.temperature = is->fill.temperature;
+    emitters = (gs4i_emitter *)gs4i_grow(&sim->memory, sim->emitters, sim->emitter_count,
+                                         &sim->emitter_capacity, sizeof *emitters);
+    if (!emitters) return gs4i_fail_memory(&sim->error);
+    sim->emitters = emitters;
+    id = gs4i_add_collider(sim, &held, (double)is->fill.spacing);
+    if (id < 0) return id;
+    collider = &sim->boundary.colliders[id];
+    collider->is_emitter = 1;
+    collider->is_off = 1;
+    collider->flow = is->fill.velocity;
+    e = &sim->emitters[sim->emitter_count];
+    memset(e, 0, sizeof *e);
+    e->is = *is;
+    e->collider = id;
+    gs4i_note_speed(sim, gs4i_length(is->fill.velocity));
+    return sim->emitter_count++;
+}
+
+/* --- emitters at work ------------------------------------------------------------------------- */
+
+static int gs4i_emitter_is_on(const gs4i_emitter *e, double time)
+{
+    return time >= (double)e->is.start && (e->is.stop <= 0 || time < (double)e->is.stop);
+}
+
+/* How far the lattice has flowed through the emitter after dt, m; it is full at the first time. */
+static void gs4i_offset_after(const gs4i_emitter *e, double dt, double offset[3])
+{
+    double flow[3], travel[3];
+    int a;
+    gs4i_to_double(e->is.fill.velocity, flow);
+    gs4i_to_double(e->is.travel, travel);
+    for (a = 0; a < 3; a++)
+        offset[a] = e->has_emitted ? e->offset[a] + (flow[a] - travel[a]) * dt : 0;
+}
+
+/* Emission is due when the lattice has flowed by a fifth of its spacing, or for the first time. */
+static int gs4i_emission_is_due(const gs4i_emitter *e, const double offset[3])
+{
+    const double s = (double)e->is.fill.spacing;
+    double d2 = 0;
+    int a;
+    for (a = 0; a < 3; a++)
+        d2 += (offset[a] - e->emitted_offset[a]) * (offset[a] - e->emitted_offset[a]);
+    return !e->has_emitted || d2 > 0.04 * s * s;
+}
+
+/* The lattice at this offset, where the emitter will be in the time `ahead`. 0: it is out of the
+ * domain. Numbers may be negative, hence other keys than those of fillings. */
+static int gs4i_emitter_lattice(const gs4_sim *sim, const gs4i_emitter *e, const double offset[3],
+                                double ahead, gs4i_lattice *l)
+{
+    static const uint64_t key[3] = { 0x9e3779b1u, (uint64_t)31 << 21, (uint64_t)17 << 42 };
+    const gs4i_collider *shape = &sim->boundary.colliders[e->collider];
+    double pivot[3], travel[3], high[3];
+    gs4_vec3 from, to;
+    int a;
+    memset(l, 0, sizeof *l);
+    l->shape = shape;
+    l->fill = &e->is.fill;
+    gs4i_to_double(shape->is.pivot, pivot);
+    gs4i_to_double(shape->is.velocity, travel);
+    gs4i_shape_bounds(&e->is.shape, &from, &to);
+    gs4i_to_double(from, l->low);
+    gs4i_to_double(to, high);
+    for (a = 0; a < 3; a++) {
+        l->offset[a] = offset[a];
+        l->moved[a] = shape->at[a] + travel[a] * ahead - pivot[a];
+        l->key[a] = key[a];
+    }
+    return gs4i_lattice_span(l, &sim->grid, l->low, high, 1);
+}
+
+/* The next point x (of the world) that is in the emitter now and was not at its last emission. */
+static int gs4i_next_emitted(const gs4i_grid *g, const gs4i_emitter *e, gs4i_lattice *l,
+                             gs4_real x[3])
+{
+    const gs4_real jitter = l->fill->jitter;
+    while (gs4i_lattice_next(l)) {
+        double now[3], then[3];
+        int a;
+        gs4i_lattice_point(l, jitter, l->offset, now);
+        if (!gs4i_lattice_is_inside(l, now)) continue;
+        gs4i_lattice_point(l, jitter, e->emitted_offset, then);
+        if (e->has_emitted && gs4i_lattice_is_inside(l, then)) continue;
+        for (a = 0; a < 3; a++) x[a] = GS4I_C(now[a] + l->moved[a]);
+        if (gs4i_is_in_domain(g, x)) return 1;
+    }
+    return 0;
+}
+
+/* At the begin of a step: which emitters hold their nodes, and room for what they will give in
+ * it, so that emitting cannot fail afterwards. */
+static int gs4i_prepare_emitters(gs4_sim *sim, double dt)
+{
+    int i, n = 0, wanted;
+    for (i = 0; i < sim->emitter_count; i++) {
+        const gs4i_emitter *e = &sim->emitters[i];
+        double offset[3];
+        gs4_real x[3];
+        gs4i_lattice l;
+        sim->boundary.colliders[e->collider].is_off = !gs4i_emitter_is_on(e, sim->time);
+        if (!gs4i_emitter_is_on(e, sim->time + dt)) continue;
+        gs4i_offset_after(e, dt, offset);
+        if (gs4i_emission_is_due(e, offset) && gs4i_emitter_lattice(sim, e, offset, dt, &l))
+            while (gs4i_next_emitted(&sim->grid, e, &l, x)) n++;
+    }
+    /* with max_particles there is all room that there will be, and emitters pause when it is full */
+    if (n == 0 || sim->desc.max_particles) return GS4_OK;
+    wanted = sim->particles.count + n;
+    if (wanted <= sim->particles.capacity) return GS4_OK;
+    if (wanted > GS4I_MAX_PARTICLES)
+        return gs4i_fail(&sim->error, GS4_ERROR_MEMORY, "more than 2^30 particles");
+    wanted += wanted / 8;
+    if (gs4i_particles_reserve(&sim->memory, &sim->particles, wanted) != GS4_OK)
+        return gs4i_fail_memory(&sim->error);
+    return GS4_OK;
+}
+
+/* What is new counts for the next limit. */
+static void gs4i_note_emission(gs4_sim *sim, const gs4i_material_constants *m)
+{
+    gs4i_report *r = &sim->limits;
+    r->max_sound = gs4i_max(r->max_sound, m->sound_speed);
+    r->max_viscosity = gs4i_max(r->max_viscosity, m->viscosity * m->inv_density);
+    r->max_stiffness =
+        gs4i_max(r->max_stiffness,
+                 gs4i_max(2 * m->modulus, GS4I_SOLID_WAVES * m->shear_modulus) * m->inv_density);
+    if (m->varies) sim->limits_stale = 1;
+}
+
+/* At the end of a step of dt: new particles where the lattices have flowed into their emitters. */
+static void gs4i_emit(gs4_sim *sim, double dt)
+{
+    int i;
+    for (i = 0; i < sim->emitter_count; i++) {
+        gs4i_emitter *e = &sim->emitters[i];
+        const gs4_fill *f = &e->is.fill;
+        const gs4_real mass = gs4i_mass_of(sim, f);
+        double offset[3];
+        gs4_real x[3];
+        gs4i_lattice l;
+        if (!gs4i_emitter_is_on(e, sim->time)) continue;
+        gs4i_offset_after(e, dt, offset);
+        memcpy(e->offset, offset, sizeof offset);
+        if (!gs4i_emission_is_due(e, offset)) continue;
+        if (gs4i_emitter_lattice(sim, e, offset, 0, &l))
+            while (gs4i_next_emitted(&sim->grid, e, &l, x))
+                if (!gs4i_add_particle(sim, gs4i_vec3(x[0], x[1], x[2]), f->velocity, mass, f)) {
+                    if (sim->desc.log)
+                        sim->desc.log(1, "an emitter pauses: max_particles is reached",
+                                      sim->desc.log_user);
+                    break;
+                }
+        memcpy(e->emitted_offset, offset, sizeof offset);
+        e->has_emitted = 1;
+        gs4i_note_emission(sim, &sim->constants[f->material]);
+    }
+}
+
+/* Particles that went out through an open wall are dropped; the others close up in order. */
+static void gs4i_drop_outside(gs4_sim *sim)
+{
+    gs4i_particles *p = &sim->particles;
+    gs4i_array a[GS4I_ARRAYS];
+    size_t i, kept = 0;
+    int k;
+    gs4i_particle_arrays(p, a);
+    for (i = 0; i < (size_t)p->count; i++) {
+        if (!gs4i_is_in_domain(&sim->grid, p->position + 4 * i)) continue;
+        for (k = 0; k < GS4I_ARRAYS && kept != i; k++)
+            if (*a[k].data)
+                memcpy((char *)*a[k].data + kept * a[k].size, (char *)*a[k].data + i * a[k].size,
+                       a[k].size);
+        kept++;
+    }
+    p->count = (int)kept;
+    sim->needs_sort = 1;
+}
+
 /* ==== [[step]] one step; the function to read first is gs4i_step, at the end of this section == */
 
 /* --- what can go wrong, in words -------------------------------------------------------------- */
@@ -11821,15 +12611,37 @@ static gs4_real gs4i_stable_dt(const gs4_sim *sim, const gs4i_report *seen)
     return GS4I_C(dt);
 }
 
+/* Speeds that colliders and emitters will give to their nodes. */
+static void gs4i_see_colliders(const gs4i_boundary *b, gs4i_report *r)
+{
+    int i;
+    for (i = 0; i < b->collider_count; i++) {
+        const gs4i_collider *c = &b->colliders[i];
+        r->max_speed = gs4i_max(r->max_speed, gs4i_length(c->is.velocity));
+        r->max_speed = gs4i_max(r->max_speed, gs4i_length(c->flow));
+    }
+}
+
+/* Sound speeds of a batch, where the greatest speed has become `top_speed`. */
+static void gs4i_follow_speed(const gs4_sim *sim, gs4_real top_speed, gs4i_batch_constants *l)
+{
+    int b;
+    for (b = 0; b < GS4I_BATCH && top_speed > sim->top_speed; b++) {
+        const double c0 = gs4i_sound_speed_of(&sim->desc, &l->of[b]->is, top_speed);
+        GS4I_NTH(l->sound_speed, b) = GS4I_C(c0);
+        GS4I_NTH(l->tait, b) = gs4i_tait_of(&l->of[b]->is, c0);
+    }
+}
+
 /* The extremes that set the limit, from the particles as they are: after the scene was changed
- * by hand. */
-static void gs4i_look_at_particles(const gs4_sim *sim, gs4i_report *report)
+ * by hand, which may have brought a greater `top_speed`. */
+static void gs4i_find_limits(const gs4_sim *sim, gs4_real top_speed, gs4i_report *report)
 {
     const gs4i_particles *p = &sim->particles;
     const gs4i_prediction now = { 0, 0 };
     gs4i_heat_work heat;
     gs4i_response r;
-    int i, c;
+    int i;
     gs4i_report_clear(report);
     gs4i_begin_response(&r, sim, p, NULL, report, NULL);
     memset(&heat, 0, sizeof heat);
@@ -11846,6 +12658,7 @@ static void gs4i_look_at_particles(const gs4_sim *sim, gs4i_report *report)
         else
             memset(L, 0, sizeof L);
         gs4i_turn_to_batch(&r, (size_t)i, n);
+        gs4i_follow_speed(sim, top_speed, &r.constants);
         if (r.heat) gs4i_load_batch_heat(&r);
         gs4i_stress(&r, L, q.v[3], sigma, mu);
         gs4i_see_motion(&r.seen, q.v, L);
@@ -11854,12 +12667,7 @@ static void gs4i_look_at_particles(const gs4_sim *sim, gs4i_report *report)
     gs4i_report_motion(report, &r.seen);
     report->max_speed = GS4I_SQRT(report->max_speed);
     report->max_gradient = GS4I_SQRT(report->max_gradient);
-    /* what colliders and emitters will do to their nodes */
-    for (c = 0; c < sim->boundary.collider_count; c++) {
-        const gs4i_collider *b = &sim->boundary.colliders[c];
-        report->max_speed = gs4i_max(report->max_speed,
-                                     gs4i_max(gs4i_length(b->is.velocity), gs4i_length(b->flow)));
-    }
+    gs4i_see_colliders(&sim->boundary, report);
 }
 
 /* The member of the family (r, s), or its first step. */
@@ -12026,227 +12834,9 @@ static int gs4i_check_stage(gs4_sim *sim)
     return GS4_OK;
 }
 
-/* --- mouths, leavers, time -------------------------------------------------------------------- */
+/* --- the end of a step -------------------------------------------------------------------------- */
 
-static int gs4i_add_one(gs4_sim *sim, gs4_vec3 x, gs4_vec3 v, gs4_real mass, int material,
-                        gs4_real temperature)
-{
-    gs4i_particles *p = &sim->particles;
-    size_t i = (size_t)p->count;
-    int k;
-    if (p->count >= p->capacity || sim->next_id == UINT32_MAX) return 0;
-    p->position[4 * i] = x.x;
-    p->position[4 * i + 1] = x.y;
-    p->position[4 * i + 2] = x.z;
-    p->position[4 * i + 3] = mass;
-    p->velocity[4 * i] = v.x;
-    p->velocity[4 * i + 1] = v.y;
-    p->velocity[4 * i + 2] = v.z;
-    p->velocity[4 * i + 3] = 1;
-    if (p->with_rates) {
-        memset(p->rate + 4 * i, 0, 4 * sizeof(gs4_real));
-        memset(p->position_residual + 4 * i, 0, 4 * sizeof(gs4i_half));
-    }
-    for (k = 0; k < 3 && p->affine[k]; k++) memset(p->affine[k] + 4 * i, 0, 4 * sizeof(gs4_real));
-    if (p->elastic_reals)
-        memset(p->elastic + (size_t)p->elastic_reals * i, 0,
-               (size_t)p->elastic_reals * sizeof(gs4_real));
-    if (p->deformation_reals) gs4i_undeform(p, i, 1);
-    if (p->with_heat) gs4i_begin_heat(p, i, &sim->constants[material], temperature);
-    p->id[i] = sim->next_id++;
-    p->material[i] = (uint8_t)material;
-    p->count++;
-    sim->min_mass = sim->min_mass > 0 ? gs4i_min(sim->min_mass, mass) : mass;
-    sim->needs_sort = 1;
-    return 1;
-}
-
-static int gs4i_inside_domain(const gs4i_grid *g, gs4_vec3 p)
-{
-    return p.x >= g->origin.x && p.x < g->origin.x + GS4I_C(g->cells[0]) * g->h
-           && p.y >= g->origin.y && p.y < g->origin.y + GS4I_C(g->cells[1]) * g->h
-           && p.z >= g->origin.z && p.z < g->origin.z + GS4I_C(g->cells[2]) * g->h;
-}
-
-/* Uniform in [-1/2, 1/2), from the seed and a number. */
-static gs4_real gs4i_jitter(uint32_t seed, uint64_t number, int axis)
-{
-    uint64_t u = gs4i_mix(gs4i_mix((uint64_t)seed << 32 ^ number) + (uint64_t)axis);
-    return GS4I_C((double)(u >> 40) / 16777216.0 - 0.5);
-}
-
-/* The lattice that flows through a mouth: points that are in it now and were not when last
- * looked at. With `sim` const in spirit when `emit` is 0: then only counts, where the mouth will
- * be in the time `ahead`. Lattice point n of axis a is at low + (n + 1/2) spacing + drift. */
-static int gs4i_emitter_points(gs4_sim *sim, gs4i_emitter *e, const double drift[3], double ahead,
-                               int emit)
-{
-    const gs4i_collider *emitter = &sim->boundary.colliders[e->collider];
-    gs4i_collider placed = *emitter;
-    const double spacing = (double)e->is.fill.spacing;
-    const gs4_real mass = sim->constants[e->is.fill.material].density * e->is.fill.spacing
-                          * e->is.fill.spacing * e->is.fill.spacing;
-    double low[3], high[3], origin[3], pivot[3], travelled[3];
-    gs4_vec3 lo, hi;
-    int64_t from[3], to[3], i, j, k;
-    int a, n = 0;
-    if (ahead > 0) gs4i_collider_move(&placed, ahead);
-    gs4i_to_double(emitter->is.pivot, pivot);
-    gs4i_shape_bounds(&e->is.shape, &lo, &hi);
-    gs4i_to_double(lo, low);
-    gs4i_to_double(hi, high);
-    gs4i_to_double(sim->grid.origin, origin);
-    /* the part of the mouth's box that is in the domain */
-    for (a = 0; a < 3; a++) {
-        const double moved = placed.at[a] - pivot[a],
-                     size = (double)sim->grid.cells[a] * (double)sim->grid.h;
-        const double begin = fmax(low[a], origin[a] - moved),
-                     end = fmin(high[a], origin[a] + size - moved);
-        from[a] = (int64_t)floor((begin - low[a] - drift[a]) / spacing) - 1;
-        to[a] = (int64_t)ceil((end - low[a] - drift[a]) / spacing) + 1;
-        travelled[a] = moved;
-    }
-    for (k = from[2]; k <= to[2]; k++)
-        for (j = from[1]; j <= to[1]; j++)
-            for (i = from[0]; i <= to[0]; i++) {
-                const double at[3] = { (double)i + 0.5, (double)j + 0.5, (double)k + 0.5 };
-                const uint64_t number =
-                    (uint64_t)i * 0x9e3779b1u + ((uint64_t)j << 21) * 31 + ((uint64_t)k << 42) * 17;
-                double p[3], before[3];
-                gs4_vec3 now, then, world;
-                for (a = 0; a < 3; a++) {
-                    const double shift =
-                        low[a]
-                        + (at[a]
-                           + (double)(e->is.fill.jitter
-                                      * gs4i_jitter(e->is.fill.random_seed, number, a)))
-                              * spacing;
-                    p[a] = shift + drift[a];
-                    before[a] = shift + e->looked[a];
-                }
-                now = gs4i_vec3(GS4I_C(p[0]), GS4I_C(p[1]), GS4I_C(p[2]));
-                then = gs4i_vec3(GS4I_C(before[0]), GS4I_C(before[1]), GS4I_C(before[2]));
-                if (!(gs4i_shape_or_field(emitter, now) < 0)
-                    || (e->begun && gs4i_shape_or_field(emitter, then) < 0))
-                    continue;
-                world = gs4i_vec3(GS4I_C(p[0] + travelled[0]), GS4I_C(p[1] + travelled[1]),
-                                  GS4I_C(p[2] + travelled[2]));
-                if (!gs4i_inside_domain(&sim->grid, world)) continue;
-                n++;
-                if (emit
-                    && !gs4i_add_one(sim, world, e->is.fill.velocity, mass, e->is.fill.material,
-                                     e->is.fill.temperature))
-                    return n;
-            }
-    return n;
-}
-
-static int gs4i_emitter_is_on(const gs4i_emitter *e, double time)
-{
-    return time >= (double)e->is.start && (e->is.stop <= 0 || time < (double)e->is.stop);
-}
-
-static void gs4i_drift_after(const gs4i_emitter *e, double dt, double drift[3])
-{
-    drift[0] = e->drift[0] + ((double)e->is.fill.velocity.x - (double)e->is.travel.x) * dt;
-    drift[1] = e->drift[1] + ((double)e->is.fill.velocity.y - (double)e->is.travel.y) * dt;
-    drift[2] = e->drift[2] + ((double)e->is.fill.velocity.z - (double)e->is.travel.z) * dt;
-}
-
-/* Look at a mouth when its lattice has moved a fifth of a spacing, or for the first time. */
-static int gs4i_is_due(const gs4i_emitter *e, const double drift[3])
-{
-    double d2 = 0;
-    int a;
-    for (a = 0; a < 3; a++) d2 += (drift[a] - e->looked[a]) * (drift[a] - e->looked[a]);
-    return !e->begun || d2 > 0.04 * (double)e->is.fill.spacing * (double)e->is.fill.spacing;
-}
-
-/* Room for what the mouths will give in this step, so that emitting cannot fail afterwards. */
-static int gs4i_prepare_emitters(gs4_sim *sim, double dt)
-{
-    int e, n = 0, wanted;
-    for (e = 0; e < sim->emitter_count; e++) {
-        double drift[3];
-        sim->boundary.colliders[sim->emitters[e].collider].asleep =
-            !gs4i_emitter_is_on(&sim->emitters[e], sim->time);
-        if (!gs4i_emitter_is_on(&sim->emitters[e], sim->time + dt)) continue;
-        if (sim->emitters[e].begun)
-            gs4i_drift_after(&sim->emitters[e], dt, drift);
-        else
-            memset(drift, 0, sizeof drift);
-        if (gs4i_is_due(&sim->emitters[e], drift))
-            n += gs4i_emitter_points(sim, &sim->emitters[e], drift, dt, 0);
-    }
-    if (n == 0) return GS4_OK;
-    wanted = sim->particles.count + n;
-    /* all room there will be; mouths pause when it is full */
-    if (sim->desc.max_particles) return GS4_OK;
-    if (wanted <= sim->particles.capacity) return GS4_OK;
-    if (wanted > GS4I_MAX_PARTICLES)
-        return gs4i_fail(&sim->error, GS4_ERROR_MEMORY, "more than 2^30 particles");
-    wanted += wanted / 8;
-    if (gs4i_particles_reserve(&sim->memory, &sim->particles, wanted) != GS4_OK)
-        return gs4i_fail_memory(&sim->error);
-    return GS4_OK;
-}
-
-static void gs4i_emit(gs4_sim *sim, double dt)
-{
-    int e;
-    for (e = 0; e < sim->emitter_count; e++) {
-        gs4i_emitter *m = &sim->emitters[e];
-        double drift[3];
-        int before = sim->particles.count, n;
-        if (!gs4i_emitter_is_on(m, sim->time)) continue;
-        if (m->begun)
-            gs4i_drift_after(m, dt, drift);
-        else
-            memset(drift, 0, sizeof drift);
-        memcpy(m->drift, drift, sizeof drift);
-        if (!gs4i_is_due(m, drift)) continue;
-        n = gs4i_emitter_points(sim, m, drift, 0, 1);
-        if (n > sim->particles.count - before && sim->desc.log)
-            sim->desc.log(1, "an emitter pauses: max_particles is reached", sim->desc.log_user);
-        memcpy(m->looked, drift, sizeof drift);
-        m->begun = 1;
-        /* what is new counts for the next limit */
-        {
-            const gs4i_material_constants *mat = &sim->constants[m->is.fill.material];
-            sim->worst.max_sound = gs4i_max(sim->worst.max_sound, mat->sound_speed);
-            sim->worst.max_viscosity =
-                gs4i_max(sim->worst.max_viscosity, mat->viscosity * mat->inv_density);
-            sim->worst.max_stiffness =
-                gs4i_max(sim->worst.max_stiffness,
-                         gs4i_max(2 * mat->modulus, GS4I_SOLID_WAVES * mat->shear_modulus)
-                             * mat->inv_density);
-            if (mat->varies) sim->limits_stale = 1;
-        }
-    }
-}
-
-/* Particles that went out through an open wall are dropped; the others close up in order. */
-static void gs4i_drop_leavers(gs4_sim *sim)
-{
-    gs4i_particles *p = &sim->particles;
-    gs4i_array a[GS4I_ARRAYS];
-    size_t i, kept = 0;
-    int k;
-    gs4i_particle_arrays(p, a);
-    for (i = 0; i < (size_t)p->count; i++) {
-        const gs4_real *x = p->position + 4 * i;
-        if (!gs4i_inside_domain(&sim->grid, gs4i_vec3(x[0], x[1], x[2]))) continue;
-        for (k = 0; k < GS4I_ARRAYS && kept != i; k++)
-            if (*a[k].data)
-                memcpy((char *)*a[k].data + kept * a[k].size, (char *)*a[k].data + i * a[k].size,
-                       a[k].size);
-        kept++;
-    }
-    p->count = (int)kept;
-    sim->needs_sort = 1;
-}
-
-/* S8: bodies move, mouths give, leavers go. */
+/* S8: colliders move, emitters give, what left the domain goes. */
 static void gs4i_finish(gs4_sim *sim)
 {
     const double dt = (double)sim->integrator.dt;
@@ -12255,17 +12845,14 @@ static void gs4i_finish(gs4_sim *sim)
         gs4i_report r = gs4i_all_reports(sim);
         r.max_speed = GS4I_SQRT(r.max_speed);
         r.max_gradient = GS4I_SQRT(r.max_gradient);
-        sim->worst = r;
+        sim->limits = r;
         sim->split += (uint64_t)r.split;
         sim->bounded += (uint64_t)r.bounded;
-        if (r.left) gs4i_drop_leavers(sim);
+        if (r.left) gs4i_drop_outside(sim);
     }
-    for (b = 0; b < sim->boundary.collider_count; b++) {
+    for (b = 0; b < sim->boundary.collider_count; b++)
         gs4i_collider_move(&sim->boundary.colliders[b], dt);
-        sim->worst.max_speed = gs4i_max(
-            sim->worst.max_speed, gs4i_max(gs4i_length(sim->boundary.colliders[b].is.velocity),
-                                           gs4i_length(sim->boundary.colliders[b].flow)));
-    }
+    gs4i_see_colliders(&sim->boundary, &sim->limits);
     sim->time += dt;
     sim->last_dt = dt;
     sim->steps++;
@@ -12613,7 +13200,7 @@ static int gs4i_write_raw(gs4_sim *sim, const char *path)
 
 typedef struct gs4i_head {
     char magic[8];
-    uint32_t version, real_size, byte_order, head_size, material_size, body_size, emitter_size;
+    uint32_t version, real_size, byte_order, head_size, material_size, collider_size, emitter_size;
     int32_t cells[3], integrator, walls[6];
     double cell_size, origin[3], gravity[3], rho[2], decay, heat[7];
     int32_t isothermal[7], deconvolved; /* walls, air */
@@ -12621,11 +13208,11 @@ typedef struct gs4i_head {
     uint64_t steps;
     uint32_t next_id;
     int32_t restart, needs_sort, limits_stale, needs_spin;
-    double min_mass, fastest, shift;
+    double min_mass, top_speed, shift;
     int32_t particles, materials, colliders, emitters, active, occupied, elastic_reals,
         deformation_reals, with_heat, with_flux;
     uint64_t split, bounded;
-    gs4i_report worst;
+    gs4i_report limits;
 } gs4i_head;
 
 static void gs4i_head_of(const gs4_sim *sim, gs4i_head *h)
@@ -12639,7 +13226,7 @@ static void gs4i_head_of(const gs4_sim *sim, gs4i_head *h)
     h->byte_order = 0x01020304u;
     h->head_size = sizeof *h;
     h->material_size = sizeof(gs4i_material_constants);
-    h->body_size = sizeof(gs4i_collider);
+    h->collider_size = sizeof(gs4i_collider);
     h->emitter_size = sizeof(gs4i_emitter);
     for (i = 0; i < 3; i++) h->cells[i] = d->cells[i];
     for (i = 0; i < 6; i++) h->walls[i] = (int32_t)d->walls[i];
@@ -12670,7 +13257,7 @@ static void gs4i_head_of(const gs4_sim *sim, gs4i_head *h)
     h->limits_stale = sim->limits_stale;
     h->needs_spin = sim->needs_spin;
     h->min_mass = (double)sim->min_mass;
-    h->fastest = (double)sim->fastest;
+    h->top_speed = (double)sim->top_speed;
     h->shift = (double)sim->shift;
     h->particles = sim->particles.count;
     h->materials = sim->material_count;
@@ -12684,7 +13271,7 @@ static void gs4i_head_of(const gs4_sim *sim, gs4i_head *h)
     h->with_flux = sim->particles.with_flux;
     h->split = sim->split;
     h->bounded = sim->bounded;
-    h->worst = sim->worst;
+    h->limits = sim->limits;
 }
 
 static int gs4i_save(gs4_sim *sim, const char *path)
@@ -12735,7 +13322,7 @@ static int gs4i_check_head(gs4_sim *sim, const gs4i_head *h)
         return gs4i_fail(&sim->error, GS4_ERROR_FORMAT, "the file is not a gs4mpm checkpoint");
     if (h->version != own.version || h->real_size != own.real_size
         || h->byte_order != own.byte_order || h->head_size != own.head_size
-        || h->material_size != own.material_size || h->body_size != own.body_size
+        || h->material_size != own.material_size || h->collider_size != own.collider_size
         || h->emitter_size != own.emitter_size)
         return gs4i_fail(&sim->error, GS4_ERROR_FORMAT,
                          "the checkpoint was made by another build (version, precision, byte order "
@@ -13012,11 +13599,11 @@ static int gs4i_restore(gs4_sim *sim, const gs4i_head *h, const gs4i_pieces *p)
     sim->needs_sort = h->needs_sort;
     sim->limits_stale = h->limits_stale;
     sim->needs_spin = h->needs_spin;
-    sim->edited = 0;
+    sim->needs_check = 0;
     sim->min_mass = GS4I_C(h->min_mass);
-    sim->fastest = GS4I_C(h->fastest);
+    sim->top_speed = GS4I_C(h->top_speed);
     sim->shift = GS4I_C(h->shift);
-    sim->worst = h->worst;
+    sim->limits = h->limits;
     return GS4_OK;
 }
 
@@ -13471,13 +14058,6 @@ static int gs4i_check_solid(gs4i_error *e, const gs4i_scene *scene, const gs4_ma
                               "(its viscosity damps the solid)");
 }
 
-/* A scene carries heat from the first material on that conducts it, melts or is heated by
- * viscosity. */
-static int gs4i_has_heat(const gs4_material *m)
-{
-    return m->conductivity > 0 || m->can_melt || m->viscous_heating;
-}
-
 /* In a scene without heat the viscosity at the temperature of the air must be a number at shear
  * rates from 1e-6 to 1e6 /s. */
 static int gs4i_check_cross_wlf(gs4i_error *e, const gs4i_scene *scene, const gs4_material *m)
@@ -13665,49 +14245,10 @@ static int gs4i_check_emitter(gs4_sim *sim, gs4_emitter *m)
     GS4I_TRY(gs4i_check3(e, "travel", m->travel));
     GS4I_TRY(gs4i_check(e, "start", m->start, GS4I_NOT_NEGATIVE));
     GS4I_TRY(gs4i_check(e, "stop", m->stop, GS4I_NOT_NEGATIVE));
-    return gs4i_require(e, m->stop == 0 || m->stop > m->start,
-                        "stop must be later than start, or 0 for never");
-}
-
-/* --- sound speed where none is given ---------------------------------------------------------- */
-
-/* Ten times the fastest that anything here moves, falls or flows down: compression goes as the
- * Mach number squared. Of solids also at least sqrt(10 G/rho): a bulk modulus of 10 shear
- * moduli, Poisson's ratio 0.45. */
-static void gs4i_set_constants(gs4_sim *sim)
-{
-    const gs4_sim_desc *d = &sim->desc;
-    const double size = (double)d->cell_size;
-    double fall = fabs((double)d->gravity.x) * d->cells[0] * size
-                  + fabs((double)d->gravity.y) * d->cells[1] * size
-                  + fabs((double)d->gravity.z) * d->cells[2] * size;
-    double speed = sqrt(2 * fall + (double)sim->fastest * (double)sim->fastest);
-    int i;
-    /* nothing moves so far: a cell a second is as good as any */
-    if (speed <= 0) speed = size;
-    for (i = 0; i < sim->material_count; i++) {
-        gs4i_material_constants *l = &sim->constants[i];
-        const gs4_material *m = &l->is;
-        double c0 =
-            m->sound_speed > 0 ? (double)m->sound_speed
-            : m->bulk_modulus > 0
-                ? sqrt((double)m->bulk_modulus / (double)m->density)
-                : fmax(10 * speed, sqrt(10 * (double)m->shear_modulus / (double)m->density));
-        l->sound_speed = GS4I_C(c0);
-        l->tait = GS4I_C((double)m->density * c0 * c0 / 7);
-        gs4i_set_material_constants(l, d->ambient_temperature);
-        sim->solid_phase[i] = *l;
-        gs4i_set_solid_phase(&sim->solid_phase[i]);
-    }
-    sim->limits_stale = 1;
-}
-
-static void gs4i_note_speed(gs4_sim *sim, gs4_real speed)
-{
-    if (speed > sim->fastest) {
-        sim->fastest = speed;
-        gs4i_set_constants(sim);
-    }
+    GS4I_TRY(gs4i_require(e, m->stop == 0 || m->stop > m->start,
+                          "stop must be later than start, or 0 for never"));
+    return gs4i_require(e, gs4i_meets_domain(&sim->grid, &m->shape),
+                        "shape lies outside of the grid");
 }
 
 /* --- life ------------------------------------------------------------------------------------- */
@@ -13953,386 +14494,16 @@ GS4_API gs4_shape gs4_mesh(const gs4_real *vertices_xyz, int vertex_count, const
 
 /* --- scene ------------------------------------------------------------------------------------ */
 
-/* Room for one more element of an array of the scene. */
-static int gs4i_grow(gs4_sim *sim, void **data, int count, int *capacity, size_t size)
-{
-    void *grown;
-    int wanted;
-    if (count < *capacity) return GS4_OK;
-    wanted = *capacity ? 2 * *capacity : 4;
-    grown = gs4i_alloc(&sim->memory, (size_t)wanted, size);
-    if (!grown) return gs4i_fail_memory(&sim->error);
-    if (*data) memcpy(grown, *data, (size_t)count * size);
-    gs4i_free(&sim->memory, *data, (size_t)*capacity, size);
-    *data = grown;
-    *capacity = wanted;
-    return GS4_OK;
-}
-
-/* From the first viscoelastic material on particles carry non-local stress. */
-static int gs4i_make_elastic(gs4_sim *sim)
-{
-    gs4i_particles *p = &sim->particles;
-    const int reals = p->with_rates ? 12 : 6;
-    if (p->elastic_reals) return GS4_OK;
-    if (p->capacity
-        && !(p->elastic = (gs4_real *)gs4i_alloc(&sim->memory, (size_t)p->capacity + 1,
-                                                 (size_t)reals * sizeof(gs4_real))))
-        return GS4_ERROR_MEMORY;
-    p->elastic_reals = reals;
-    return GS4_OK;
-}
-
-/* From the first material with heat on particles carry a temperature, those that are there
- * already that of the air; from the first with a flux relaxation time on, a flux. */
-static int gs4i_make_heat(gs4_sim *sim, const gs4_material *material)
-{
-    gs4i_particles *p = &sim->particles;
-    const size_t room = (size_t)p->capacity + 1, each = 4 * sizeof(gs4_real);
-    const int heat = !p->with_heat, flux = !p->with_flux && material->flux_relaxation_time > 0;
-    gs4_real *made[3] = { NULL, NULL, NULL };
-    uint8_t *liquid = NULL;
-    int i;
-    if (p->capacity) {
-        if (heat) {
-            made[0] = (gs4_real *)gs4i_alloc(&sim->memory, room, each);
-            liquid = (uint8_t *)gs4i_alloc(&sim->memory, room, 1);
-        }
-        if (flux) {
-            made[1] = (gs4_real *)gs4i_alloc(&sim->memory, room, each);
-            made[2] = (gs4_real *)gs4i_alloc(&sim->memory, room, each);
-        }
-        if ((heat && (!made[0] || !liquid)) || (flux && (!made[1] || !made[2]))) {
-            for (i = 0; i < 3; i++) gs4i_free(&sim->memory, made[i], room, each);
-            gs4i_free(&sim->memory, liquid, room, 1);
-            return GS4_ERROR_MEMORY;
-        }
-    }
-    if (heat) {
-        p->heat = made[0];
-        p->liquid = liquid;
-        p->with_heat = 1;
-    }
-    for (i = 0; i < p->count && heat; i++)
-        gs4i_begin_heat(p, (size_t)i, &sim->constants[p->material[i]],
-                        sim->desc.ambient_temperature);
-    if (flux) {
-        p->flux = made[1];
-        p->flux_rate = made[2];
-        p->with_flux = 1;
-    }
-    sim->conduction.heats |= material->viscous_heating != 0;
-    sim->needs_sort = 1; /* nodes need room for it, too */
-    return GS4_OK;
-}
-
-/* From the first solid on particles carry F; those that are there already, the one that their
- * volume ratio says. */
-static int gs4i_make_deformation(gs4_sim *sim)
-{
-    gs4i_particles *p = &sim->particles;
-    const int reals = p->with_rates ? 24 : 9;
-    int i;
-    if (p->deformation_reals) return GS4_OK;
-    if (p->capacity
-        && !(p->deformation = (gs4_real *)gs4i_alloc(&sim->memory, (size_t)p->capacity + 1,
-                                                     (size_t)reals * sizeof(gs4_real))))
-        return GS4_ERROR_MEMORY;
-    p->deformation_reals = reals;
-    for (i = 0; i < p->count; i++) gs4i_undeform(p, (size_t)i, p->velocity[4 * (size_t)i + 3]);
-    return GS4_OK;
-}
-
-/* All that particles carry from this material on, or nothing of it. */
-static int gs4i_make_history(gs4_sim *sim, const gs4_material *material)
-{
-    gs4i_particles *p = &sim->particles;
-    const gs4i_particles before = *p;
-    int result = material->liquid != GS4_NEWTONIAN ? gs4i_make_elastic(sim) : GS4_OK;
-    if (result == GS4_OK && material->solid != GS4_NO_SOLID) result = gs4i_make_deformation(sim);
-    if (result == GS4_OK && gs4i_has_heat(material)) result = gs4i_make_heat(sim, material);
-    if (result == GS4_OK) return GS4_OK;
-    if (p->elastic != before.elastic)
-        gs4i_free(&sim->memory, p->elastic, (size_t)p->capacity + 1,
-                  (size_t)p->elastic_reals * sizeof(gs4_real));
-    if (p->deformation != before.deformation)
-        gs4i_free(&sim->memory, p->deformation, (size_t)p->capacity + 1,
-                  (size_t)p->deformation_reals * sizeof(gs4_real));
-    *p = before;
-    return result;
-}
-
-/* All members, and nothing of what lies between them: checkpoints compare materials byte by
- * byte. */
-static void gs4i_copy_members(gs4_material *to, const gs4_material *m)
-{
-    to->density = m->density;
-    to->liquid = m->liquid;
-    to->viscosity = m->viscosity;
-    to->local_fraction = m->local_fraction;
-    to->relaxation_time = m->relaxation_time;
-    to->stretch_time = m->stretch_time;
-    to->anisotropy = m->anisotropy;
-    to->arms = m->arms;
-    to->viscosity_law = m->viscosity_law;
-    to->cross_wlf.a = m->cross_wlf.a;
-    to->cross_wlf.n = m->cross_wlf.n;
-    to->cross_wlf.d1 = m->cross_wlf.d1;
-    to->cross_wlf.a1 = m->cross_wlf.a1;
-    to->cross_wlf.t1 = m->cross_wlf.t1;
-    to->cross_wlf.t2 = m->cross_wlf.t2;
-    to->viscosity_fn = m->viscosity_fn;
-    to->viscosity_user = m->viscosity_user;
-    to->bulk_modulus = m->bulk_modulus;
-    to->sound_speed = m->sound_speed;
-    to->incompressible = m->incompressible;
-    to->solid = m->solid;
-    to->shear_modulus = m->shear_modulus;
-    to->yield_compression = m->yield_compression;
-    to->yield_stretch = m->yield_stretch;
-    to->heat_capacity = m->heat_capacity;
-    to->conductivity = m->conductivity;
-    to->flux_relaxation_time = m->flux_relaxation_time;
-    to->fourier_fraction = m->fourier_fraction;
-    to->melting_temperature = m->melting_temperature;
-    to->latent_heat = m->latent_heat;
-    to->can_melt = m->can_melt;
-    to->viscous_heating = m->viscous_heating;
-}
-
 GS4_API int gs4_add_material(gs4_sim *sim, const gs4_material *material)
 {
     gs4i_scene scene;
     if (!sim) return GS4_ERROR_ARGUMENT;
-    if (!material) return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT, "material is NULL");
     scene = gs4i_scene_of(sim);
+    GS4I_TRY(gs4i_require(&sim->error, material != NULL, "material is NULL"));
     GS4I_TRY(gs4i_check_material(&sim->error, &scene, material));
-    if (sim->material_count == 256)
-        return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT,
-                         "there are 256 materials already, which is all there can be");
-    GS4I_TRY(gs4i_grow(sim, (void **)&sim->constants, sim->material_count, &sim->material_capacity,
-                       sizeof *sim->constants));
-    GS4I_TRY(gs4i_grow(sim, (void **)&sim->solid_phase, sim->material_count,
-                       &sim->solid_phase_capacity, sizeof *sim->solid_phase));
-    if (gs4i_make_history(sim, material) != GS4_OK) return gs4i_fail_memory(&sim->error);
-    memset(&sim->constants[sim->material_count].is, 0, sizeof *material);
-    gs4i_copy_members(&sim->constants[sim->material_count++].is, material);
-    gs4i_set_constants(sim);
-    return sim->material_count - 1;
-}
-
-/* Room for n more particles. */
-static int gs4i_make_room(gs4_sim *sim, int64_t n)
-{
-    const int64_t wanted = sim->particles.count + n,
-                  limit = sim->desc.max_particles ? sim->desc.max_particles : GS4I_MAX_PARTICLES;
-    if (wanted > limit)
-        return gs4i_fail_value(&sim->error, GS4_ERROR_MEMORY, "this needs room for ",
-                               (double)wanted,
-                               " particles, more than max_particles; nothing was added");
-    if ((uint64_t)sim->next_id + (uint64_t)n >= UINT32_MAX)
-        return gs4i_fail(&sim->error, GS4_ERROR_MEMORY, "all 2^32 particle ids are used up");
-    if (gs4i_particles_reserve(&sim->memory, &sim->particles, (int)wanted) != GS4_OK)
-        return gs4i_fail_memory(&sim->error);
-    return GS4_OK;
-}
-
-/* Give one particle to the scene: v = velocity + omega x (x - centre), C = omega x. */
-static void gs4i_fill_one(gs4_sim *sim, gs4_vec3 x, gs4_vec3 centre, const gs4_fill *f,
-                          gs4_real mass)
-{
-    const gs4_vec3 w = f->angular_velocity;
-    const gs4_real C[3][4] = { { 0, w.z, -w.y, 0 }, { -w.z, 0, w.x, 0 }, { w.y, -w.x, 0, 0 } };
-    const size_t i = (size_t)sim->particles.count;
-    const gs4_vec3 v = gs4i_add(f->velocity, gs4i_cross(w, gs4i_sub(x, centre)));
-    int k;
-    if (!gs4i_add_one(sim, x, v, mass, f->material, f->temperature)) return;
-    for (k = 0; k < 3 && sim->particles.affine[k]; k++)
-        memcpy(sim->particles.affine[k] + 4 * i, C[k], sizeof C[k]);
-    if (sim->particles.deformation_reals && !sim->needs_spin)
-        gs4i_set_spin(&sim->particles, i,
-                      gs4i_constants_of(sim, i)->shear_modulus > 0 ? w : gs4i_vec3(0, 0, 0));
-    gs4i_note_speed(sim, gs4i_length(v));
-}
-
-/* Is there material already where new particles would go? A cell that the new ones fill by a
- * good half must not be filled by as much before. `low` and `n` span the cells; -1: out of
- * memory. */
-static int gs4i_overlaps(gs4_sim *sim, const int low[3], const int n[3], const gs4_real *points,
-                         int count, gs4_real volume)
-{
-    const gs4i_particles *p = &sim->particles;
-    const size_t cells = (size_t)n[0] * (size_t)n[1] * (size_t)n[2];
-    const gs4_real o[3] = { sim->grid.origin.x, sim->grid.origin.y, sim->grid.origin.z };
-    const gs4_real full = sim->grid.h * sim->grid.h * sim->grid.h;
-    gs4_real *filled;
-    size_t i;
-    int a, pass, overlap = 0;
-    if (p->count == 0) return 0;
-    filled = (gs4_real *)gs4i_alloc(&sim->memory, cells, 2 * sizeof *filled);
-    if (!filled) return -1;
-    for (pass = 0; pass < 2; pass++)
-        for (i = 0; i < (size_t)(pass ? count : p->count); i++) {
-            const gs4_real *x = pass ? points + 3 * i : p->position + 4 * i;
-            size_t at = 0;
-            for (a = 2; a >= 0; a--) {
-                const int c = (int)((x[a] - o[a]) * sim->grid.inv_h) - low[a];
-                if (c < 0 || c >= n[a]) break;
-                at = at * (size_t)n[a] + (size_t)c;
-            }
-            if (a >= 0) continue;
-            filled[2 * at + (size_t)pass] += pass ? volume
-                                                  : p->position[4 * i + 3]
-                                                        * sim->constants[p->material[i]].inv_density
-                                                        * p->velocity[4 * i + 3];
-        }
-    for (i = 0; i < cells; i++)
-        overlap |= filled[2 * i] > GS4I_C(0.6) * full && filled[2 * i + 1] > GS4I_C(0.6) * full;
-    gs4i_free(&sim->memory, filled, cells, 2 * sizeof *filled);
-    return overlap;
-}
-
-/* Points of the lattice low + (i + 1/2) spacing that are inside the shape and the domain: counts
- * them, and writes them where `out` is given; -1 when there are more than there is room for.
- * Lattices of all shapes are aligned with the cells. */
-static int64_t gs4i_lattice(const gs4_sim *sim, const gs4i_collider *shape, const gs4_fill *f,
-                            const int64_t from[3], const int64_t to[3], gs4_real *out)
-{
-    const double s = (double)f->spacing;
-    const int64_t most = (sim->desc.max_particles ? sim->desc.max_particles : GS4I_MAX_PARTICLES)
-                         - sim->particles.count;
-    double o[3];
-    int64_t i, j, k, n = 0;
-    gs4i_to_double(sim->grid.origin, o);
-    for (k = from[2]; k < to[2]; k++)
-        for (j = from[1]; j < to[1]; j++)
-            for (i = from[0]; i < to[0]; i++) {
-                const uint64_t number = ((uint64_t)k << 42) ^ ((uint64_t)j << 21) ^ (uint64_t)i;
-                gs4_vec3 x = gs4i_vec3(GS4I_C(o[0] + ((double)i + 0.5) * s),
-                                       GS4I_C(o[1] + ((double)j + 0.5) * s),
-                                       GS4I_C(o[2] + ((double)k + 0.5) * s));
-                if (!(gs4i_shape_or_field(shape, x) < 0)) continue;
-                if (f->jitter > 0) {
-                    const gs4_real amount = f->jitter * f->spacing;
-                    x = gs4i_add(x, gs4i_vec3(amount * gs4i_jitter(f->random_seed, number, 0),
-                                              amount * gs4i_jitter(f->random_seed, number, 1),
-                                              amount * gs4i_jitter(f->random_seed, number, 2)));
-                }
-                if (!gs4i_inside_domain(&sim->grid, x)) continue;
-                if (n == most) return -1;
-                if (out) {
-                    out[3 * n] = x.x;
-                    out[3 * n + 1] = x.y;
-                    out[3 * n + 2] = x.z;
-                }
-                n++;
-            }
-    return n;
-}
-
-/* Box of a shape, cut to the domain: in lattice numbers of the given spacing, and in cells. 0
- * where nothing is left. */
-static int gs4i_clip_shape(const gs4_sim *sim, const gs4_shape *s, double spacing, int64_t from[3],
-                           int64_t to[3], int low[3], int n[3])
-{
-    gs4_vec3 lo = sim->grid.origin, hi = sim->grid.origin;
-    double l[3], h[3], o[3];
-    int a;
-    gs4i_shape_bounds(s, &lo, &hi);
-    gs4i_to_double(lo, l);
-    gs4i_to_double(hi, h);
-    gs4i_to_double(sim->grid.origin, o);
-    for (a = 0; a < 3; a++) {
-        const double size = sim->grid.cells[a] * (double)sim->grid.h;
-        if (s->kind == GS4_SHAPE_PLANE) {
-            l[a] = o[a];
-            h[a] = o[a] + size;
-        }
-        if (l[a] < o[a]) l[a] = o[a];
-        if (h[a] > o[a] + size) h[a] = o[a] + size;
-        if (l[a] >= h[a]) return 0;
-        from[a] = (int64_t)floor((l[a] - o[a]) / spacing);
-        to[a] = (int64_t)ceil((h[a] - o[a]) / spacing);
-        low[a] = (int)((l[a] - o[a]) / (double)sim->grid.h) - 1;
-        n[a] = (int)((h[a] - o[a]) / (double)sim->grid.h) + 2 - low[a];
-    }
-    return 1;
-}
-
-/* A body for `shape` at rest, its distances sampled where it is a mesh. */
-static int gs4i_make_collider(gs4_sim *sim, gs4i_collider *b, const gs4_collider *is,
-                              double spacing)
-{
-    memset(b, 0, sizeof *b);
-    b->is = *is;
-    b->at[0] = (double)is->pivot.x;
-    b->at[1] = (double)is->pivot.y;
-    b->at[2] = (double)is->pivot.z;
-    b->turn[0] = 1;
-    gs4i_collider_orient(b);
-    if (is->shape.kind == GS4_SHAPE_MESH
-        && gs4i_field_create(&sim->memory, &b->field, &is->shape, spacing) != GS4_OK)
-        return gs4i_fail_memory(&sim->error);
-    return GS4_OK;
-}
-
-/* Points of the shape, checked for overlap, into a list that the caller frees. Returns how many,
- * or an error. */
-static int64_t gs4i_collect_points(gs4_sim *sim, const gs4_shape *shape, const gs4_fill *f,
-                                   gs4_real **points)
-{
-    gs4_collider as_body;
-    gs4i_collider collider;
-    int64_t from[3], to[3], n;
-    int low[3], cells[3], overlap;
-    if (!gs4i_clip_shape(sim, shape, (double)f->spacing, from, to, low, cells))
-        return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT,
-                         "shape lies outside of the grid: nothing was added");
-    if ((double)(to[0] - from[0]) * (double)(to[1] - from[1]) * (double)(to[2] - from[2]) > 16e9)
-        return gs4i_fail(
-            &sim->error, GS4_ERROR_MEMORY,
-            "shape spans more than 1.6e10 particles; a larger spacing would do; nothing was added");
-    memset(&as_body, 0, sizeof as_body);
-    as_body.shape = *shape;
-    GS4I_TRY(gs4i_make_collider(sim, &collider, &as_body, (double)f->spacing));
-    n = gs4i_lattice(sim, &collider, f, from, to, NULL);
-    if (n < 0)
-        n = gs4i_fail(&sim->error, GS4_ERROR_MEMORY,
-                      "shape holds more particles than there is room for (max_particles); a larger "
-                      "spacing would do; nothing was added");
-    else if (n == 0)
-        n = gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT,
-                      "shape holds no particle: it is thinner than fill.spacing, "
-                      "outside of the grid, or inside out");
-    else if (!(*points = (gs4_real *)gs4i_alloc(&sim->memory, (size_t)n, 3 * sizeof **points)))
-        n = gs4i_fail_memory(&sim->error);
-    else {
-        gs4i_lattice(sim, &collider, f, from, to, *points);
-        overlap =
-            gs4i_overlaps(sim, low, cells, *points, (int)n, f->spacing * f->spacing * f->spacing);
-        if (overlap) {
-            gs4i_free(&sim->memory, *points, (size_t)n, 3 * sizeof **points);
-            n = overlap < 0
-                    ? gs4i_fail_memory(&sim->error)
-                    : gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT,
-                                "shape overlaps material that is there already: nothing was added");
-        }
-    }
-    gs4i_field_free(&sim->memory, &collider.field);
-    return n;
-}
-
-/* Speed of the fastest particle; one that is not finite does not count. */
-static gs4_real gs4i_fastest(const gs4i_particles *p)
-{
-    gs4_real fastest = 0;
-    int i;
-    for (i = 0; i < p->count; i++) {
-        const gs4_real *v = p->velocity + 4 * (size_t)i,
-                       speed = gs4i_length(gs4i_vec3(v[0], v[1], v[2]));
-        if (speed > fastest && speed < GS4I_HUGE) fastest = speed;
-    }
-    return fastest;
+    GS4I_TRY(gs4i_require(&sim->error, sim->material_count < 256,
+                          "there are 256 materials already, which is all there can be"));
+    return gs4i_add_material(sim, material);
 }
 
 /* After an edit by hand: all that a user may have written, before it can do harm. */
@@ -14340,10 +14511,10 @@ static int gs4i_check_edit(gs4_sim *sim)
 {
     const gs4i_particles *p = &sim->particles;
     int i, c;
-    if (!sim->edited) return GS4_OK;
+    if (!sim->needs_check) return GS4_OK;
     for (i = 0; i < p->count; i++) {
         const gs4_real *x = p->position + 4 * (size_t)i, *v = p->velocity + 4 * (size_t)i;
-        int good = gs4i_inside_domain(&sim->grid, gs4i_vec3(x[0], x[1], x[2]));
+        int good = gs4i_is_in_domain(&sim->grid, x);
         for (c = 0; c < 3; c++)
             good = good && gs4i_finite(x[c]) && gs4i_finite(v[c]) && v[c] < GS4I_HUGE
                    && v[c] > -GS4I_HUGE;
@@ -14355,115 +14526,83 @@ static int gs4i_check_edit(gs4_sim *sim)
     }
     for (i = 0; i < p->count && p->with_heat; i++)
         gs4i_settle_phase(p, (size_t)i, &sim->constants[p->material[i]]);
-    gs4i_note_speed(sim, gs4i_fastest(p));
-    sim->edited = 0;
+    gs4i_note_speed(sim, gs4i_top_speed(p));
+    sim->needs_check = 0;
     return GS4_OK;
 }
 
 GS4_API int gs4_add_particles(gs4_sim *sim, gs4_shape shape, const gs4_fill *fill)
 {
     gs4_fill f;
-    gs4_vec3 lo, hi, centre;
-    gs4_real *points = NULL, mass;
-    int64_t n, i;
-    int result;
     if (!sim) return GS4_ERROR_ARGUMENT;
-    if (!fill) return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT, "fill is NULL");
+    GS4I_TRY(gs4i_require(&sim->error, fill != NULL, "fill is NULL"));
     f = *fill;
     GS4I_TRY(gs4i_check_edit(sim));
     GS4I_TRY(gs4i_check_fill(sim, &f));
     GS4I_TRY(gs4i_check_shape(&sim->error, &sim->memory, &shape));
-    lo = hi = shape.a;
-    gs4i_shape_bounds(&shape, &lo, &hi);
-    centre = gs4i_scale(gs4i_add(lo, hi), GS4I_C(0.5));
-    n = gs4i_collect_points(sim, &shape, &f, &points);
-    if (n < 0) return (int)n;
-    mass = sim->constants[f.material].density * f.spacing * f.spacing * f.spacing;
-    result = mass > GS4I_TINY / GS4I_EPSILON
-                 ? gs4i_make_room(sim, n)
-                 : gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT,
-                             "a particle would be lighter than gs4_real can tell from "
-                             "nothing; use other units, or define GS4_DOUBLE");
-    for (i = 0; i < n && result == GS4_OK; i++)
-        gs4i_fill_one(sim, gs4i_vec3(points[3 * i], points[3 * i + 1], points[3 * i + 2]), centre,
-                      &f, mass);
-    gs4i_free(&sim->memory, points, (size_t)n, 3 * sizeof *points);
-    if (result != GS4_OK) return result;
-    sim->restart = sim->needs_sort = sim->limits_stale = 1;
-    return (int)n;
+    return gs4i_fill_shape(sim, &shape, &f);
+}
+
+/* Points in the domain, and their mean. */
+static int gs4i_check_points(gs4_sim *sim, const gs4_real *xyz, int count, gs4_vec3 *mean)
+{
+    int i, a;
+    *mean = gs4i_vec3(0, 0, 0);
+    for (i = 0; i < count; i++) {
+        const gs4_real *x = xyz + 3 * (size_t)i;
+        for (a = 0; a < 3; a++) GS4I_TRY(gs4i_check(&sim->error, "xyz", x[a], GS4I_FINITE));
+        GS4I_TRY(gs4i_require_value(&sim->error, gs4i_is_in_domain(&sim->grid, x), "point ", i,
+                                    " lies outside of the grid: nothing was added"));
+        *mean = gs4i_add(*mean, gs4i_scale(gs4i_vec3(x[0], x[1], x[2]), 1 / GS4I_C(count)));
+    }
+    return GS4_OK;
 }
 
 GS4_API int gs4_add_points(gs4_sim *sim, const gs4_real *xyz, int count, gs4_real volume_each,
                            const gs4_fill *fill)
 {
+    gs4i_error *e;
     gs4_fill f;
-    gs4_vec3 centre = gs4i_vec3(0, 0, 0);
-    gs4_real mass;
-    int i, a;
+    gs4_vec3 mean;
     if (!sim) return GS4_ERROR_ARGUMENT;
-    if (!fill || (!xyz && count > 0))
-        return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT, "xyz or fill is NULL");
-    if (count < 0)
-        return gs4i_fail_value(&sim->error, GS4_ERROR_ARGUMENT, "count is ", count,
-                               "; it must be 0 or above");
+    e = &sim->error;
+    GS4I_TRY(gs4i_require(e, fill && (xyz || count <= 0), "xyz or fill is NULL"));
+    GS4I_TRY(gs4i_require_value(e, count >= 0, "count is ", count, "; it must be 0 or above"));
     f = *fill;
     GS4I_TRY(gs4i_check_edit(sim));
     GS4I_TRY(gs4i_check_fill(sim, &f));
-    GS4I_TRY(gs4i_check(&sim->error, "volume_each", volume_each, GS4I_POSITIVE));
-    if (volume_each > 8 * sim->grid.h * sim->grid.h * sim->grid.h)
-        return gs4i_fail_value(&sim->error, GS4_ERROR_ARGUMENT, "volume_each is ",
-                               (double)volume_each,
-                               "; above eight cells there would be holes in the material");
-    for (i = 0; i < count; i++) {
-        const gs4_real *x = xyz + 3 * (size_t)i;
-        for (a = 0; a < 3; a++) GS4I_TRY(gs4i_check(&sim->error, "xyz", x[a], GS4I_FINITE));
-        if (!gs4i_inside_domain(&sim->grid, gs4i_vec3(x[0], x[1], x[2])))
-            return gs4i_fail_value(&sim->error, GS4_ERROR_ARGUMENT, "point ", i,
-                                   " lies outside of the grid: nothing was added");
-        centre = gs4i_add(centre, gs4i_scale(gs4i_vec3(x[0], x[1], x[2]), 1 / GS4I_C(count)));
-    }
-    mass = sim->constants[f.material].density * volume_each;
-    if (!(mass > GS4I_TINY / GS4I_EPSILON))
-        return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT,
-                         "a particle would be lighter than gs4_real can tell from "
-                         "nothing; use other units, or define GS4_DOUBLE");
-    GS4I_TRY(gs4i_make_room(sim, count));
-    for (i = 0; i < count; i++)
-        gs4i_fill_one(sim,
-                      gs4i_vec3(xyz[3 * (size_t)i], xyz[3 * (size_t)i + 1], xyz[3 * (size_t)i + 2]),
-                      centre, &f, mass);
-    if (count) sim->restart = sim->needs_sort = sim->limits_stale = 1;
-    return count;
+    GS4I_TRY(gs4i_check(e, "volume_each", volume_each, GS4I_POSITIVE));
+    GS4I_TRY(gs4i_require_value(e, volume_each <= 8 * sim->grid.h * sim->grid.h * sim->grid.h,
+                                "volume_each is ", (double)volume_each,
+                                "; above eight cells there would be holes in the material"));
+    GS4I_TRY(gs4i_check_points(sim, xyz, count, &mean));
+    return gs4i_add_points(sim, xyz, count, sim->constants[f.material].density * volume_each, mean,
+                           &f);
 }
 
 GS4_API int gs4_add_collider(gs4_sim *sim, const gs4_collider *collider)
 {
     gs4_collider c;
     if (!sim) return GS4_ERROR_ARGUMENT;
-    if (!collider) return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT, "collider is NULL");
+    GS4I_TRY(gs4i_require(&sim->error, collider != NULL, "collider is NULL"));
     c = *collider;
     GS4I_TRY(gs4i_check_collider(sim, &c));
-    GS4I_TRY(gs4i_grow(sim, (void **)&sim->boundary.colliders, sim->boundary.collider_count,
-                       &sim->boundary.collider_capacity, sizeof *sim->boundary.colliders));
-    GS4I_TRY(gs4i_make_collider(sim, &sim->boundary.colliders[sim->boundary.collider_count], &c,
-                                0.5 * (double)sim->grid.h));
-    gs4i_note_speed(sim, gs4i_length(c.velocity));
-    sim->limits_stale = 1;
-    return sim->boundary.collider_count++;
+    return gs4i_add_collider(sim, &c, 0.5 * (double)sim->grid.h);
 }
 
 GS4_API int gs4_move_collider(gs4_sim *sim, int collider, gs4_vec3 velocity,
                               gs4_vec3 angular_velocity)
 {
+    gs4i_collider *c;
     if (!sim) return GS4_ERROR_ARGUMENT;
     GS4I_TRY(gs4i_check_id(&sim->error, "collider", collider, sim->boundary.collider_count));
-    if (sim->boundary.colliders[collider].is_emitter)
-        return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT,
-                         "that id belongs to the mouth of an emitter, not to a collider");
+    c = &sim->boundary.colliders[collider];
+    GS4I_TRY(gs4i_require(&sim->error, !c->is_emitter,
+                          "that id belongs to the mouth of an emitter, not to a collider"));
     GS4I_TRY(gs4i_check3(&sim->error, "velocity", velocity));
     GS4I_TRY(gs4i_check3(&sim->error, "angular_velocity", angular_velocity));
-    sim->boundary.colliders[collider].is.velocity = velocity;
-    sim->boundary.colliders[collider].is.angular_velocity = angular_velocity;
+    c->is.velocity = velocity;
+    c->is.angular_velocity = angular_velocity;
     gs4i_note_speed(sim, gs4i_length(velocity));
     sim->limits_stale = 1;
     return GS4_OK;
@@ -14472,35 +14611,11 @@ GS4_API int gs4_move_collider(gs4_sim *sim, int collider, gs4_vec3 velocity,
 GS4_API int gs4_add_emitter(gs4_sim *sim, const gs4_emitter *emitter)
 {
     gs4_emitter e;
-    gs4_collider held;
-    gs4i_collider *collider;
-    int64_t from[3], to[3];
-    int low[3], n[3];
     if (!sim) return GS4_ERROR_ARGUMENT;
-    if (!emitter) return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT, "emitter is NULL");
+    GS4I_TRY(gs4i_require(&sim->error, emitter != NULL, "emitter is NULL"));
     e = *emitter;
     GS4I_TRY(gs4i_check_emitter(sim, &e));
-    if (!gs4i_clip_shape(sim, &e.shape, (double)e.fill.spacing, from, to, low, n))
-        return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT, "shape lies outside of the grid");
-    memset(&held, 0, sizeof held);
-    held.shape = e.shape;
-    held.velocity = e.travel;
-    held.temperature = e.fill.temperature;
-    GS4I_TRY(gs4i_grow(sim, (void **)&sim->emitters, sim->emitter_count, &sim->emitter_capacity,
-                       sizeof *sim->emitters));
-    GS4I_TRY(gs4i_grow(sim, (void **)&sim->boundary.colliders, sim->boundary.collider_count,
-                       &sim->boundary.collider_capacity, sizeof *sim->boundary.colliders));
-    collider = &sim->boundary.colliders[sim->boundary.collider_count];
-    GS4I_TRY(gs4i_make_collider(sim, collider, &held, (double)e.fill.spacing));
-    collider->is_emitter = 1;
-    collider->asleep = 1;
-    collider->flow = e.fill.velocity;
-    memset(&sim->emitters[sim->emitter_count], 0, sizeof *sim->emitters);
-    sim->emitters[sim->emitter_count].is = e;
-    sim->emitters[sim->emitter_count].collider = sim->boundary.collider_count++;
-    gs4i_note_speed(sim, gs4i_max(gs4i_length(e.fill.velocity), gs4i_length(e.travel)));
-    sim->limits_stale = 1;
-    return sim->emitter_count++;
+    return gs4i_add_emitter(sim, &e);
 }
 
 GS4_API int gs4_move_emitter(gs4_sim *sim, int emitter, gs4_vec3 travel)
@@ -14517,29 +14632,25 @@ GS4_API int gs4_move_emitter(gs4_sim *sim, int emitter, gs4_vec3 travel)
 
 /* --- stepping --------------------------------------------------------------------------------- */
 
+/* Largest stable dt of the present state, s. What an edit by hand has brought is seen, but left
+ * to the next call that checks it. */
 static gs4_real gs4i_limit_now(const gs4_sim *sim)
 {
-    gs4i_report r = sim->worst;
-    if (sim->limits_stale) gs4i_look_at_particles(sim, &r);
+    gs4i_report r = sim->limits;
+    gs4_real top_speed = sim->top_speed;
+    if (sim->needs_check) top_speed = gs4i_max(top_speed, gs4i_top_speed(&sim->particles));
+    if (sim->limits_stale) gs4i_find_limits(sim, top_speed, &r);
     return gs4i_stable_dt(sim, &r);
 }
 
-GS4_API gs4_real gs4_stable_dt(const gs4_sim *sim)
-{
-    /* a default sound speed follows the speeds that an edit has brought */
-    gs4_sim *noted;
-    if (!sim) return GS4I_C(0);
-    memcpy(&noted, &sim, sizeof noted);
-    if (sim->edited) gs4i_note_speed(noted, gs4i_fastest(&sim->particles));
-    return gs4i_limit_now(sim);
-}
+GS4_API gs4_real gs4_stable_dt(const gs4_sim *sim) { return sim ? gs4i_limit_now(sim) : GS4I_C(0); }
 
 static int gs4i_try_step(gs4_sim *sim, gs4_real dt)
 {
     gs4_real limit;
     GS4I_TRY(gs4i_check_edit(sim));
     if (sim->limits_stale) {
-        gs4i_look_at_particles(sim, &sim->worst);
+        gs4i_find_limits(sim, sim->top_speed, &sim->limits);
         sim->limits_stale = 0;
     }
     limit = gs4i_limit_now(sim);
@@ -14658,7 +14769,7 @@ GS4_API gs4_edit gs4_edit_particles(gs4_sim *sim, gs4_field field)
         sim->needs_spin = 1;
         gs4i_forget_spin(sim);
     }
-    if (e.data) sim->edited = sim->restart = sim->needs_sort = sim->limits_stale = 1;
+    if (e.data) sim->needs_check = sim->restart = sim->needs_sort = sim->limits_stale = 1;
     return e;
 }
 

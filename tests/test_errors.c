@@ -957,7 +957,7 @@ static void test_errors_edit(void)
 }
 
 /* A slip of the hand, refused and repaired, leaves no trace: not in the sound speed either,
- * which follows speeds. */
+ * which follows speeds, and not by asking for the stable step in between. */
 static void test_errors_edit_repaired(void)
 {
     gs4_sim_desc d = err_desc();
@@ -971,6 +971,7 @@ static void test_errors_edit_repaired(void)
     before = gs4_stable_dt(sim);
     e = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
     e.data[0] = (gs4_real)1e12;
+    CHECK(gs4_stable_dt(sim) < before / 1000);
     e.data[e.stride] = (gs4_real)ERR_NAN;
     CHECK_RESULT(sim, gs4_step(sim, (gs4_real)1e-6), GS4_ERROR_ARGUMENT);
     e = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);

@@ -1,20 +1,20 @@
-/* gs4mpm.h - thick liquids in 3D by the Material Point Method, second order in time. One file, libc and libm.   0.1.0
- * MIT licence, at the end of the file.
+/* gs4mpm.h - thick liquids in 3D by the Material Point Method, second order in time. 0.1.0
+ * One file, libc and libm. MIT licence, at the end of the file; what changed stands before it.
  *
  * USE. In one C or C++ file of your program:
  *
  *     #define GS4MPM_IMPLEMENTATION
  *     #include "gs4mpm.h"
  *
- * and everywhere else the include alone. A whole program, which drops honey on a floor and writes what it looks like after a
- * quarter of a second as a point cloud (cc drop.c -lm):
+ * and everywhere else the include alone. A whole program (cc drop.c -lm), which drops honey on a
+ * floor and writes what it looks like after a quarter of a second as a point cloud:
  *
  *     #include <stdio.h>
  *     #define GS4MPM_IMPLEMENTATION
  *     #include "gs4mpm.h"
  *     int main(void)
  *     {
- *         gs4_sim_desc desc = { { 32, 32, 32 }, 0.004f };          // 32^3 cells of 4 mm: a box of 13 cm
+ *         gs4_sim_desc desc = { { 32, 32, 32 }, 0.004f };   // 32^3 cells of 4 mm: a box of 13 cm
  *         gs4_vec3 centre = { 0.064f, 0.08f, 0.064f };
  *         gs4_material honey;
  *         gs4_fill fill = { 0 };
@@ -24,27 +24,30 @@
  *         gs4_material_preset("honey", &honey);
  *         fill.material = gs4_add_material(sim, &honey);
  *         gs4_add_particles(sim, gs4_sphere(centre, 0.03f), &fill);
- *         if (gs4_advance(sim, 0.25f) < 0 || gs4_write_ply(sim, "honey.ply") < 0) puts(gs4_last_error(sim));
+ *         if (gs4_advance(sim, 0.25f) < 0 || gs4_write_ply(sim, "honey.ply") < 0)
+ *             puts(gs4_last_error(sim));
  *         gs4_destroy(sim);
  *         return 0;
  *     }
  *
- * WHAT IT DOES NOT DO, YET. Implicit and projection schemes are declared and refused with a sentence.
- * It has no surface tension, no two-way coupling to bodies, no sparse domain beyond 2^36 cells.
+ * WHAT IT DOES NOT DO, YET. Implicit and projection schemes are declared and refused with a
+ * sentence. It has no surface tension, no two-way coupling to colliders, no domain beyond 2^36
+ * cells.
  *
- * MAP. Sections carry a tag; grep -n '^/. ==== ' gs4mpm.h is the table of contents. A section uses only sections above it.
+ * MAP. Sections carry a tag; grep -n '^/. ==== ' gs4mpm.h is the table of contents. A section uses
+ * only sections above it.
  *
  *     [[config]]    version, precision, linkage      [[base]]      arithmetic, memory, text, tasks
  *     [[types]]     results, vectors, shapes, hooks  [[vec]]       three-vectors and shapes
  *     [[materials]] what matter is                   [[poisson]]   multigrid on a masked grid
  *     [[sim]]       description, scene, stepping     [[kernel]]    quadratic B-splines on 27 nodes
- *     [[poisson]]   the elliptic solver by itself    [[grid]]      blocks of nodes where there is material
+ *     [[poisson]]   the elliptic solver by itself    [[grid]]      blocks of nodes near material
  *                                                    [[particles]] the store, and how it is sorted
  *                                                    [[liquid]]    pressure, viscosity, presets
  *                                                    [[viscoelastic]] non-local stress
  *                                                    [[solid]]     elastic and plastic solids
  *                                                    [[heat]]      temperature, melting, flux
- *                                                    [[response]]  all laws, for a velocity gradient
+ *                                                    [[response]]  all laws for a velocity gradient
  *                                                    [[boundary]]  walls by mirror nodes, colliders
  *                                                    [[state]]     what a simulation is
  *                                                    [[transfer]]  particles to nodes and back
@@ -52,143 +55,241 @@
  *                                                    [[explicit]]  the scheme: S3 to S7
  *                                                    [[conduction]] heat from node to node
  *                                                    [[scene]]     what is given to it; emitters
- *                                                    [[step]]      one step: read gs4i_make_step first
+ *                                                    [[step]]      one step: gs4i_make_step
  *                                                    [[files]]     frames and checkpoints
- *                                                    [[public]]    every value checked, then the work
+ *                                                    [[public]]    values checked, then the work
  *
- * UNITS AND CONVENTIONS. SI, or any consistent system. L_ij = dv_i/dx_j, D = (L + L^T)/2. Stresses are Cauchy, tension positive.
- * Nodes are cell centres, x fastest; walls lie on the faces of the outer cells. J = rho0/rho is the volume ratio.
+ * UNITS AND CONVENTIONS. SI, or any consistent system. L_ij = dv_i/dx_j, D = (L + L^T)/2.
+ * Stresses are Cauchy, tension positive. Nodes are cell centres, x fastest; walls lie on the faces
+ * of the outer cells. J = rho0/rho is the volume ratio. A prime of time: y~ is y at the stage.
+ *
+ * WORDS
+ *     block           4^3 nodes; only blocks within reach of particles exist
+ *     slot            number of a block that has nodes
+ *     tile            the 8^3 nodes that the particles of a block can touch
+ *     batch           16 particles side by side in vector lanes
+ *     stage           t_n + alpha_f dt, where right-hand sides are evaluated
+ *     integrator      the coefficients of rule (4) for one step
+ *     prediction      how far the stage is ahead
+ *     scheme          what turns the state of particles into acceleration of nodes
+ *     response        stress, viscosity and stiffness for a velocity gradient
+ *     material constants, solid phase    what laws need of a material; the same while it is solid
+ *     deconvolution   taking the transfers' own smoothing out of a field (sharp_gradients)
+ *     fill fraction   mass of a node over that of a node in the midst of the material
+ *     mirror node     node behind a wall, which continues the field of the inner node before it
+ *     parity          how a field continues there: even, odd, or odd about a value
+ *     collider        a shape that moves and turns and acts on nodes and particles
+ *     image particle  reflection of a particle behind the surface of a sticky collider
+ *     emitter         a shape that is kept full of flowing material
+ *     jump            velocity that contact gives a node at once; never part of a rate
+ *     remembered acceleration (ag)    what a node keeps of acc from step to step
+ *     sub-grid velocity    V - v~: what the grid does not see of a particle's velocity
+ *     decay           of the sub-grid velocity, a rate
+ *     spin            angular velocity of a particle of a solid
+ *     position residual    v - shift a - dx/dt, small: how dx/dt is kept
+ *     trial pass      S7 without writing, for blocks that nodes cannot prove safe
+ *     left the tile   said of particles too far from their block: sort and scatter again
+ *     pocket          part of the liquid in the elliptic solver that nothing holds
  *
  * MODEL
- *     dv/dt = div sigma / rho + g,   dJ/dt = J div v,   dx/dt = v                                                    (1)
- *     sigma = -p I + 2 F_v mu D + s + s_F                                                                             (2)
- *     p = (rho0 c0^2 / 7) (J^-7 - 1)                     Tait, weakly compressible                                   (3)
- * mu is a constant, Cross-WLF or a callback of temperature (of the air, in a scene without heat) and shear rate sqrt(2 D:D). F_v is 1
- * for Newtonian liquids; else s, the non-local stress, is what Oldroyd-B (UCM at F_v 0) or the extended Pom-Pom model say, with
- * G0 = (1 - F_v) mu / lambda_b, r = lambda_b/lambda_0s, Lam = sqrt(1 + tr s/(3 G0)):
- *     ds/dt = L s + s L^T + 2 G0 D - [f s + G0 (f - 1) I + (alpha/G0) s.s] / lambda_b                                 (5)
- *     f = 2 r exp((2/Q) (Lam - 1)) (1 - 1/Lam) + (1 - alpha tr(s.s)/(3 G0^2)) / Lam^2;  Oldroyd-B: f = 1, alpha = 0
- * s goes by rule (4) where the step resolves it; else by a split that keeps the conformation s/G0 + I positive definite, in as many
- * substeps as it takes (counted: stress_substeps). With alpha > 1 (5) itself blows up: there, and only there, eigenvalues of the
- * conformation below 1 - 1/alpha relax without the term of alpha, none relaxes to less, and none is above 1e6 (counted: stress_bounded).
- * Solids have s_F, of the elastic deformation gradient F with det F = J, B = J^(-2/3) F F^T and V^2 = B:
- *     dF/dt = L F,   neo-Hookean: s_F = (G/J) dev(B),   fixed-corotated: s_F = (2 G/J) dev(B - V)                     (6)
- * the pressure is (3) with the same J, viscosity damps (Kelvin-Voigt). Where it yields, the singular values of F are clamped to
- * [1 - yield_compression, 1 + yield_stretch] after each step and scaled to det F = J again: F is what is elastic of the deformation.
- * Where there is no such limit they are kept within 1/512 and 512 (counted: stress_bounded). (3) holds no tension beyond rho0 c0^2 / 7:
- * a solid whose mean stress is to be more needs a higher sound_speed than the default, or it tears and J grows out of its range.
+ *     dv/dt = div sigma / rho + g,   dJ/dt = J div v,   dx/dt = v                              (1)
+ *     sigma = -p I + 2 F_v mu D + S + s_F                                                      (2)
+ *     p = (rho0 c0^2 / 7) (J^-7 - 1)                     Tait, weakly compressible             (3)
  *
- * Heat, in scenes with a material that conducts, melts or is heated by viscosity (tau the stress without the pressure, t = flux_relaxation_time):
- *     rho c dT/dt + div q = tau : D,   q = -F_T k grad T + q_NL,   q_NL + t (dq_NL/dt - L q_NL) = -(1 - F_T) k grad T           (7)
- * H = c T + L fraction: a material that can melt keeps T_m while its latent heat comes or goes, becomes liquid when it is all there and
- * solid when it is all gone. Solid it has s_F alone, beside the pressure, liquid mu and s; F begins anew without strain. Temperatures are
- * on any scale; those of presets and of the default Cross-WLF are degrees Celsius. Walls, colliders and air are insulated or isothermal.
- * Two bodies of material less than two cells apart conduct heat to each other, as they hold each other. Below its t2 Cross-WLF has no
- * value: a step that asks for one is refused; with T_m above t2 none does.
+ * mu is a constant, Cross-WLF, or a callback of temperature and shear rate sqrt(2 D:D). Without
+ * heat the temperature is that of the air. F_v is 1 for Newtonian liquids. Else S, the non-local
+ * stress, is what Oldroyd-B (UCM at F_v 0) or the extended Pom-Pom model say, with
+ * G0 = (1 - F_v) mu / lambda_b, r = lambda_b/lambda_0s, Lam = sqrt(1 + tr S/(3 G0)):
  *
- * TIME. Every quantity y of a particle is kept with its rate r; 0 <= rho_s <= rho_inf <= 1 choose the member of the GS4 family
- * (rho_inf: what high frequencies keep per step, rho_s the same of the spurious root; 0, 0 damps most and is the default):
- *     alpha_m = (3 + rho_inf + rho_s - rho_inf rho_s) / (2 (1 + rho_inf) (1 + rho_s)),  alpha_f = 1 / (1 + rho_inf),
- *     gamma = 1 / (1 + rho_s)
- *     predict y~ = y + alpha_f dt r;   evaluate R at y~;   dr = (R - r) / alpha_m;   y += dt r + gamma dt dr;   r += dr  (4)
- * The rate belongs to t + (1/2 - gamma) dt. The first step, and the first after an edit, has alpha_m = gamma = 1, alpha_f = 1/2.
+ *     dS/dt = L S + S L^T + 2 G0 D - [f S + G0 (f - 1) I + (alpha/G0) S.S] / lambda_b          (5)
+ *     f = 2 r exp((2/Q) (Lam - 1)) (1 - 1/Lam) + (1 - alpha tr(S.S)/(3 G0^2)) / Lam^2
+ *     Oldroyd-B: f = 1, alpha = 0
  *
- * THE STEP, stage by stage, as in gs4i_step:
- *     S1  sort particles by block of 4^3 cells, when one has strayed more than a cell from its block
+ * S goes by rule (4) where the step resolves it. Elsewhere it goes by a split that keeps the
+ * conformation S/G0 + I positive definite, in as many substeps as it takes (stress_substeps).
+ * With alpha > 1 equation (5) itself blows up. There, and only there, eigenvalues of the
+ * conformation below 1 - 1/alpha relax without the term of alpha, none relaxes to less, and none
+ * exceeds 1e6 (stress_bounded).
+ *
+ * Solids have s_F, of the elastic deformation gradient F with det F = J, B = J^(-2/3) F F^T and
+ * V^2 = B:
+ *     dF/dt = L F,   neo-Hookean: s_F = (G/J) dev(B),   fixed-corotated: s_F = (2 G/J) dev(B - V)
+ *                                                                                              (6)
+ * The pressure is (3) with the same J; viscosity damps (Kelvin-Voigt). Where a solid yields, the
+ * singular values of F are clamped to [1 - yield_compression, 1 + yield_stretch] after each step
+ * and scaled to det F = J again. So F is what is elastic of the deformation. Without such a limit
+ * they stay within 1/512 and 512 (stress_bounded). (3) holds no tension beyond rho0 c0^2 / 7: a
+ * solid under more needs a higher sound_speed than the default, or it tears.
+ *
+ * Heat, in scenes with a material that conducts, melts or is heated by viscosity. tau is the stress
+ * without the pressure, t_q = flux_relaxation_time:
+ *     rho c dT/dt + div q = tau : D,   q = -F_T k grad T + q_NL                                (7)
+ *     q_NL + t_q (dq_NL/dt - L q_NL) = -(1 - F_T) k grad T
+ *
+ * Enthalpy is c T + latent heat times liquid fraction. A material that can melt keeps T_m while its
+ * latent heat comes or goes. It becomes liquid when all is there and solid when all is gone. Solid
+ * it has s_F alone beside the pressure, liquid mu and S; F begins anew without strain.
+ * Temperatures are on any scale; those of presets and of the default Cross-WLF are degrees Celsius.
+ * Walls, colliders and air are insulated or isothermal. Two pieces of material less than two cells
+ * apart conduct heat to each other, as they hold each other. Below its t2 Cross-WLF has no value: a
+ * step that asks for one is refused; with T_m above t2 none does.
+ *
+ * TIME. Every quantity y of a particle is kept with its rate r. 0 <= rho_sp <= rho_inf <= 1 choose
+ * the member of the GS4 family: rho_inf is what high frequencies keep per step, rho_sp the same of
+ * the spurious root (rho_inf_spurious). (0, 0) damps most and is the default.
+ *     alpha_m = (3 + rho_inf + rho_sp - rho_inf rho_sp) / (2 (1 + rho_inf) (1 + rho_sp))
+ *     alpha_f = 1 / (1 + rho_inf),   gamma = 1 / (1 + rho_sp)
+ *
+ *     predict    y~ = y + alpha_f dt r                                                         (4)
+ *     evaluate   R at y~
+ *     correct    dr = (R - r) / alpha_m;   y += dt r + gamma dt dr;   r += dr
+ *
+ * The rate belongs to t + (1/2 - gamma) dt. The first step, and the first after an edit, has
+ * alpha_m = gamma = 1, alpha_f = 1/2. Where R depends on y~ itself, linearly, (4) is solved for it:
+ *     (y~ - y**) / s = R(y~),   y** = y + (alpha_f dt - s) r,   s = alpha_f gamma dt / alpha_m
+ *
+ * THE STEP, as in gs4i_make_step:
+ *     S1  sort particles by block of 4^3 cells, when one has left the tile of its block
  *     S2  x~, v~ by (4); quadratic B-spline weights w at x~
- *     S3  m_i = sum w m,   v_i = sum w m v~ / m_i;   solids: v~ + w~ x (x_i - x~), w how the particle turns (below)
- *     S4  V = sum w v_i;   L~ = sum v_i (x) grad w;   J~ by (4), implicit in J for known div v;   s~ by (4), (5);   F~ by (4), (6);
- *         sigma there by (2), (3)
- *     S5  f_i = - sum V sigma grad w + sum w m g
- *         heat: (m c)_i, (m c T**)_i, T** = T + (alpha_f dt - s) r; then (m c)_i (T~_i - T**_i) / s = (7) at T~, an elliptic solve ([[conduction]])
- *     S6  acc_i = f_i / m_i;   u_i = v_i + s (acc_i - ag_i), s = alpha_f gamma dt / alpha_m;   ag_i += (acc_i - ag_i) / alpha_m
- *         is what the node remembers; walls and bodies
- *     S7  A = sum w acc_i, U = sum w u_i; v by (4) with dv/dt = A - (v~ - V) / flip_decay_time; J, s, F by (4) with grad u; T by (4)
- *         with sum w (T~_i - T**_i) / s; x by (4) with dx/dt = U; w by (4) with dw/dt = curl(A - grad u grad u)/2 - (w - curl u/2) / flip_decay_time
- *     S8  bodies move, nozzles give, leavers go
- * With sharp_gradients L~ and grad u are those of S v_i and S u_i, U is of S u_i, and f_i = - S^T sum V sigma grad w + sum w m g, S as in [[grid]].
- * What (v~ - V) / flip_decay_time takes from motion that the grid does see is small: as much as a kinematic viscosity of h^2 / (4 flip_decay_time).
- * It takes no momentum: sum m V = sum m v~.
- * Before S7 nothing of the state has changed. When the nodes cannot prove that S7 is safe it is rehearsed; if a particle would
- * leave 1/16 < J < 16, move more than two cells or become non-finite, the step is refused and the last good state stays.
+ *     S3  m_i = sum w m,   v_i = sum w m v~ / m_i;   solids: v~ + spin~ x (x_i - x~)
+ *     S4  V = sum w v_i;   L~ = sum v_i (x) grad w;   J~ by (4), implicit in J for known div v;
+ *         S~ by (4), (5);   F~ by (4), (6);   sigma there by (2), (3)
+ *     S5  f_i = - sum V_p sigma grad w + sum w m g
+ *         heat: (m c)_i, (m c T**)_i;   then (m c)_i (T~_i - T**_i) / s = (7) at T~, an elliptic
+ *         solve ([[conduction]])
+ *     S6  acc_i = f_i / m_i;   u_i = v_i + s (acc_i - ag_i);   ag_i += (acc_i - ag_i) / alpha_m;
+ *         walls and colliders
+ *     S7  A = sum w acc_i, U = sum w u_i. By (4):
+ *         dv/dt = A - (v~ - V) / flip_decay_time,   dx/dt = U,   J, S, F with L = grad u,
+ *         dT/dt = sum w (T~_i - T**_i) / s,
+ *         dspin/dt = curl(A - grad u grad u)/2 - (spin - curl u/2) / flip_decay_time
+ *     S8  colliders move, emitters give, particles that left are dropped
  *
- * Without w the velocity that nodes at a surface see is that of particles on one side of them, and too slow where a body turns: what is
- * missing strains the body. A stiff cube lost 20 % of its kinetic energy to that in a quarter of a turn; with w, 0.01 %.
+ * With sharp_gradients L~ and grad u are those of Z v_i and Z u_i, U is of Z u_i, and
+ * f_i = - Z^T sum V_p sigma grad w + sum w m g, with Z as in [[grid]]. The decay takes little from
+ * motion that the grid does see: as much as a kinematic viscosity of h^2 / (4 flip_decay_time). It
+ * takes no momentum: sum m V = sum m v~.
  *
- * Symplectic Euler, the fast tier: one affine scatter with stress and one gather (MLS-MPM, APIC), first order.
+ * The spin is there because nodes at a surface see particles on one side of them alone, so too slow
+ * a velocity where a solid turns. What is missing strains it: without spin a stiff cube lost 20 %
+ * of its kinetic energy in a quarter of a turn, with it 0.01 %.
  *
- * ACCURACY (tests/test_order.c, tests/test_physics.c hold these)
- *     order in time 1.9 or more in x, v, J, F, T, q; elastic waves within 1.5 % at 32 cells a wave (tests/test_solid.c); order in space 2.0 for
- *     Poiseuille flow and for heat, whose modes decay within 0.4 % at 32 cells a wave, see tests/test_heat.c; sound speed within 1.5 % at
- *     32 cells a wave; a melting front within 0.3 cells; heat in an insulated box conserved to the tolerance of the solver,
- *     temperatures beyond those given by up to 1 % of a jump;
- *     with sharp_gradients elastic waves and sound within 0.1 % at 32 cells a wave, order in space 2.5; the pressure of a column at rest is off by
- *     up to 0.3 rho g h in the cell at its surface and 0.13 rho g h above its floor (else 0.1 and 0.08);
- *     free flight exact to rounding where rho_s = 0, else to O(dt^2); momentum to rounding away from walls and spray; a column at rest keeps
- *     its pressure within 0.5 % and its speed below 1e-4 sqrt(g h).
+ * Symplectic Euler, the fast tier: one affine scatter with stress and one gather (MLS-MPM, APIC),
+ * first order.
+ *
+ * SAFETY. Before S7 nothing of the state has changed. If a particle would leave 1/16 < J < 16, move
+ * more than two cells or become non-finite, the step is refused and the last good state stays. Most
+ * blocks need no trial pass to know, by this lemma:
+ *     In a particle of mass m_p node i has weight at most m_i/m_p, and a gradient of at most
+ *     sqrt(2 m_i/m_p)/h along each axis; the gradients of 27 nodes sum to at most 2/h. Let
+ *     q_i = min(1, 14 sqrt(m_i/m_min)), r any velocity, |.|_1 the sum over axes. Nodes with q_i = 1
+ *     give h |div u| <= 2 max |u_i - r|_1, lighter ones 27 sqrt(2)/14 max q_i |u_i - r|_1. So
+ *     h |div u| <= 4.7 max q_i |u_i - r|_1 over the nodes around the block.
+ * A block is safe where that bound gives |div u| dt < 0.2, the mean velocity moves less than a
+ * cell, 1/4 < J < 4, and no particle needed the split.
+ *
+ * WALLS. A wall lies between the nodes -1 and 0 of its axis; behind it mirror nodes continue the
+ * field of the inner nodes, node -1 - k that of node k:
+ *
+ *          mirror nodes        |        inner nodes
+ *        o --------- o ------- | ------- o --------- o --------- o
+ *       -2          -1       wall        0           1           2
+ *      u = -u_1    u = -u_0    0        u_0         u_1               stick: odd in all components
+ *                                                                     slip: odd along the normal,
+ *                                                                           even along the wall
+ * What particles scatter to mirror nodes is folded back to the inner ones by the same parity. So
+ * walls are second order in space. A separating wall acts as slip while material moves into it or
+ * presses on it, and is not there otherwise. Behind a periodic wall a field goes on a period away.
+ *
+ * COLLIDERS. Sticky ones act by image particles, second order in space where particles fill the
+ * space up to the surface. A filling that leaves out half a row puts the wall up to 0.8 cells
+ * behind it (tests: couette). Where they are thinner than 3 cells or as crooked as that, they hold
+ * nodes up to 3/4 of a cell before the surface, to first order. Of slip and separate ones nodes
+ * inside lose the inward relative normal part (separate with Coulomb friction). What a collider
+ * takes from a node at once is a jump: it goes to the velocities of particles, not into their
+ * rates. A particle that ends inside a collider or behind a wall is put back on the surface. Where
+ * the grid sees little of a particle its sub-grid velocity decays at the rate c0/h: at a wall by
+ * the weight of mirror nodes, and in spray that fills nodes by less than 20 %.
+ *
+ * ACCURACY (tests/test_order.c and tests/test_physics.c hold these)
+ *     order in time 1.9 or more in x, v, J, F, T, q; elastic waves within 1.5 % at 32 cells a wave
+ *     (tests/test_solid.c); order in space 2.0 for Poiseuille flow and for heat, whose modes decay
+ *     within 0.4 % at 32 cells a wave (tests/test_heat.c); sound speed within 1.5 % at 32 cells a
+ *     wave; a melting front within 0.3 cells; heat in an insulated box conserved to the tolerance
+ *     of the solver, temperatures beyond those given by up to 1 % of a jump;
+ *     with sharp_gradients elastic waves and sound within 0.1 % at 32 cells a wave, order in space
+ *     2.5; the pressure of a column at rest is off by up to 0.3 rho g h in the cell at its surface
+ *     and 0.13 rho g h above its floor (else 0.1 and 0.08);
+ *     free flight exact to rounding where rho_sp = 0, else to O(dt^2); momentum to rounding away
+ *     from walls and spray; a column at rest keeps its pressure within 0.5 % and its speed below
+ *     1e-4 sqrt(g h).
  *
  * STABILITY. gs4_stable_dt is the least of
- *     sound and viscosity   (w dt)^2 + (d dt) (3 + rho_inf + rho_s - rho_inf rho_s)/2 <= 2 (1 - rho_inf rho_s)
- *                           w = 1.73 c/h, c^2 that of sound and of elastic waves, 2 c_max G0/rho of liquids,
- *                           G b_max/rho0 of solids (b_max of B; fixed-corotated b_max (2 - 1/sqrt(b_max))); d = 2.5 F_v mu/(rho h^2);
- *                           sharp_gradients: w^2 and d 2.3 times as large;
- *                           symplectic Euler: (w dt)^2 + 2 d dt <= 4, w = 3.5 c/h, d = 16 F_v mu/(rho h^2)
+ *     sound and viscosity   (om dt)^2 + d dt (3 + rho_inf + rho_sp - rho_inf rho_sp)/2
+ *                                                              <= 2 (1 - rho_inf rho_sp),
+ *                           om = 1.73 c/h, d = 2.5 F_v mu/(rho h^2);
+ *                           c^2: of sound and of elastic waves, 2 c_max G0/rho of liquids,
+ *                           G b_max/rho0 of solids (b_max of B; fixed-corotated
+ *                           b_max (2 - 1/sqrt(b_max)));
+ *                           sharp_gradients: om^2 and d 2.3 times as large;
+ *                           symplectic Euler: (om dt)^2 + 2 d dt <= 4, om = 3.5 c/h,
+ *                           d = 16 F_v mu/(rho h^2)
  *     flow                  one cell a step along each axis, the fall within the step included
  *     strain, relaxation    |grad v| dt <= 1,  dt <= 1000 lambda_b
- * and gs4_step refuses more. gs4_advance takes the fraction `cfl` of it, and half of that again, up to 7 times, where a step is refused.
+ * and gs4_step refuses more. gs4_advance takes the fraction `cfl` of it, and half of that again, up
+ * to 7 times, where a step is refused.
  *
- * CONTACT. Walls act by images, second order in space: nodes behind a wall mirror the field (stick: odd; slip: odd along the
- * normal, even along the wall; separate: as slip while material moves into the wall or presses on it, free otherwise).
- * Sticky bodies act by images of the particles before them, second order in space too where particles fill the space up to the surface
- * (a filling that leaves out half a row puts the wall up to 0.8 cells behind it, tests: couette); where they are thinner than 3 cells or as
- * crooked as that, they hold nodes up to 3/4 of a cell before the surface, to first order. Of slip and separate nodes inside lose the inward
- * relative normal part (separate with Coulomb friction). What a body takes from a node at once goes to the velocities of particles and not into
- * their rates. A particle that ends inside a body or behind a wall is put back on the surface. Where the grid sees little of a
- * particle (at a wall by the weight of images; in spray filled by less than 20 %) its unseen motion fades at the rate c0/h.
+ * ELLIPTIC SOLVER. gs4_poisson_* solves (diagonal - div coefficient grad) x = rhs on a box of cells
+ * that are liquid, air or solid, by itself: multigrid in float preconditions conjugate gradients in
+ * double. It needs 6 to 11 iterations for a residual of 1e-8 whatever the size, also where large
+ * parts differ by 1000. Small parts that differ so, walls with holes of one cell, spray, porous
+ * matter and serpentines take up to 21; single faces that differ by 1000 up to 41; a maze of
+ * corridors one cell wide 80 (tests/test_poisson.c, bench/poisson.c). Pockets are found: there the
+ * mean of x is 0, and the mean of rhs is taken off. At 256^3 it takes 45 bytes a cell where one
+ * coefficient serves all faces, 58 else, 72 in double, 5 to 9 more with a diagonal; more in small
+ * boxes (64^3: 63). A solve allocates nothing. `threads` and the same bits as below.
  *
- * ELLIPTIC SOLVER. gs4_poisson_* solves (diagonal - div coefficient grad) x = rhs on a box of cells that are liquid, air or solid, by
- * itself: multigrid in float preconditions conjugate gradients in double. It needs 6 to 11 iterations for a residual of 1e-8 whatever
- * the size, also where large parts differ by 1000; up to 21 where cells or small blocks do, behind walls with holes of one cell, in spray,
- * in porous matter and in serpentines; up to 41 where single faces differ by 1000, and 80 in a maze of corridors one cell wide
- * (tests/test_poisson.c, bench/poisson.c). Parts that nothing holds are found: there the mean of x is 0, and the mean of rhs is taken
- * off. At 256^3 it takes 45 bytes a cell where one coefficient serves all faces, 58 else, 72 in double, 5 to 9 more with a diagonal;
- * more in small boxes (64^3: 63). A solve allocates nothing. `threads` and the same bits as below.
+ * OPTIONS (macros)             meaning                                             define it
+ *     GS4MPM_IMPLEMENTATION    compile the implementation here                     in one file
+ *     GS4_DOUBLE               gs4_real is double; functions end in _f64           everywhere
+ *     GS4_STATIC               all functions static                                with the impl.
+ *     GS4_PTHREADS             compile the thread pool (link with -lpthread)       with the impl.
+ *     GS4_NO_VECTORS           arrays instead of vectors; the same bits, slower    with the impl.
  *
- * OPTIONS (macros)             meaning                                                    define it
- *     GS4MPM_IMPLEMENTATION    compile the implementation here                            in one file
- *     GS4_DOUBLE               gs4_real is double; every function gets the ending _f64    everywhere or nowhere
- *     GS4_STATIC               all functions static                                       with the implementation
- *     GS4_PTHREADS             compile the built-in thread pool (link with -lpthread)     with the implementation
- *     GS4_NO_VECTORS           arrays instead of compiler vectors; the same bits, slower  with the implementation
+ * ERRORS. Every call returns 0 or more for success and a negative gs4_result otherwise;
+ * gs4_last_error has a sentence. Every field is checked, NaN included. A call that fails has
+ * changed nothing, out of memory included; a step that is refused has not been taken.
  *
- * ERRORS. Every call returns 0 or more for success and a negative gs4_result otherwise; gs4_last_error has a sentence. Every field is
- * checked, NaN included. A call that fails has changed nothing, out of memory included; a step that is refused has not been taken.
+ * MEMORY. GS4: 65 bytes a particle in float (position, velocity, J and their rates, mass, id,
+ * material, and 4 for sorting), 16 more unless flip_decay_time is INFINITY, 49 a cell near material
+ * (sharp_gradients: 69), 16 more near walls and colliders, 4 per 64 cells of the domain; 260
+ * (double: 512) more for each particle within 8 cells of a sticky collider. Symplectic Euler: 89
+ * and 33. A scene with a viscoelastic liquid: 48 more a particle (Euler 24). With a solid: 96 more
+ * (Euler 36). With heat: 17 more a particle, 32 more with a flux_relaxation_time, 16 (or 32) a cell
+ * near material, and about 100 a cell of the box around all material, where the solver works.
+ * Double, GS4: 121 (32 more) and 97. Stepping allocates nothing once the scene has stopped growing;
+ * a kernel takes 39 KB of stack, with heat 61; in double 77 and 120.
  *
- * MEMORY. GS4: 65 bytes a particle in float (position, velocity, J and their rates, mass, id, material, and 4 for sorting), 16 more
- * unless flip_decay_time is INFINITY, 48 a cell near material (sharp_gradients: 68), 16 more near walls and bodies, 4 per 64 cells of the domain; 260
- * (double: 512) more for each particle within 8 cells of a sticky body. Symplectic Euler: 89 and 32. A scene with a viscoelastic
- * liquid: 48 more a particle (Euler 24). With a solid: 96 more (Euler 36). With heat: 17 more a
- * particle, 32 more with a flux_relaxation_time, 16 (or 32) a cell near material, and about 100 a cell of the box around all material, where the
- * solver works. Double, GS4: 121 (32 more) and 96.
- * Stepping allocates nothing once the scene has stopped growing; a kernel takes 39 KB of stack, with heat 61; in double 77 and
- * 120.
+ * THREADS. `parallel_for` or the pool. The same bits for any number of threads: blocks of one
+ * colour share no node, sums run in the order of particles within a block. Two simulations on two
+ * threads are fine. Callbacks (distances, viscosity) may be called from several threads at once.
  *
- * THREADS. `parallel_for` or the pool. The same bits for any number of threads: blocks of one colour share no node, sums run in the
- * order of particles within a block. Two simulations on two threads are fine. Callbacks (distances, viscosity) may be called from
- * several threads at once.
+ * DETERMINISM. Same binary, same input, same bits. No fused multiply-add is used, decided in this
+ * file and undone at its end, so that -O0, -O2 and -O3 -march=native of one compiler agree too. Not
+ * with -ffast-math, nor where doubles are kept in x87 registers.
  *
- * DETERMINISM. Same binary, same input, same bits. No fused multiply-add is used, decided in this file and undone at its end, so that
- * -O0, -O2 and -O3 -march=native of one compiler agree too. Not with -ffast-math, nor where doubles are kept in x87 registers.
+ * LIMITS. 2^30 particles, 2^36 cells, 256 materials. Time steps follow sound: viscosities above
+ * some 100 Pa s at millimetre cells mean steps of microseconds. There is one velocity at a node:
+ * solids that touch stick together until they are two cells apart. Filling is refused where
+ * material is already; emitters pause when max_particles is reached. An emitter gives what its
+ * velocity says whatever is before it. Where that goes slower, as in a sticky pipe as wide as the
+ * emitter, particles pack 1.4 to 1.8 times too densely within a radius or two of it, and J does not
+ * tell.
  *
- * LIMITS. 2^30 particles, 2^36 cells, 256 materials. Time steps follow sound: viscosities above some 100 Pa s at millimetre cells
- * mean steps of microseconds. There is one velocity at a node: solids that touch stick together until they are two cells apart. Filling
- * is refused where material is already; emitters pause when max_particles is reached. A mouth gives what its velocity says whatever is before
- * it: where that goes slower, as in a sticky pipe as wide as the mouth, particles pack within a radius or two of it, 1.4 to 1.8 times too
- * dense, and J does not tell.
- *
- * SOURCES. The GS4 family: Zhou & Tamma 2004; extended Pom-Pom: Verbeeten, Peters & Baaijens 2001, in the form of Oishi et al. 2012; the
- * MPM scheme after "GS4 viscoelastic MPM" (2021), with rates on particles; MLS-MPM: Hu et al. 2018; solids
- * and their yield: "Augmented MPM" (Stomakhin et al. 2014); images, contact and limits: measured for this file. */
+ * SOURCES. The GS4 family: Zhou & Tamma 2004. Extended Pom-Pom: Verbeeten, Peters & Baaijens 2001,
+ * in the form of Oishi et al. 2012. The MPM scheme: after "GS4 viscoelastic MPM" (2021), with rates
+ * on particles. MLS-MPM: Hu et al. 2018. Solids and their yield: "Augmented MPM" (Stomakhin et al.
+ * 2014). Mirror nodes, image particles, contact and limits: measured for this file. */
 #ifndef GS4MPM_H
 #define GS4MPM_H
 
@@ -4666,7 +4767,7 @@ GS4I_INLINE uint32_t gs4i_block_number(const gs4i_grid *g, int x, int y, int z)
            + (uint32_t)x;
 }
 
-/* Block that cell or node x of an axis, from -4, is in; the table begins a block before the domain. */
+/* Block along an axis of cell or node x, from -4: the table begins a block before the domain. */
 GS4I_INLINE int gs4i_block_at(int x) { return (x + 4) >> 2; }
 
 /* Place of node (x, y, z) in its block; only the last two bits count. */
@@ -5189,7 +5290,7 @@ static void gs4i_tile_add(const gs4i_grid *g, int o, uint64_t rows,
     }
 }
 
-/* --- the tile of any slot, whether its blocks have nodes or not -------------------------------- */
+/* --- the tile of any slot, whether its blocks have nodes or not ------------------------------- */
 
 /* Slots of the 27 blocks around a slot, -1 where there are no nodes; and the frame of its tile. */
 typedef struct gs4i_surroundings {
@@ -8790,7 +8891,7 @@ static const gs4i_collider *gs4i_hold_in_emitter(const gs4i_boundary *b, const g
 typedef struct gs4i_emitter {
     gs4_emitter is;
     int collider; /* that holds the particles in it */
-    /* m that the lattice has flowed through it; the same at the last emission, where there was one */
+    /* m that the lattice has flowed through it; the same at the last emission, if there was one */
     double offset[3], emitted_offset[3];
     int has_emitted;
 } gs4i_emitter;
@@ -9228,7 +9329,7 @@ static void gs4i_gather_heat(const gs4_sim *sim, const gs4i_response *r, const g
 /* |div u| dt up to which J is known to stay in its range: it changes by less than a quarter. */
 #define GS4I_SAFE_STRAIN 0.2
 
-/* --- responses of a block ------------------------------------------------------------------------ */
+/* --- responses of a block --------------------------------------------------------------------- */
 
 /* Ask the laws about particles of `p`; `heat` NULL: the scene has none. */
 static void gs4i_begin_response(gs4i_response *r, const gs4_sim *sim, const gs4i_particles *p,
@@ -10621,7 +10722,7 @@ static int gs4i_is_safe(const gs4i_pass *pass, int index)
     return 1;
 }
 
-/* --- gather and correct ------------------------------------------------------------------------ */
+/* --- gather and correct ----------------------------------------------------------------------- */
 
 /* The tiles that S7 reads of one block. */
 typedef struct gs4i_correction_tiles {
@@ -11766,10 +11867,11 @@ static int gs4i_solve_heat(gs4_sim *sim, gs4i_node_pass *nodes)
     return GS4_OK;
 }
 
-/* ==== [[scene]] materials, particles in shapes, colliders, emitters ============================= *
+/* ==== [[scene]] materials, particles in shapes, colliders, emitters ============================ *
  *
  * What is given to a simulation, once it is checked ([[public]]): a call adds all of it or
- * nothing. Emitters work within a step: gs4i_prepare_emitters at its begin, gs4i_emit at its end. */
+ * nothing. Emitters work within a step: gs4i_prepare_emitters when it begins, gs4i_emit when it
+ * ends. */
 
 /* --- materials -------------------------------------------------------------------------------- */
 
@@ -12468,7 +12570,7 @@ static int gs4i_prepare_emitters(gs4_sim *sim, double dt)
         if (gs4i_emission_is_due(e, offset) && gs4i_emitter_lattice(sim, e, offset, dt, &l))
             while (gs4i_next_emitted(&sim->grid, e, &l, x)) n++;
     }
-    /* with max_particles there is all room that there will be, and emitters pause when it is full */
+    /* with max_particles there is all the room there will be; emitters pause when it is full */
     if (n == 0 || sim->desc.max_particles) return GS4_OK;
     wanted = sim->particles.count + n;
     if (wanted <= sim->particles.capacity) return GS4_OK;
@@ -12834,7 +12936,7 @@ static int gs4i_check_stage(gs4_sim *sim)
     return GS4_OK;
 }
 
-/* --- the end of a step -------------------------------------------------------------------------- */
+/* --- the end of a step ------------------------------------------------------------------------ */
 
 /* S8: colliders move, emitters give, what left the domain goes. */
 static void gs4i_finish(gs4_sim *sim)
@@ -13681,7 +13783,7 @@ static int gs4i_load(gs4_sim *sim, const char *path)
 
 /* ==== [[public]] every value checked, then the work =========================================== */
 
-/* --- rules ------------------------------------------------------------------------------------
+/* --- rules ---------------------------------------------------------------------------------------
  *
  * A rule a line: the value, what is accepted, and the sentence that says so. A check is the list
  * of the rules of one thing that crosses the interface. */
@@ -15399,5 +15501,6 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  * OUT OF OR IN CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE SOFTWARE.
  *
  * CHANGES 0.1.0  the explicit scheme: GS4 and symplectic Euler, Newtonian and viscoelastic
- * liquids, solids, walls, bodies, emitters, frames, checkpoints.
+ * liquids, solids, walls, colliders, emitters, frames, checkpoints. Checkpoints have a byte of flags
+ * a node; those written before cannot be read.
  * */

@@ -542,7 +542,7 @@ static void ref_step(ref_sim *s, double dt)
 
 /* --- symplectic Euler: MLS-MPM with APIC ------------------------------------------------------- */
 
-/* (m v)_i = sum w [m (v + dt g) + (m C - dt J m/rho0 sigma 4/h^2) (x_i - x)], |C| dt bounded by 1/4;
+/* (m v)_i = sum w [m (v + dt g) + (m C - dt J m/rho0 sigma 4/h^2) (x_i - x)], |C| dt at most 1/4;
  * v = sum w v_i,  C = sum v_i (x) grad w,  x += dt v,  J += dt J tr C;
  * F and s by (4) with alpha_m = alpha_f = gamma = 1 and no rates. */
 static void ref_euler_step(ref_sim *s, double dt)

@@ -1,5 +1,6 @@
-/* Shared reference of the solid models (made independently of this library, in extended precision): deformations, their singular values
- * and rotations, Kirchhoff stresses over the shear modulus; what the yield clamp leaves; neo-Hookean stress in simple loadings. */
+/* Shared reference of the solid models (made independently of this library, in extended
+ * precision): deformations, their singular values and rotations, Kirchhoff stresses over the
+ * shear modulus; what the yield clamp leaves; neo-Hookean stress in simple loadings. */
 typedef struct reference_solid {
     const char *name;
     double F[9], s[3], R[9]; /* s[2] < 0: turned inside out */
@@ -142,7 +143,8 @@ static const reference_clamp reference_clamps[] = {
 };
 /* clang-format on */
 
-/* G = 1, J = 1. Stretches: the stress along them, with none across; shear: s_xy and N1 = s_xx - s_yy. */
+/* G = 1, J = 1. Stretches: the stress along them, with none across; shear: s_xy and N1 = s_xx -
+ * s_yy. */
 typedef struct reference_rubber {
     int mode;
     double parameter, cauchy, N1;

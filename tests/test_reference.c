@@ -1,6 +1,7 @@
-/* The kernels of the library against tests/reference_step.h, particle by particle: the same particles,
- * the same steps, in small scenes that between them have every wall on every side, members of the
- * family, materials, short and long decay, uneven steps, spray, and particles that change blocks. */
+/* The kernels of the library against tests/reference_step.h, particle by particle: the same
+ * particles, the same steps, in small scenes that between them have every wall on every side,
+ * members of the family, materials, short and long decay, uneven steps, spray, and particles
+ * that change blocks. */
 #include "reference_step.h"
 
 typedef struct reference_scene {
@@ -224,10 +225,10 @@ static double reference_difference(const gs4_sim *sim, gs4_field field, const re
     return most;
 }
 
-/* The bounds are rounding, n eps in the units of each field after n steps. J is the worst: an error
- * eps of it is one of rho0 c0^2 eps of the pressure, which gives velocities c0 eps in a step (c0 dt/h
- * < 1). Measured: up to 1 n eps in double and 4 in float, where now and then the kept half of a
- * lag rounds the other way. */
+/* The bounds are rounding, n eps in the units of each field after n steps. J is the worst: an
+ * error eps of it is one of rho0 c0^2 eps of the pressure, which gives velocities c0 eps in a
+ * step (c0 dt/h < 1). Measured: up to 1 n eps in double and 4 in float, where now and then the
+ * kept half of a lag rounds the other way. */
 static void reference_compare(const reference_scene *c, const gs4_sim *sim, const ref_sim *r)
 {
     const double eps = 10 * c->steps * reference_epsilon();

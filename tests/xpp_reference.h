@@ -1,11 +1,14 @@
-/* Stress of extended Pom-Pom and Oldroyd-B liquids in homogeneous flow: a choice of rows of xpp_startup.csv, xpp_step_shear.csv,
- * xpp_cessation.csv, xpp_steady.csv and oldroyd_homogeneous.csv, tables that an independent solver made in extended precision, two ways
- * each. They come from no output of gs4mpm.h, and must never be made anew from it.
- * Stress over G0 and time over lambda_b; Wi is the rate times lambda_b, and the strain where a step of strain came before t = 0. */
+/* Stress of extended Pom-Pom and Oldroyd-B liquids in homogeneous flow: a choice of rows of
+ * xpp_startup.csv, xpp_step_shear.csv, xpp_cessation.csv, xpp_steady.csv and
+ * oldroyd_homogeneous.csv, tables that an independent solver made in extended precision, two
+ * ways each. They come from no output of gs4mpm.h, and must never be made anew from it. Stress
+ * over G0 and time over lambda_b; Wi is the rate times lambda_b, and the strain where a step of
+ * strain came before t = 0. */
 #ifndef XPP_REFERENCE_H
 #define XPP_REFERENCE_H
 
-/* r = lambda_b/lambda_0s, Q, alpha. SuC, SuD: table 4 of the 2021 paper; V: modes of a polyethylene; G: a grid. */
+/* r = lambda_b/lambda_0s, Q, alpha. SuC, SuD: table 4 of the 2021 paper; V: modes of a
+ * polyethylene; G: a grid. */
 /* clang-format off */
 static const double reference_sets[10][3] = {
     { 1.11111111111111, 16, 1 },    /* SuC */
@@ -21,7 +24,8 @@ static const double reference_sets[10][3] = {
 };
 /* clang-format on */
 
-/* REF_CESSATION begins with the row at t = 0; REF_ROTATION: Oldroyd-B, L_yx = -L_xy = Wi after steady shear at Wi 1. */
+/* REF_CESSATION begins with the row at t = 0; REF_ROTATION: Oldroyd-B, L_yx = -L_xy = Wi after
+ * steady shear at Wi 1. */
 enum {
     REF_STARTUP,
     REF_STEP,

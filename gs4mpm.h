@@ -9433,12 +9433,8 @@ static const gs4i_collider *gs4i_find_surface(const gs4_sim *sim, gs4_vec3 p, gs
     const gs4i_collider *collider =
         gs4i_nearest_sticky(&sim->boundary, p, GS4I_IMAGE_REACH * sim->grid.h, d);
     if (!collider) return NULL;
-    *n = gs4i_vec3(gs4i_collider_distance(collider, gs4i_vec3(p.x + step, p.y, p.z)) - *d,
-                   gs4i_collider_distance(collider, gs4i_vec3(p.x, p.y + step, p.z)) - *d,
-                   gs4i_collider_distance(collider, gs4i_vec3(p.x, p.y, p.z + step)) - *d);
-    if (!(gs4i_length(*n) > 0)) return NULL;
-    *n = gs4i_scale(*n, 1 / gs4i_length(*n));
-    return collider;
+    *n = gs4i_collider_normal(collider, p, step);
+    return gs4i_length(*n) > 0 ? collider : NULL;
 }
 
 /* The image of a particle at p. It can be had where the body is flat and thick enough: a point

@@ -8670,7 +8670,7 @@ static void gs4i_fill(const gs4i_boundary *b, const gs4i_grid *g, gs4_real *fiel
 }
 
 /* Find the mirror nodes of a wall that are in contact: all, but of a separating wall those where
- * material moves into it or pressed on it in the last step. Their jump has 1 as fourth number. */
+ * material moves into it or pressed on it in the last step. */
 static void gs4i_find_contact(const gs4i_boundary *b, const gs4i_grid *g, int wall)
 {
     const int axis = wall / 2;
@@ -8682,40 +8682,85 @@ static void gs4i_find_contact(const gs4i_boundary *b, const gs4i_grid *g, int wa
         const gs4_real into = (gs4i_of_node(g->momentum, pair->mirror)[axis]
                                + gs4i_of_node(g->momentum, pair->inner)[axis])
                               * outward;
-        if (b->walls[wall] == GS4_WALL_SEPARATE && !(into > 0)
-            && !(g->flags[pair->mirror] & GS4I_WAS_PRESSED))
-            continue;
-        gs4i_jump_of_node(g, pair->mirror)[3] = 1;
-        g->flags[pair->mirror] |= (uint8_t)(1 << axis);
+        if (b->walls[wall] != GS4_WALL_SEPARATE || into > 0
+            || g->flags[pair->mirror] & GS4I_WAS_PRESSED)
+            g->flags[pair->mirror] |= (uint8_t)(1 << axis);
     }
 }
 
-/* Fold mass and momentum; what is in contact is found on the way. */
+/* Behind two walls, or behind one and a periodic one, a mirror node is in contact with each as
+ * the node is that it mirrors in the other: so no axis comes first, and the seam is no place.
+ * Twice, for nodes behind three. */
+static void gs4i_share_contact(const gs4i_boundary *b, const gs4i_grid *g)
+{
+    int pass, wall, i;
+    for (pass = 0; pass < 2; pass++)
+        for (wall = 0; wall < 6; wall++) {
+            const uint8_t others = (uint8_t)(7 & ~(1 << wall / 2));
+            for (i = 0; i < b->mirror_count[wall]; i++) {
+                const gs4i_mirror_pair *pair = &b->mirrors[wall][i];
+                uint8_t *flags = &g->flags[pair->mirror];
+                *flags = (uint8_t)((*flags & ~others) | (g->flags[pair->inner] & others));
+            }
+        }
+}
+
+/* The jump of a mirror node in contact has 1 as fourth number. */
+static void gs4i_mark_contact(const gs4i_boundary *b, const gs4i_grid *g, int wall)
+{
+    int i;
+    if (b->walls[wall] == GS4_WALL_PERIODIC) return;
+    for (i = 0; i < b->mirror_count[wall]; i++)
+        if (gs4i_in_contact(b, g, &b->mirrors[wall][i], wall))
+            gs4i_jump_of_node(g, b->mirrors[wall][i].mirror)[3] = 1;
+}
+
+/* Fold mass and momentum; what is in contact is found on the way. Separating walls come last and
+ * see all that the others reflect. */
 static void gs4i_fold_momentum(const gs4i_boundary *b, const gs4i_grid *g)
 {
     gs4i_parity parity[6];
-    int wall;
+    int separating, wall, any;
     gs4i_vector_parity(b, 4, parity);
-    for (wall = 0; wall < 6; wall++) {
-        gs4i_find_contact(b, g, wall);
-        gs4i_fold_wall(b, g, g->momentum, wall, &parity[wall]);
+    for (separating = 0; separating < 2; separating++) {
+        for (any = wall = 0; wall < 6; wall++)
+            if ((b->walls[wall] == GS4_WALL_SEPARATE) == separating) {
+                gs4i_find_contact(b, g, wall);
+                any = 1;
+            }
+        if (separating && any) gs4i_share_contact(b, g);
+        for (wall = 0; wall < 6; wall++)
+            if ((b->walls[wall] == GS4_WALL_SEPARATE) == separating) {
+                gs4i_mark_contact(b, g, wall);
+                gs4i_fold_wall(b, g, g->momentum, wall, &parity[wall]);
+            }
     }
 }
 
-/* Fold forces of stress: what pushes out of the domain presses on a separating wall. */
+/* What pushes out of the domain presses on a separating wall. */
+static void gs4i_find_pressed(const gs4i_boundary *b, const gs4i_grid *g, int wall)
+{
+    const gs4_real outward = wall & 1 ? GS4I_C(1) : GS4I_C(-1);
+    int i;
+    for (i = 0; i < b->mirror_count[wall]; i++) {
+        const uint32_t mirror = b->mirrors[wall][i].mirror;
+        if (gs4i_of_node(g->force, mirror)[wall / 2] * outward > 0)
+            g->flags[mirror] |= GS4I_PRESSED;
+    }
+}
+
+/* Fold forces of stress, in the order of momentum. */
 static void gs4i_fold_force(const gs4i_boundary *b, const gs4i_grid *g)
 {
     gs4i_parity parity[6];
-    int wall, i;
+    int separating, wall;
     gs4i_vector_parity(b, 3, parity);
-    for (wall = 0; wall < 6; wall++) {
-        const gs4_real outward = wall & 1 ? GS4I_C(1) : GS4I_C(-1);
-        for (i = 0; i < b->mirror_count[wall] && b->walls[wall] == GS4_WALL_SEPARATE; i++) {
-            const uint32_t mirror = b->mirrors[wall][i].mirror;
-            if (gs4i_of_node(g->force, mirror)[wall / 2] * outward > 0)
-                g->flags[mirror] |= GS4I_PRESSED;
-        }
-        gs4i_fold_wall(b, g, g->force, wall, &parity[wall]);
+    for (separating = 0; separating < 2; separating++) {
+        for (wall = 0; wall < 6 && separating; wall++)
+            if (b->walls[wall] == GS4_WALL_SEPARATE) gs4i_find_pressed(b, g, wall);
+        for (wall = 0; wall < 6; wall++)
+            if ((b->walls[wall] == GS4_WALL_SEPARATE) == separating)
+                gs4i_fold_wall(b, g, g->force, wall, &parity[wall]);
     }
 }
 

@@ -224,42 +224,59 @@ static double ref_sign(const ref_sim *s, int wall, int c)
 
 static int ref_nodes(const ref_sim *s) { return s->n[0] * s->n[1] * s->n[2]; }
 
+/* Is node i, beyond a separating wall, in contact? Where it and its original together move into the
+ * wall, or where material pressed on it in the last step. Beyond others, too: as its original in
+ * those. */
+static int ref_touches(const ref_sim *s, int wall, int i)
+{
+    const double out = wall & 1 ? 1 : -1;
+    const ref_node *mirror = &s->node[i], *to;
+    int other;
+    for (other = 0; other < 6; other++) {
+        to = other / 2 == wall / 2 ? NULL : ref_original(s, other, (int)(mirror - s->node));
+        if (to) mirror = to;
+    }
+    to = ref_original(s, wall, (int)(mirror - s->node));
+    return mirror->pressed || out * (mirror->v[wall / 2] + to->v[wall / 2]) > 0;
+}
+
 /* What reached nodes beyond a wall goes to their originals with the sign, mass with +, wall after
- * wall. A separating wall does so where both nodes together move into it, or where material pressed
- * on it in the last step. */
+ * wall; separating walls come last, all that are in contact when the others are done. */
 static void ref_fold_momentum(ref_sim *s)
 {
-    int wall, i, c;
-    for (wall = 0; wall < 6; wall++)
-        for (i = 0; i < ref_nodes(s); i++) {
-            ref_node *mirror = &s->node[i], *to = ref_original(s, wall, i);
-            const double out = wall & 1 ? 1 : -1;
-            if (!to) continue;
-            if (s->d.walls[wall] == GS4_WALL_SEPARATE && !mirror->pressed
-                && !(out * (mirror->v[wall / 2] + to->v[wall / 2]) > 0))
-                continue;
-            mirror->folds |= 1 << wall / 2;
-            mirror->mirrors |= s->d.walls[wall] != GS4_WALL_PERIODIC;
-            for (c = 0; c < 3; c++) to->v[c] += ref_sign(s, wall, c) * mirror->v[c];
-            to->m += mirror->m;
-        }
+    int pass, wall, i, c;
+    for (pass = 0; pass < 3; pass++)
+        for (wall = 0; wall < 6; wall++)
+            for (i = 0; i < ref_nodes(s); i++) {
+                ref_node *mirror = &s->node[i], *to = ref_original(s, wall, i);
+                const int separate = s->d.walls[wall] == GS4_WALL_SEPARATE;
+                if (!to || separate != (pass > 0)) continue;
+                if (pass < 2 && (!separate || ref_touches(s, wall, i))) {
+                    mirror->folds |= 1 << wall / 2;
+                    mirror->mirrors |= s->d.walls[wall] != GS4_WALL_PERIODIC;
+                }
+                if (pass == 1 || !(mirror->folds >> wall / 2 & 1)) continue;
+                for (c = 0; c < 3; c++) to->v[c] += ref_sign(s, wall, c) * mirror->v[c];
+                to->m += mirror->m;
+            }
 }
 
 /* The same of forces. One out of the domain, weight included, presses on a separating wall. */
 static void ref_fold_forces(ref_sim *s)
 {
-    int wall, i, c;
-    for (i = 0; i < ref_nodes(s); i++) s->node[i].pressed = 0;
-    for (wall = 0; wall < 6; wall++)
-        for (i = 0; i < ref_nodes(s); i++) {
-            ref_node *mirror = &s->node[i], *to = ref_original(s, wall, i);
-            const double out = wall & 1 ? 1 : -1;
-            if (!to) continue;
-            mirror->pressed |=
-                s->d.walls[wall] == GS4_WALL_SEPARATE && out * mirror->f[wall / 2] > 0;
-            for (c = 0; c < 3 && mirror->folds >> wall / 2 & 1; c++)
-                to->f[c] += ref_sign(s, wall, c) * mirror->f[c];
-        }
+    int pass, wall, i, c;
+    for (pass = 0; pass < 3; pass++)
+        for (wall = 0; wall < 6; wall++)
+            for (i = 0; i < ref_nodes(s); i++) {
+                ref_node *mirror = &s->node[i], *to = ref_original(s, wall, i);
+                const int separate = s->d.walls[wall] == GS4_WALL_SEPARATE;
+                const double out = wall & 1 ? 1 : -1;
+                if (!pass && !wall) mirror->pressed = 0;
+                if (!to || separate != (pass > 0)) continue;
+                if (pass == 1) mirror->pressed |= out * mirror->f[wall / 2] > 0;
+                for (c = 0; c < 3 && pass != 1 && mirror->folds >> wall / 2 & 1; c++)
+                    to->f[c] += ref_sign(s, wall, c) * mirror->f[c];
+            }
 }
 
 /* Then they take what their originals have, walls in the reverse order. Their mass stays what

@@ -13,6 +13,7 @@
 #include "test_solid.c"
 #include "test_stress.c"
 #include "test_poisson.c"
+#include "test_symmetry.c"
 #include "test_reference.c"
 
 int main(int count, char **values)
@@ -65,6 +66,7 @@ int main(int count, char **values)
     run_files();
     run_stress();
     run_poisson();
+    run_symmetry();
     RUN(test_reference);
     RUN(test_stability);
     RUN_ONCE(test_stability_of_two_densities);

@@ -9238,27 +9238,30 @@ static void gs4i_fold_momentum(const gs4i_boundary *b, const gs4i_grid *g)
     }
 }
 
-/* What pushes out of the domain presses on a separating wall. */
-static void gs4i_find_pressed(const gs4i_boundary *b, const gs4i_grid *g, int wall)
+/* What pushes out of the domain presses on a separating wall, but where material leaves with ten
+ * times (chosen) the impulse of that push in this step: there rounding alone would hold it. */
+static void gs4i_find_pressed(const gs4i_boundary *b, const gs4i_grid *g, gs4_real dt, int wall)
 {
     const gs4_real outward = wall & 1 ? GS4I_C(1) : GS4I_C(-1);
     int i;
     for (i = 0; i < b->mirror_count[wall]; i++) {
-        const uint32_t mirror = b->mirrors[wall][i].mirror;
-        if (gs4i_of_node(g->force, mirror)[wall / 2] * outward > 0)
-            g->flags[mirror] |= GS4I_PRESSED;
+        const gs4i_mirror_pair *pair = &b->mirrors[wall][i];
+        const gs4_real push = gs4i_of_node(g->force, pair->mirror)[wall / 2] * outward * dt,
+                       v = gs4i_of_node(gs4i_velocity(g), pair->inner)[wall / 2] * outward,
+                       mass = gs4i_of_node(gs4i_velocity(g), pair->mirror)[3];
+        if (push > 0 && push > GS4I_C(-0.1) * v * mass) g->flags[pair->mirror] |= GS4I_PRESSED;
     }
 }
 
 /* Fold forces of stress, in the order of momentum. */
-static void gs4i_fold_force(const gs4i_boundary *b, const gs4i_grid *g)
+static void gs4i_fold_force(const gs4i_boundary *b, const gs4i_grid *g, gs4_real dt)
 {
     gs4i_parity parity[6];
     int separating, wall;
     gs4i_vector_parity(b, 3, parity);
     for (separating = 0; separating < 2; separating++) {
         for (wall = 0; wall < 6 && separating; wall++)
-            if (b->walls[wall] == GS4_WALL_SEPARATE) gs4i_find_pressed(b, g, wall);
+            if (b->walls[wall] == GS4_WALL_SEPARATE) gs4i_find_pressed(b, g, dt, wall);
         for (wall = 0; wall < 6; wall++)
             if ((b->walls[wall] == GS4_WALL_SEPARATE) == separating)
                 gs4i_fold_wall(b, g, g->force, wall, &parity[wall]);
@@ -10032,6 +10035,41 @@ GS4I_INLINE gs4i_image_particle *gs4i_image_particles_of(const gs4_sim *sim, int
                : NULL;
 }
 
+/* Columns of spin x (I - n n), how the body's velocity changes along its surface. */
+GS4I_INLINE void gs4i_surface_spin(const gs4i_image_particle *g, gs4_real turn[3][3])
+{
+    const gs4_real *w = g->spin, *n = g->n;
+    const gs4_real columns[3][3] = { { 0, w[2], -w[1] }, { -w[2], 0, w[0] }, { w[1], -w[0], 0 } };
+    const gs4_real across[3] = { w[1] * n[2] - w[2] * n[1], w[2] * n[0] - w[0] * n[2],
+                                 w[0] * n[1] - w[1] * n[0] };
+    int a, c;
+    for (a = 0; a < 3; a++)
+        for (c = 0; c < 3; c++) turn[a][c] = columns[a][c] - across[c] * n[a];
+}
+
+/* A solid's particle turns as well, with w = own[0..2] + ahead own[3..5]: of its image, columns of
+ * how its momentum changes from node to node, 2 m spin x (I - n n) - m w x R. */
+static void gs4i_reflect_spin(gs4i_image_particle *g, const gs4_real own[6], gs4_real ahead,
+                              gs4_real h)
+{
+    const gs4_real *n = g->n, m = g->x[3] * h;
+    const gs4_real w[3] = { own[0] + ahead * own[3], own[1] + ahead * own[4],
+                            own[2] + ahead * own[5] };
+    gs4_real turn[3][3];
+    int a, c;
+    if (!g->kind || (w[0] == 0 && w[1] == 0 && w[2] == 0)) return;
+    gs4i_surface_spin(g, turn);
+    for (a = 0; a < 3; a++) {
+        gs4_real e[3] = { 0, 0, 0 };
+        e[a] = 1;
+        for (c = 0; c < 3; c++) e[c] -= 2 * n[a] * n[c];
+        for (c = 0; c < 3; c++) {
+            const int i = (c + 1) % 3, j = (c + 2) % 3;
+            g->carried[1 + a][c] = m * (2 * turn[a][c] - (w[i] * e[j] - w[j] * e[i]));
+        }
+    }
+}
+
 static void gs4i_place_image_particles(int index, void *context)
 {
     gs4_sim *sim = ((const gs4i_pass *)context)->sim;
@@ -10058,6 +10096,10 @@ static void gs4i_place_image_particles(int index, void *context)
                 g->carried[0][c] =
                     g->x[3] * (2 * g->v[c] - GS4I_NTH(q.v[c], b) - ahead * GS4I_NTH(q.a[c], b));
             g->carried[0][3] = g->x[3];
+            if (p->with_rates && p->deformation_reals)
+                gs4i_reflect_spin(
+                    g, p->deformation + (size_t)p->deformation_reals * (i + (size_t)b) + 18, ahead,
+                    sim->grid.h);
         }
     }
 }
@@ -10331,18 +10373,6 @@ static void gs4i_gather_image_particles(gs4_sim *sim, gs4_task_fn kernel)
     pass.blocks = (const int32_t *)sim->image_particles.slots.data;
     pass.count = sim->image_particles.colour_first[8];
     gs4i_parallel_for(&sim->tasks, pass.count, kernel, &pass);
-}
-
-/* Columns of spin x (I - n n), how the body's velocity changes along its surface. */
-GS4I_INLINE void gs4i_surface_spin(const gs4i_image_particle *g, gs4_real turn[3][3])
-{
-    const gs4_real *w = g->spin, *n = g->n;
-    const gs4_real columns[3][3] = { { 0, w[2], -w[1] }, { -w[2], 0, w[0] }, { w[1], -w[0], 0 } };
-    const gs4_real across[3] = { w[1] * n[2] - w[2] * n[1], w[2] * n[0] - w[0] * n[2],
-                                 w[0] * n[1] - w[1] * n[0] };
-    int a, c;
-    for (a = 0; a < 3; a++)
-        for (c = 0; c < 3; c++) turn[a][c] = columns[a][c] - across[c] * n[a];
 }
 
 /* Has a particle an odd part to take? */
@@ -10709,8 +10739,9 @@ static void gs4i_set_velocities(gs4_sim *sim, gs4i_node_pass *nodes)
     const int groups = gs4i_groups(sim);
     gs4i_parallel_for(&sim->tasks, groups, gs4i_clear_jumps, nodes);
     gs4i_scatter_image_particles(sim, gs4i_mark_image_nodes);
-    gs4i_scatter_image_particles(sim, sim->particles.with_rates ? gs4i_scatter_image_momentum
-                                                                : gs4i_scatter_image_affine);
+    gs4i_scatter_image_particles(sim, sim->particles.with_rates && !sim->particles.deformation_reals
+                                          ? gs4i_scatter_image_momentum
+                                          : gs4i_scatter_image_affine);
     gs4i_fold_momentum(&sim->boundary, &sim->grid);
     gs4i_parallel_for(&sim->tasks, groups, gs4i_node_velocities, nodes);
     gs4i_fill_mirror_nodes(&sim->boundary, &sim->grid, sim->grid.momentum);
@@ -10737,7 +10768,7 @@ static void gs4i_finish_forces(gs4_sim *sim, gs4i_node_pass *nodes)
     gs4i_grid *g = &sim->grid;
     gs4i_parity parity[6];
     gs4i_scatter_image_particles(sim, gs4i_scatter_image_force);
-    gs4i_fold_force(&sim->boundary, g);
+    gs4i_fold_force(&sim->boundary, g, sim->integrator.dt);
     if (!g->with_deconvolution) return;
     gs4i_fill_mirror_nodes(&sim->boundary, g, g->force);
     gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_deconvolve_forces, nodes);

@@ -14,6 +14,7 @@
 #include "test_stress.c"
 #include "test_poisson.c"
 #include "test_symmetry.c"
+#include "test_contact.c"
 #include "test_reference.c"
 
 int main(int count, char **values)
@@ -67,6 +68,7 @@ int main(int count, char **values)
     run_stress();
     run_poisson();
     run_symmetry();
+    run_contact();
     RUN(test_reference);
     RUN(test_stability);
     RUN_ONCE(test_stability_of_two_densities);

@@ -1,0 +1,891 @@
+/* Contact with walls and bodies against closed forms: every kind along every axis and askew. */
+
+#define CONTACT_DOUBLE (sizeof(gs4_real) == 8)
+#define CONTACT_H 0.1    /* cell */
+#define CONTACT_SIDE 1.2 /* of the domain */
+
+/* A surface: a point of it, e[0] along it, e[1] its outward normal, e[2] across. Askew, the unit
+ * vectors are those of the axes after a turn by the vector `turn`. */
+typedef struct contact_frame {
+    double at[3], e[3][3], turn[3];
+    int askew;
+} contact_frame;
+
+/* x turned by the angle |w| about w: Rodrigues' formula. */
+static void contact_turn(const double w[3], const double x[3], double out[3])
+{
+    const double angle = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
+    double k[3] = { 0, 0, 0 }, along = 0;
+    int i;
+    for (i = 0; i < 3 && angle > 0; i++) k[i] = w[i] / angle;
+    for (i = 0; i < 3; i++) along += k[i] * x[i];
+    for (i = 0; i < 3; i++)
+        out[i] = x[i] * cos(angle)
+                 + (k[(i + 1) % 3] * x[(i + 2) % 3] - k[(i + 2) % 3] * x[(i + 1) % 3]) * sin(angle)
+                 + k[i] * along * (1 - cos(angle));
+}
+
+static uint32_t contact_seed;
+
+static double contact_random(void) /* in [-1, 1) */
+{
+    contact_seed = contact_seed * 1664525u + 1013904223u;
+    return (double)(contact_seed >> 8) / 8388608.0 - 1;
+}
+
+/* Face `wall` of a box `in` inside of the domain; e[0] is the next axis or, swapped, the one
+ * after. */
+static contact_frame contact_face(int wall, int swap, double in)
+{
+    contact_frame f;
+    const int a = wall / 2;
+    const double side = wall & 1 ? -1 : 1;
+    memset(&f, 0, sizeof f);
+    f.e[1][a] = side;
+    f.e[0][(a + 1 + swap) % 3] = 1;
+    f.e[2][(a + 2 - swap) % 3] = 1;
+    f.at[0] = f.at[1] = f.at[2] = CONTACT_SIDE / 2;
+    f.at[a] = side > 0 ? in : CONTACT_SIDE - in;
+    return f;
+}
+
+/* A surface `back` behind the middle of the domain, any way up. */
+static contact_frame contact_askew(double back)
+{
+    static const double unit[3][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } };
+    contact_frame f;
+    int i;
+    memset(&f, 0, sizeof f);
+    f.askew = 1;
+    for (i = 0; i < 3; i++) f.turn[i] = 2 * contact_random();
+    for (i = 0; i < 3; i++) contact_turn(f.turn, unit[i], f.e[i]);
+    for (i = 0; i < 3; i++) f.at[i] = CONTACT_SIDE / 2 - back * f.e[1][i];
+    return f;
+}
+
+/* A vector of the frame in the world, and a point. */
+static gs4_vec3 contact_vector(const contact_frame *f, double along, double up, double across)
+{
+    return at(along * f->e[0][0] + up * f->e[1][0] + across * f->e[2][0],
+              along * f->e[0][1] + up * f->e[1][1] + across * f->e[2][1],
+              along * f->e[0][2] + up * f->e[1][2] + across * f->e[2][2]);
+}
+
+static gs4_vec3 contact_point(const contact_frame *f, double along, double up, double across)
+{
+    const gs4_vec3 v = contact_vector(f, along, up, across);
+    return at(f->at[0] + (double)v.x, f->at[1] + (double)v.y, f->at[2] + (double)v.z);
+}
+
+/* World vector v in the frame. */
+static void contact_inward(const contact_frame *f, const double v[3], double out[3])
+{
+    int i;
+    for (i = 0; i < 3; i++) out[i] = v[0] * f->e[i][0] + v[1] * f->e[i][1] + v[2] * f->e[i][2];
+}
+
+/* Mean velocity in the frame. */
+static void contact_mean(gs4_sim *sim, const contact_frame *f, double out[3])
+{
+    const gs4_stats s = gs4_get_stats(sim);
+    int i;
+    contact_inward(f, s.momentum, out);
+    for (i = 0; i < 3; i++) out[i] /= s.mass;
+}
+
+/* Mean place in the frame. */
+static void contact_centre(const gs4_sim *sim, const contact_frame *f, double out[3])
+{
+    const gs4_view x = gs4_particles(sim, GS4_FIELD_POSITION);
+    double mean[3] = { 0, 0, 0 };
+    int i, c;
+    for (i = 0; i < x.count; i++)
+        for (c = 0; c < 3; c++)
+            mean[c] +=
+                ((double)x.data[(size_t)i * (size_t)x.stride + (size_t)c] - f->at[c]) / x.count;
+    contact_inward(f, mean, out);
+}
+
+static gs4_sim_desc contact_desc(int integrator, gs4_wall wall)
+{
+    gs4_sim_desc d = scene_cube(12);
+    int w;
+    d.cell_size = (gs4_real)CONTACT_H;
+    d.integrator = physics_integrators[integrator];
+    for (w = 0; w < 6; w++) d.walls[w] = wall;
+    return d;
+}
+
+/* A damped solid, 1 % deep under its weight at 10 m/s^2. */
+static gs4_material contact_material(void)
+{
+    gs4_material m = scene_liquid(1000, 500, 12);
+    m.solid = GS4_NEO_HOOKEAN;
+    m.shear_modulus = (gs4_real)3e4;
+    return m;
+}
+
+/* Particles two a cell in the box low .. high of the frame; how many. */
+static int contact_fill(gs4_sim *sim, const contact_frame *f, const double low[3],
+                        const double high[3], gs4_vec3 velocity)
+{
+    static gs4_real xyz[3 * 8192];
+    const double d = CONTACT_H / 2;
+    const gs4_fill fill = scene_fill(velocity);
+    int n[3], i, c, count;
+    for (c = 0; c < 3; c++) n[c] = (int)floor((high[c] - low[c]) / d + 0.5);
+    count = n[0] * n[1] * n[2];
+    CHECK(count <= 8192);
+    for (i = 0; i < count; i++) {
+        const gs4_vec3 p =
+            contact_point(f, low[0] + d * (i % n[0] + 0.5), low[1] + d * (i / n[0] % n[1] + 0.5),
+                          low[2] + d * (i / (n[0] * n[1]) + 0.5));
+        xyz[3 * i] = p.x;
+        xyz[3 * i + 1] = p.y;
+        xyz[3 * i + 2] = p.z;
+    }
+    CHECK(gs4_add_points(sim, xyz, count, (gs4_real)(d * d * d), &fill) == count);
+    return count;
+}
+
+/* A block that stands on the surface, its middle `along` from the frame's point. */
+static int contact_block(gs4_sim *sim, const contact_frame *f, double along, double length,
+                         double height, gs4_vec3 velocity)
+{
+    const double low[3] = { along - length / 2, 0, -length / 2 },
+                 high[3] = { along + length / 2, height, length / 2 };
+    return contact_fill(sim, f, low, high, velocity);
+}
+
+/* --- a half space, or a slab, as every kind of shape ------------------------------------------ */
+
+enum {
+    CONTACT_PLANE,
+    CONTACT_BOX,
+    CONTACT_CYLINDER,
+    CONTACT_SDF,
+    CONTACT_MESH,
+    CONTACT_SHAPES
+};
+
+typedef struct contact_slab {
+    contact_frame f;
+    double deep, wide;
+    gs4_real vertex[24];
+} contact_slab;
+
+static gs4_real contact_slab_distance(gs4_vec3 p, void *user)
+{
+    const contact_slab *s = (const contact_slab *)user;
+    const double r[3] = { (double)p.x - s->f.at[0], (double)p.y - s->f.at[1],
+                          (double)p.z - s->f.at[2] };
+    double q[3];
+    contact_inward(&s->f, r, q);
+    return (gs4_real)(fabs(q[1] + s->deep / 2) - s->deep / 2);
+}
+
+static gs4_shape contact_slab_mesh(contact_slab *s)
+{
+    static const int sides[36] = { 0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4,
+                                   2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5 };
+    static int mirrored[36];
+    const double(*e)[3] = (const double(*)[3])s->f.e;
+    const double handed = e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1])
+                          + e[0][1] * (e[1][2] * e[2][0] - e[1][0] * e[2][2])
+                          + e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0]);
+    int i;
+    for (i = 0; i < 8; i++) {
+        const gs4_vec3 p = contact_point(&s->f, i & 1 ? s->wide : -s->wide, i & 2 ? 0 : -s->deep,
+                                         i & 4 ? s->wide : -s->wide);
+        s->vertex[3 * i] = p.x;
+        s->vertex[3 * i + 1] = p.y;
+        s->vertex[3 * i + 2] = p.z;
+    }
+    for (i = 0; i < 36; i++) mirrored[i] = sides[i % 3 == 1 ? i + 1 : i % 3 == 2 ? i - 1 : i];
+    return gs4_mesh(s->vertex, 8, handed > 0 ? sides : mirrored, 12);
+}
+
+/* Add to an empty scene a body whose surface is that of the frame, `deep` thick. A box that lies
+ * askew is turned there, in one second. */
+static int contact_body(gs4_sim *sim, const contact_frame *f, int shape, double deep,
+                        gs4_wall contact, double friction)
+{
+    static contact_slab slabs[4];
+    static int next;
+    contact_slab *s = &slabs[next++ % 4];
+    const gs4_vec3 none = at(0, 0, 0);
+    gs4_collider c;
+    double a[3], b[3];
+    int i, id;
+    memset(&c, 0, sizeof c);
+    s->f = *f;
+    s->deep = deep;
+    s->wide = 1.5 * CONTACT_SIDE;
+    for (i = 0; i < 3; i++) {
+        const double wide = f->askew ? (i == 1 ? 0 : s->wide) : s->wide * (1 - fabs(f->e[1][i]));
+        a[i] = f->at[i] - wide - deep * (f->askew ? i == 1 : fmax(f->e[1][i], 0));
+        b[i] = f->at[i] + wide + deep * (f->askew ? 0 : fmax(-f->e[1][i], 0));
+    }
+    c.contact = contact;
+    c.friction = (gs4_real)friction;
+    c.pivot = contact_point(f, 0, 0, 0);
+    c.shape = shape == CONTACT_PLANE ? gs4_plane(c.pivot, contact_vector(f, 0, 1, 0))
+              : shape == CONTACT_BOX ? gs4_box(at(a[0], a[1], a[2]), at(b[0], b[1], b[2]))
+              : shape == CONTACT_CYLINDER
+                  ? gs4_cylinder(contact_point(f, 0, -deep, 0), c.pivot, (gs4_real)s->wide)
+              : shape == CONTACT_SDF
+                  ? gs4_sdf(contact_slab_distance, s, at(-2, -2, -2), at(4, 4, 4))
+                  : contact_slab_mesh(s);
+    if (shape == CONTACT_BOX) c.angular_velocity = at(f->turn[0], f->turn[1], f->turn[2]);
+    id = gs4_add_collider(sim, &c);
+    CHECK_RESULT(sim, id, 0);
+    if (shape != CONTACT_BOX || !f->askew) return id;
+    CHECK(physics_run(sim, 1) == 0);
+    CHECK_RESULT(sim, gs4_move_collider(sim, id, none, none), GS4_OK);
+    return id;
+}
+
+/* --- friction --------------------------------------------------------------------------------- */
+
+/* A block slides on a plane at `angle` from the level, down or up it. What friction takes of its
+ * momentum is mu times what the plane has given it, at any time: with v_n the velocity that it
+ * has left along the normal
+ *     v = v0 + g sin t -+ mu (v_n + g cos t)
+ * and the block stays on the plane, so that a = g (sin -+ mu cos). mu below 0: of a wall or a
+ * body that slips. */
+static void contact_slide(int integrator, const contact_frame *f, int shape, gs4_wall contact,
+                          double angle, double mu, double v0)
+{
+    const double g = 10, time = 0.1, along = g * sin(angle), down = g * cos(angle);
+    gs4_sim_desc d = contact_desc(integrator, shape < 0 ? contact : GS4_WALL_SLIP);
+    const gs4_material m = contact_material();
+    double v[3], t, start, off, sunk;
+    gs4_sim *sim;
+    d.gravity = contact_vector(f, along, -down, 0);
+    sim = physics_create(&d, &m);
+    if (shape >= 0) contact_body(sim, f, shape, 0.5, contact, mu);
+    contact_block(sim, f, -0.5 * v0 * time, 0.3, 0.2, contact_vector(f, v0, 0, 0));
+    start = gs4_get_stats(sim).time;
+    CHECK(physics_run(sim, start + time) == 0);
+    t = gs4_get_stats(sim).time - start;
+    contact_mean(sim, f, v);
+    off = v[0] - (v0 + along * t - (v0 < 0 ? -mu : mu) * (v[1] + down * t));
+    sunk = v[1];
+    if (test_filter[0])
+        printf("slide, integrator %d, shape %d, contact %d, angle %.2f, mu %.2f, v0 %+.1f: off by "
+               "%+.1e, normal %+.1e, across %+.1e\n",
+               integrator, shape, (int)contact, angle, mu, v0, off, sunk, v[2]);
+    /* local slip is not all along the plane; near walls the hidden motion of particles fades */
+    CHECK_CLOSE(off, 0, mu > 0 ? 2e-3 * mu : shape < 0 ? 4e-5 : CONTACT_DOUBLE ? 1e-9 : 1e-5);
+    CHECK_CLOSE(sunk, 0, 0.1);
+    CHECK_CLOSE(v[2], 0, mu > 0 && f->askew ? 0.015 * mu : CONTACT_DOUBLE ? 1e-9 : 1e-5);
+    gs4_destroy(sim);
+}
+
+static void test_contact_friction(void)
+{
+    static const double angles[6] = { 0.18, 0.35, 0.52, 0.7, 0.87, 1.04 },
+                        mus[4] = { 0.15, 0.3, 0.4, 0.1 };
+    int w, swap, i, n = 0;
+    for (w = 0; w < 6; w++)
+        for (swap = 0; swap < 2; swap++)
+            for (i = 0; i < 2; i++, n++) {
+                const contact_frame f = contact_face(w, swap, 0.3);
+                contact_slide(i, &f, (n + n / 10) % CONTACT_SHAPES, GS4_WALL_SEPARATE,
+                              angles[n % 6], mus[n % 4], n % 3 == 1 ? -2.5 : 2);
+            }
+    contact_seed = 7;
+    for (n = 0; n < 10; n++) {
+        const contact_frame f = contact_askew(0.1);
+        contact_slide(n % 2, &f, n / 2, GS4_WALL_SEPARATE, angles[n % 6], mus[n % 4],
+                      n % 3 == 1 ? -2.5 : 2);
+    }
+}
+
+/* The same without friction, on bodies and walls that slip or let go. */
+static void test_contact_slip(void)
+{
+    int w, i, n = 0;
+    for (w = 0; w < 6; w++)
+        for (i = 0; i < 2; i++, n++) {
+            contact_frame f = contact_face(w, n % 4 / 2, 0.3);
+            contact_slide(i, &f, (n + n / 5) % CONTACT_SHAPES,
+                          n % 3 ? GS4_WALL_SLIP : GS4_WALL_SEPARATE, 0.5, 0, 1);
+            f = contact_face(w, n % 2, 0);
+            contact_slide(i, &f, -1, GS4_WALL_SLIP, 0.6, 0, 1);
+            contact_slide(i, &f, -1, GS4_WALL_SEPARATE, 0.4, 0, -1);
+        }
+    contact_seed = 9;
+    for (n = 0; n < 5; n++) {
+        const contact_frame f = contact_askew(0.1);
+        contact_slide(n % 2, &f, n, n % 3 ? GS4_WALL_SLIP : GS4_WALL_SEPARATE, 0.3, 0, 1.5);
+    }
+}
+
+/* Where mu is more than the tangent of the angle it stays: of what gravity would have given it,
+ * all but a creep is taken away. */
+static void test_contact_friction_holds(void)
+{
+    int n;
+    for (n = 0; n < 6; n++) {
+        const contact_frame f = contact_face(n, n % 2, 0.3);
+        const gs4_material m = contact_material();
+        const double g = 10, angle = n % 3 ? 0.35 : 0.2, free = g * sin(angle) * 0.3;
+        gs4_sim_desc d = contact_desc(n / 2 % 2, GS4_WALL_SLIP);
+        double v[3];
+        gs4_sim *sim;
+        d.gravity = contact_vector(&f, g * sin(angle), -g * cos(angle), 0);
+        sim = physics_create(&d, &m);
+        contact_body(sim, &f, n % CONTACT_SHAPES, 0.5, GS4_WALL_SEPARATE, 0.7);
+        contact_block(sim, &f, 0, 0.5, 0.2, at(0, 0, 0));
+        CHECK(physics_run(sim, 0.3) == 0);
+        contact_mean(sim, &f, v);
+        if (test_filter[0])
+            printf("holds, integrator %d, angle %.2f: %+.4f of what is free, normal %+.1e, across "
+                   "%+.1e\n",
+                   n / 2 % 2, angle, v[0] / free, v[1], v[2]);
+        CHECK_CLOSE(v[0] / free, 0, 0.03);
+        CHECK_CLOSE(v[1], 0, 0.03);
+        CHECK_CLOSE(v[2], 0, 0.01);
+        gs4_destroy(sim);
+    }
+}
+
+/* --- walls ------------------------------------------------------------------------------------ */
+
+/* A liquid that goes at speed 1 along a channel 8 cells wide, between wall `w` and the one
+ * before it; mean speed at t. With both sticky (half 0), one of them (half 1) or none, of
+ * kinematic viscosity nu:
+ *     sum over odd k of 8/(pi k)^2 exp(-nu t (pi k/W)^2), W the width, twice that with one. */
+static void contact_channel(int integrator, int w, int swap, gs4_wall one, gs4_wall other)
+{
+    const double nu = 0.4, t = 0.2, pi = acos(-1.0);
+    const int a = w / 2, along = (a + 1 + swap) % 3;
+    const int sticky = (one == GS4_WALL_STICK) + (other == GS4_WALL_STICK);
+    gs4_sim_desc d = scene_cube(8);
+    const gs4_material m = scene_liquid(1, nu, 8);
+    const gs4_fill f = scene_fill(at(along == 0, along == 1, along == 2));
+    double expected = sticky ? 0 : 1, v[3];
+    gs4_sim *sim;
+    int k, c;
+    for (k = 1; k < 60 && sticky; k += 2)
+        expected += 8 / (pi * pi * k * k) * exp(-nu * t * k * k * pi * pi / (sticky == 2 ? 1 : 4));
+    for (c = 0; c < 3; c++) {
+        if (c == a) continue;
+        d.cells[c] = 4;
+        d.walls[2 * c] = d.walls[2 * c + 1] = GS4_WALL_PERIODIC;
+    }
+    d.walls[w] = one;
+    d.walls[w ^ 1] = other;
+    d.integrator = physics_integrators[integrator];
+    sim = physics_create(&d, &m);
+    CHECK(gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1, 1, 1)), &f) == 8 * 4 * 4 * 8);
+    CHECK(physics_run(sim, t) == 0);
+    for (c = 0; c < 3; c++)
+        v[c] =
+            gs4_get_stats(sim).momentum[c] / gs4_get_stats(sim).mass - (c == along ? expected : 0);
+    if (test_filter[0])
+        printf("channel, integrator %d, walls %d: %d and %d, along %d: %+.1e of %.4f, %+.1e, "
+               "%+.1e\n",
+               integrator, a, (int)one, (int)other, along, v[along], expected, v[(along + 1) % 3],
+               v[(along + 2) % 3]);
+    CHECK_CLOSE(v[along], 0, sticky ? 0.015 * sticky : CONTACT_DOUBLE ? 1e-9 : 1e-5);
+    CHECK_CLOSE(v[(along + 1) % 3], 0, 1e-5);
+    CHECK_CLOSE(v[(along + 2) % 3], 0, 1e-5);
+    gs4_destroy(sim);
+}
+
+static void test_contact_channel(void)
+{
+    int w, i;
+    for (w = 0; w < 6; w++)
+        for (i = 0; i < 4; i++) {
+            contact_channel(i / 2, w, i % 2, GS4_WALL_STICK,
+                            i % 2 ? GS4_WALL_SLIP : GS4_WALL_STICK);
+            if (i % 2 == w % 2)
+                contact_channel(i / 2, w, (w + i / 2) % 2,
+                                i < 2 ? GS4_WALL_SLIP : GS4_WALL_SEPARATE, GS4_WALL_SLIP);
+        }
+}
+
+/* A block on a sticky wall stays there under gravity along it, is not pulled off by less than it
+ * can bear, and holds. */
+static void test_contact_sticky_wall(void)
+{
+    int n;
+    for (n = 0; n < 12; n++) {
+        const contact_frame f = contact_face(n / 2, n / 4 % 2, 0);
+        const gs4_material m = contact_material();
+        const double g = 10, way = n % 4 < 2 ? 1 : -1, up = n % 3 - 1;
+        gs4_sim_desc d = contact_desc(n % 2, GS4_WALL_STICK);
+        double v[3];
+        gs4_sim *sim;
+        d.gravity = contact_vector(&f, way * g, up * g / 2, 0);
+        sim = physics_create(&d, &m);
+        contact_block(sim, &f, 0, 0.4, 0.2, at(0, 0, 0));
+        CHECK(physics_run(sim, 0.2) == 0);
+        contact_mean(sim, &f, v);
+        if (test_filter[0])
+            printf("sticky wall %d, integrator %d: %+.1e %+.1e %+.1e\n", n / 2, n % 2, v[0], v[1],
+                   v[2]);
+        CHECK_CLOSE(v[0], 0, 0.02);
+        CHECK_CLOSE(v[1], 0, 0.02);
+        CHECK_CLOSE(v[2], 0, 0.02);
+        gs4_destroy(sim);
+    }
+}
+
+/* --- letting go ------------------------------------------------------------------------------- */
+
+/* A block thrown off a surface that it touches leaves as it was thrown, and keeps its spin about
+ * the normal. */
+static void contact_leave(int integrator, const contact_frame *f, int shape, gs4_wall contact,
+                          double friction)
+{
+    const gs4_material m = contact_material();
+    const gs4_sim_desc d = contact_desc(integrator, shape < 0 ? contact : GS4_WALL_SLIP);
+    gs4_sim *sim = physics_create(&d, &m);
+    double v[3], start;
+    if (shape >= 0) contact_body(sim, f, shape, 0.5, contact, friction);
+    contact_block(sim, f, -0.05, 0.3, 0.2, contact_vector(f, 0.5, 1, -0.25));
+    start = gs4_get_stats(sim).time;
+    CHECK(physics_run(sim, start + 0.15) == 0);
+    contact_mean(sim, f, v);
+    if (test_filter[0])
+        printf("leaves, integrator %d, shape %d, contact %d: off by %+.1e %+.1e %+.1e\n",
+               integrator, shape, (int)contact, v[0] - 0.5, v[1] - 1, v[2] + 0.25);
+    CHECK_CLOSE(v[0], 0.5, CONTACT_DOUBLE ? 1e-12 : 1e-5);
+    CHECK_CLOSE(v[1], 1, CONTACT_DOUBLE ? 1e-12 : 1e-5);
+    CHECK_CLOSE(v[2], -0.25, CONTACT_DOUBLE ? 1e-12 : 1e-5);
+    gs4_destroy(sim);
+}
+
+static void test_contact_leaves(void)
+{
+    int n;
+    contact_seed = 5;
+    for (n = 0; n < 12; n++) {
+        contact_frame f = contact_face(n / 2, n % 4 / 2, 0.3);
+        contact_leave(n % 2, &f, n % CONTACT_SHAPES, n % 3 ? GS4_WALL_SEPARATE : GS4_WALL_SLIP,
+                      n % 3 == 1 ? 0.5 : 0);
+        f = contact_face(n / 2, n % 4 / 2, 0);
+        contact_leave(n % 2, &f, -1, GS4_WALL_SEPARATE, 0);
+        f = contact_askew(0.1);
+        contact_leave(n % 2, &f, n % CONTACT_SHAPES, n % 3 ? GS4_WALL_SEPARATE : GS4_WALL_SLIP,
+                      n % 3 == 1 ? 0.5 : 0);
+    }
+}
+
+/* --- moving bodies ---------------------------------------------------------------------------- */
+
+/* A block stands on a body that goes with velocity V. At rest at first, a sticky body drags it to
+ * its own velocity, whatever the direction. One that slips has it along its normal, where gravity
+ * keeps it pressed, and leaves it what it had along the surface: nothing. */
+static void contact_carry(int integrator, const contact_frame *f, int shape, gs4_wall contact)
+{
+    const double V[3] = { 0.3, 0.4, -0.2 }, time = 0.4;
+    const int sticky = contact == GS4_WALL_STICK;
+    const gs4_material m = contact_material();
+    gs4_sim_desc d = contact_desc(integrator, GS4_WALL_SLIP);
+    gs4_sim *sim;
+    double v[3], x[3], start;
+    int id;
+    if (!sticky) d.gravity = contact_vector(f, 0, -10, 0);
+    sim = physics_create(&d, &m);
+    id = contact_body(sim, f, shape, 0.5, contact, 0);
+    CHECK_RESULT(sim, gs4_move_collider(sim, id, contact_vector(f, V[0], V[1], V[2]), at(0, 0, 0)),
+                 GS4_OK);
+    contact_block(sim, f, 0, 0.3, 0.2, contact_vector(f, 0, sticky ? 0 : V[1], 0));
+    start = gs4_get_stats(sim).time;
+    CHECK(physics_run(sim, start + time) == 0);
+    contact_mean(sim, f, v);
+    contact_centre(sim, f, x);
+    x[1] -= 0.1 + V[1] * time;
+    if (test_filter[0])
+        printf("carries, integrator %d, shape %d, contact %d: %.5f %.5f %.5f of %.1f %.1f %.1f, "
+               "place %+.1e\n",
+               integrator, shape, (int)contact, v[0], v[1], v[2], sticky ? V[0] : 0, V[1],
+               sticky ? V[2] : 0, x[1] / CONTACT_H);
+    CHECK_CLOSE(v[0], sticky ? V[0] : 0, sticky ? 0.01 : 1e-5);
+    CHECK_CLOSE(v[1], V[1], sticky ? 0.005 : 0.06);
+    CHECK_CLOSE(v[2], sticky ? V[2] : 0, sticky ? 0.01 : 1e-5);
+    CHECK_CLOSE(x[1], 0, (sticky ? 0.002 : 0.25) * CONTACT_H);
+    gs4_destroy(sim);
+}
+
+static void test_contact_carries(void)
+{
+    int n;
+    contact_seed = 3;
+    for (n = 0; n < 12; n++) {
+        contact_frame f = contact_face(n / 2, n % 4 / 2, 0.4);
+        if (n % 2 == n / 2 % 2)
+            contact_carry(n % 2, &f, n % CONTACT_SHAPES, GS4_WALL_STICK);
+        else
+            contact_carry(n % 2, &f, (n + 2) % CONTACT_SHAPES,
+                          n % 4 < 2 ? GS4_WALL_SLIP : GS4_WALL_SEPARATE);
+        if (n < 5) {
+            f = contact_askew(0.2);
+            contact_carry(n % 2, &f, n, (gs4_wall)(n % 3));
+        }
+    }
+}
+
+/* World point x after `time` with a body that goes with V and turns with w about `pivot`. */
+static void contact_pose(const double pivot[3], const double V[3], const double w[3], double time,
+                         const double x[3], double out[3])
+{
+    double r[3], turn[3];
+    int c;
+    for (c = 0; c < 3; c++) {
+        r[c] = x[c] - pivot[c];
+        turn[c] = w[c] * time;
+    }
+    contact_turn(turn, r, out);
+    for (c = 0; c < 3; c++) out[c] += pivot[c] + V[c] * time;
+}
+
+/* A block that is glued to a body which turns goes round with it as one piece. */
+static void contact_ride(int integrator, const contact_frame *f, int shape, const double w[3])
+{
+    static double x0[3 * 8192], x1[3 * 8192];
+    const gs4_material m = contact_material();
+    const gs4_sim_desc d = contact_desc(integrator, GS4_WALL_SLIP);
+    const double V[3] = { 0.1, -0.15, 0.05 }, time = 0.3;
+    gs4_sim *sim = physics_create(&d, &m);
+    double worst = 0, start;
+    gs4_view x;
+    gs4_edit v;
+    int i, k, n, id;
+    id = contact_body(sim, f, shape, 0.5, GS4_WALL_STICK, 0);
+    CHECK_RESULT(sim, gs4_move_collider(sim, id, at(V[0], V[1], V[2]), at(w[0], w[1], w[2])),
+                 GS4_OK);
+    n = contact_block(sim, f, 0.05, 0.3, 0.2, at(0, 0, 0));
+    x = gs4_particles(sim, GS4_FIELD_POSITION);
+    v = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
+    for (i = 0; i < n; i++) {
+        const gs4_real *p = x.data + (size_t)i * (size_t)x.stride;
+        gs4_real *u = v.data + (size_t)i * (size_t)v.stride;
+        for (k = 0; k < 3; k++) {
+            const int a = (k + 1) % 3, b = (k + 2) % 3;
+            u[k] = (gs4_real)(V[k] + w[a] * ((double)p[b] - f->at[b])
+                              - w[b] * ((double)p[a] - f->at[a]));
+        }
+    }
+    scene_by_id(sim, GS4_FIELD_POSITION, x0);
+    start = gs4_get_stats(sim).time;
+    CHECK(physics_run(sim, start + time) == 0);
+    scene_by_id(sim, GS4_FIELD_POSITION, x1);
+    for (i = 0; i < n; i++) {
+        double to[3];
+        contact_pose(f->at, V, w, time, x0 + 3 * i, to);
+        for (k = 0; k < 3; k++) worst = fmax(worst, fabs(x1[3 * i + k] - to[k]));
+    }
+    if (test_filter[0])
+        printf("rides, integrator %d, shape %d, w %.1f %.1f %.1f: off by up to %.4f cells\n",
+               integrator, shape, w[0], w[1], w[2], worst / CONTACT_H);
+    CHECK(worst < 0.006 * CONTACT_H);
+    gs4_destroy(sim);
+}
+
+static void test_contact_rides(void)
+{
+    static const double spins[4][3] = { { 2, 0, 0 }, { 0, 2, 0 }, { 0, 0, 2 }, { 1, -1.5, 1.2 } };
+    int n;
+    contact_seed = 4;
+    for (n = 0; n < 12; n++) {
+        const contact_frame f = n < 6 ? contact_face(n, n % 2, 0.45) : contact_askew(0.1);
+        contact_ride(n % 2, &f, n % CONTACT_SHAPES, spins[(n + n / 4) % 4]);
+    }
+}
+
+/* Single particles at rest in the way of a box that turns and goes: none is in it, where it was
+ * when the step began, and those that it has met lie on its surface. */
+static void contact_sweep(int integrator, gs4_wall contact, const double w[3])
+{
+    static double x[3 * 8192];
+    const double V[3] = { 0.4, -0.3, 0.5 }, pivot[3] = { 0.5, 0.65, 0.6 };
+    const double low[3] = { 0.4, 0.45, 0.4 }, high[3] = { 0.8, 0.75, 0.7 };
+    const gs4_material m = scene_liquid(1000, 0, 10);
+    const gs4_sim_desc d = contact_desc(integrator, GS4_WALL_SLIP);
+    gs4_real xyz[3 * 1331];
+    gs4_sim *sim = physics_create(&d, &m);
+    gs4_collider c;
+    gs4_fill fill = scene_fill(at(0, 0, 0));
+    int i, k, n = 0, step, met = 0;
+    double deepest = 0, time = 0;
+    memset(&c, 0, sizeof c);
+    c.shape = gs4_box(at(low[0], low[1], low[2]), at(high[0], high[1], high[2]));
+    c.contact = contact;
+    c.velocity = at(V[0], V[1], V[2]);
+    c.angular_velocity = at(w[0], w[1], w[2]);
+    c.pivot = at(pivot[0], pivot[1], pivot[2]);
+    CHECK_RESULT(sim, gs4_add_collider(sim, &c), 0);
+    for (i = 0; i < 11 * 11 * 11; i++) {
+        const double p[3] = { 0.1 + 0.1 * (i % 11), 0.11 + 0.1 * (i / 11 % 11),
+                              0.09 + 0.1 * (i / 121) };
+        int out = 0;
+        for (k = 0; k < 3; k++) out |= p[k] < low[k] - 0.01 || p[k] > high[k] + 0.01;
+        if (!out) continue;
+        for (k = 0; k < 3; k++) xyz[3 * n + k] = (gs4_real)p[k];
+        n++;
+    }
+    CHECK(gs4_add_points(sim, xyz, n, (gs4_real)1e-4, &fill) == n);
+    for (step = 0; step < 60; step++) {
+        CHECK_RESULT(sim, gs4_step(sim, gs4_stable_dt(sim) / 2), GS4_OK);
+        scene_by_id(sim, GS4_FIELD_POSITION, x);
+        for (i = 0; i < n; i++) {
+            const double back[3] = { -w[0], -w[1], -w[2] }, still[3] = { 0, 0, 0 };
+            double p[3], q[3], inside = 1;
+            for (k = 0; k < 3; k++) p[k] = x[3 * i + k] - V[k] * time;
+            contact_pose(pivot, still, back, time, p, q);
+            for (k = 0; k < 3; k++) inside = fmin(inside, fmin(q[k] - low[k], high[k] - q[k]));
+            deepest = fmax(deepest, inside);
+            met += step == 59 && fabs(inside) < 0.3 * CONTACT_H;
+        }
+        time = gs4_get_stats(sim).time;
+    }
+    if (test_filter[0])
+        printf("sweeps, integrator %d, contact %d: %d of %d on it, %.1e deep\n", integrator,
+               (int)contact, met, n, deepest);
+    CHECK(met > 10);
+    CHECK(deepest < 0.01 * CONTACT_H);
+    gs4_destroy(sim);
+}
+
+static void test_contact_sweeps(void)
+{
+    static const double spins[4][3] = { { 5, 0, 0 }, { 0, -5, 0 }, { 0, 0, 5 }, { 3, -4, 2 } };
+    int n;
+    for (n = 0; n < 8; n++)
+        contact_sweep(n % 2, n / 2 % 2 ? GS4_WALL_SLIP : GS4_WALL_SEPARATE, spins[n / 2]);
+}
+
+/* --- bodies of revolution --------------------------------------------------------------------- */
+
+/* How far the hole of a pipe is: radius 0.35 about the axis of the frame's normal. */
+static gs4_real contact_hole(gs4_vec3 p, void *user)
+{
+    const contact_frame *f = (const contact_frame *)user;
+    const double r[3] = { (double)p.x - f->at[0], (double)p.y - f->at[1], (double)p.z - f->at[2] };
+    double q[3];
+    contact_inward(f, r, q);
+    return (gs4_real)(0.35 - sqrt(q[0] * q[0] + q[2] * q[2]));
+}
+
+/* A solid ring, or disc, that turns about the normal: on a surface (kind 0), in a pipe that fits
+ * (1), round a pin that fits (2), on a wall (3), or in nothing (4). What it keeps of its
+ * spin. */
+static double contact_spin(int integrator, contact_frame *f, int kind, gs4_wall contact)
+{
+    const gs4_material m = contact_material();
+    const double w = 4, time = 0.15, inner = kind == 2 ? 0.15 : 0, outer = 0.35;
+    gs4_sim_desc d = contact_desc(integrator, kind == 3 ? contact : GS4_WALL_SLIP);
+    gs4_sim *sim;
+    gs4_collider c;
+    gs4_real xyz[3 * 8192];
+    gs4_fill fill = scene_fill(at(0, 0, 0));
+    gs4_view x;
+    gs4_edit v;
+    double L[2] = { 0, 0 };
+    int i, k, n = 0, pass;
+    if (kind == 0 || kind == 3) d.gravity = contact_vector(f, 0, -10, 0);
+    sim = physics_create(&d, &m);
+    memset(&c, 0, sizeof c);
+    c.contact = contact;
+    if (kind == 0) contact_body(sim, f, CONTACT_PLANE, 1, contact, 0);
+    if (kind == 1) c.shape = gs4_sdf(contact_hole, f, at(-2, -2, -2), at(4, 4, 4));
+    if (kind == 2)
+        c.shape =
+            gs4_cylinder(contact_point(f, 0, -2, 0), contact_point(f, 0, 2, 0), (gs4_real)inner);
+    if (kind == 1 || kind == 2) CHECK_RESULT(sim, gs4_add_collider(sim, &c), 0);
+    for (i = 0; i < 14 * 14 * 6; i++) {
+        const double a = 0.05 * (i % 14 - 6.5), b = 0.05 * (i / 14 % 14 - 6.5),
+                     r = sqrt(a * a + b * b);
+        const gs4_vec3 p = contact_point(f, a, 0.05 * (i / 196 + 0.5), b);
+        if (r < inner || r > outer) continue;
+        xyz[3 * n] = p.x;
+        xyz[3 * n + 1] = p.y;
+        xyz[3 * n++ + 2] = p.z;
+    }
+    CHECK(gs4_add_points(sim, xyz, n, (gs4_real)(0.05 * 0.05 * 0.05), &fill) == n);
+    for (pass = 0; pass < 2; pass++) {
+        x = gs4_particles(sim, GS4_FIELD_POSITION);
+        v = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
+        for (i = 0; i < n; i++) {
+            double r[3], u[3], q[3], p[3];
+            for (k = 0; k < 3; k++)
+                r[k] = (double)x.data[(size_t)i * (size_t)x.stride + (size_t)k] - f->at[k];
+            contact_inward(f, r, q);
+            if (!pass) {
+                const gs4_vec3 to = contact_vector(f, w * q[2], 0, -w * q[0]);
+                v.data[(size_t)i * (size_t)v.stride] = to.x;
+                v.data[(size_t)i * (size_t)v.stride + 1] = to.y;
+                v.data[(size_t)i * (size_t)v.stride + 2] = to.z;
+            }
+            for (k = 0; k < 3; k++) u[k] = (double)v.data[(size_t)i * (size_t)v.stride + (size_t)k];
+            contact_inward(f, u, p);
+            L[pass] += q[2] * p[0] - q[0] * p[2];
+        }
+        if (!pass) CHECK(physics_run(sim, gs4_get_stats(sim).time + time) == 0);
+    }
+    gs4_destroy(sim);
+    return L[1] / L[0];
+}
+
+static void test_contact_spins(void)
+{
+    int n, i;
+    contact_seed = 8;
+    for (i = 0; i < 2; i++) {
+        contact_frame f = contact_face(2, 0, 0.45);
+        const double alone = contact_spin(i, &f, 4, GS4_WALL_SLIP);
+        for (n = 0; n < 8; n++) {
+            const int kind = n % 4;
+            const gs4_wall contact = (n + n / 4) % 2 ? GS4_WALL_SLIP : GS4_WALL_SEPARATE;
+            double kept;
+            f = kind != 3 && n > 3 ? contact_askew(0.15)
+                                   : contact_face((n + 3 * i) % 6, 0, kind == 3 ? 0 : 0.45);
+            kept = contact_spin(i, &f, kind, contact);
+            if (test_filter[0])
+                printf("spins, integrator %d, kind %d, contact %d: %.6f, alone %.6f\n", i, kind,
+                       (int)contact, kept, alone);
+            CHECK_CLOSE(kept, alone, i ? 0.02 : 0.004);
+        }
+    }
+}
+
+/* --- nothing goes through --------------------------------------------------------------------- */
+
+/* A ball of liquid or a solid is thrown at a slab that is 1.2 cells thick, as fast as steps may
+ * be; how many particles are behind its middle, or out of the domain, afterwards. */
+static int contact_thrown(int integrator, const contact_frame *f, int shape, gs4_wall contact,
+                          int solid)
+{
+    const gs4_material liquid = scene_liquid(1000, 1, 10), rubber = contact_material();
+    gs4_sim_desc d = contact_desc(integrator, contact);
+    const double speed = 5 + 5 * fabs(contact_random()), side = 3 * contact_random(),
+                 low[3] = { -0.15, 0.05, -0.15 }, high[3] = { 0.15, 0.35, 0.15 };
+    const double deep = shape == CONTACT_PLANE ? 1 : 1.2 * CONTACT_H;
+    gs4_sim *sim = physics_create(&d, solid ? &rubber : &liquid);
+    gs4_view x;
+    int i, n, behind = 0;
+    double start;
+    if (shape >= 0) contact_body(sim, f, shape, deep, contact, 0);
+    contact_fill(sim, f, low, high, contact_vector(f, side, -speed, side / 2));
+    start = gs4_get_stats(sim).time;
+    for (n = 0; n < 3; n++) {
+        CHECK(physics_run(sim, start + (n + 1) * 0.4 / speed) == 0);
+        x = gs4_particles(sim, GS4_FIELD_POSITION);
+        for (i = 0; i < x.count; i++) {
+            double r[3], q[3];
+            int c, out = 0;
+            for (c = 0; c < 3; c++) {
+                r[c] = (double)x.data[(size_t)i * (size_t)x.stride + (size_t)c];
+                out |= r[c] < 0 || r[c] > CONTACT_SIDE;
+                r[c] -= f->at[c];
+            }
+            contact_inward(f, r, q);
+            behind += out || (shape >= 0 && q[1] < -0.5 * CONTACT_H);
+        }
+    }
+    CHECK(x.count == 6 * 6 * 6);
+    gs4_destroy(sim);
+    return behind;
+}
+
+static void test_contact_holds_out(void)
+{
+    const int cases = test_slow ? 300 : 30;
+    int n, w;
+    contact_seed = 12;
+    for (n = 0; n < cases; n++) {
+        const contact_frame f = contact_askew(0.1);
+        const int behind = contact_thrown(n % 2, &f, n / 2 % CONTACT_SHAPES,
+                                          (gs4_wall)((n / 10 + n) % 3), n / 5 % 2);
+        if (behind)
+            printf("case %d, integrator %d, shape %d, contact %d: %d behind\n", n, n % 2,
+                   n / 2 % CONTACT_SHAPES, (n / 10 + n) % 3, behind);
+        CHECK(behind == 0);
+    }
+    for (w = 0; w < 6; w++) {
+        const contact_frame f = contact_face(w, w % 2, 0);
+        CHECK(contact_thrown(w % 2, &f, -1, (gs4_wall)(w % 3), w / 3) == 0);
+    }
+}
+
+/* --- a piston --------------------------------------------------------------------------------- */
+
+/* A piston closes a channel full of liquid at speed V: the liquid is compressed by as much as the
+ * channel is shorter, none gets behind the piston, and flows with V at the piston and 0 at the
+ * end, V/2 on the whole. A sticky one is where its surface is, within 0.01 cells; nodes inside one
+ * that slips are first held some 0.2 cells behind it. */
+static void contact_piston(int integrator, int w, gs4_wall contact)
+{
+    const contact_frame f = contact_face(w, 0, 0.3);
+    const double V = 0.2, length = CONTACT_SIDE - 0.3, time = 0.35;
+    const int sticky = contact == GS4_WALL_STICK;
+    gs4_sim_desc d = contact_desc(integrator, GS4_WALL_SLIP);
+    const gs4_material m = scene_liquid(1000, 200, 10);
+    const double low[3] = { -0.2, 0, -0.2 }, high[3] = { 0.2, length, 0.2 };
+    double v[3], J = 0, off = 0, behind = 1;
+    contact_frame g = f;
+    gs4_sim *sim;
+    gs4_view x;
+    int i, c, id;
+    for (c = 0; c < 3; c++) {
+        if (c == w / 2) continue;
+        d.cells[c] = 4;
+        g.at[c] = 0.2;
+    }
+    sim = physics_create(&d, &m);
+    id = contact_body(sim, &g, CONTACT_BOX, 1, contact, 0);
+    CHECK_RESULT(sim, gs4_move_collider(sim, id, contact_vector(&g, 0, V, 0), at(0, 0, 0)), GS4_OK);
+    contact_fill(sim, &g, low, high, at(0, 0, 0));
+    CHECK(physics_run(sim, time) == 0);
+    contact_mean(sim, &g, v);
+    x = gs4_particles(sim, GS4_FIELD_VOLUME_RATIO);
+    for (i = 0; i < x.count; i++) J += (double)x.data[(size_t)i * (size_t)x.stride] / x.count;
+    for (i = 0; i < x.count; i++)
+        off = fmax(off, fabs((double)x.data[(size_t)i * (size_t)x.stride] - J));
+    x = gs4_particles(sim, GS4_FIELD_POSITION);
+    for (i = 0; i < x.count; i++) {
+        double r[3], q[3];
+        for (c = 0; c < 3; c++)
+            r[c] = (double)x.data[(size_t)i * (size_t)x.stride + (size_t)c] - g.at[c];
+        contact_inward(&g, r, q);
+        behind = fmin(behind, q[1] - V * time);
+    }
+    if (test_filter[0])
+        printf("piston, integrator %d, wall %d, contact %d: J %.4f, expected %.4f, within %.4f, "
+               "flows %.4f V, nearest %+.3f cells\n",
+               integrator, w, (int)contact, J, 1 - V * time / length, off, v[1] / V,
+               behind / CONTACT_H);
+    CHECK_CLOSE((length - V * time - J * length) / CONTACT_H, 0, sticky ? 0.01 : 0.25);
+    CHECK_CLOSE(off, 0, sticky ? 0.01 : 0.09);
+    CHECK_CLOSE(v[1] / V, 0.5, sticky ? 0.06 : 0.12);
+    CHECK_CLOSE(behind / CONTACT_H, sticky ? 0.25 : 0.03, 0.05);
+    gs4_destroy(sim);
+}
+
+static void test_contact_piston(void)
+{
+    int n;
+    for (n = 0; n < 12; n++) contact_piston(n % 2, n / 2, (gs4_wall)((n + n / 6) % 3));
+}
+
+static void run_contact(void)
+{
+    RUN(test_contact_friction);
+    RUN(test_contact_slip);
+    RUN(test_contact_friction_holds);
+    RUN(test_contact_channel);
+    RUN(test_contact_sticky_wall);
+    RUN(test_contact_leaves);
+    RUN(test_contact_carries);
+    RUN(test_contact_rides);
+    RUN(test_contact_sweeps);
+    RUN(test_contact_spins);
+    RUN(test_contact_holds_out);
+    RUN(test_contact_piston);
+}

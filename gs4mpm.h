@@ -202,7 +202,8 @@
  *                                                                           even along the wall
  * What particles scatter to mirror nodes is folded back to the inner ones by the same parity. So
  * walls are second order in space. A separating wall acts as slip while material moves into it or
- * presses on it, and is not there otherwise. Behind a periodic wall a field goes on a period away.
+ * presses on it, and is not there otherwise, nor where material leaves with ten times the impulse
+ * of its push in a step. Behind a periodic wall a field goes on a period away.
  *
  * COLLIDERS. Sticky ones act by image particles, second order in space where particles fill the
  * space up to the surface. A filling that leaves out half a row puts the wall up to 0.8 cells

@@ -1422,9 +1422,20 @@ static void gs4i_shape_bounds(const gs4_shape *s, gs4_vec3 *low, gs4_vec3 *high)
 #define GS4I_GRAPHS 24
 /* of the geometric mean of the strongest links of both ends: less does not join them */
 #define GS4I_STRONG 0.36f
-#define GS4I_DENSE 200   /* unknowns that are solved by Cholesky */
-#define GS4I_IS_LIQUID 2 /* bits of a kind: unknown; lets flow through */
+#define GS4I_DENSE 200          /* unknowns that are solved by Cholesky */
+#define GS4I_NO_UNKNOWN (-8.0f) /* as diagonal: a cell without unknown */
+#define GS4I_IS_LIQUID 2        /* bits of a kind: unknown; lets flow through */
 #define GS4I_IS_OPEN 1
+
+/* The matrix in cells l of one colour in rows with t, see above:
+ *     (A v)_l = (diagonal + diagonal_low)_l v_l
+ *               + sum over f of face[f]_l (v_l - around_{l + beside[f]}),  f = -x +x -y +y -z +z,
+ * where `around` is v of the other colour. */
+typedef struct gs4i_stencil {
+    int uniform; /* all faces are 1 */
+    ptrdiff_t beside[6];
+    const float *face[6], *face_low[6], *diagonal, *diagonal_low /* NULL: 0 */;
+} gs4i_stencil;
 
 /* One level on a grid. Rows, and planes at both ends, are guarded by zeros: row j of plane k
  * begins at gs4i_row_of(g, j, k). */
@@ -1438,9 +1449,8 @@ typedef struct gs4i_level {
     float *w[3][2], *w_low[3][2];
     /* h^2 d; level 1: with the faces to the air; level 0 where w: -1 without unknown */
     float *diagonal[2], *diagonal_low[2];
-    /* where w is NULL: faces that conduct; 0 where there is no unknown */
-    float *degree[2];
-    double *r[2]; /* residual */
+    double *r[2];               /* residual */
+    gs4i_stencil stencil[2][2]; /* of each colour, t = 0 and 1 */
 } gs4i_level;
 
 typedef struct gs4i_graph {
@@ -1487,7 +1497,6 @@ typedef struct gs4i_solver {
     double alpha;
     float beta;
     double *sums, *given; /* one and three per plane, added in order */
-    float *zeros;         /* a row */
     gs4i_scratch grid, kinds, planes, cells, labels, square;
     int shape[5]; /* of `grid` */
     const char *fault, *accepted;
@@ -1499,26 +1508,119 @@ GS4I_INLINE size_t gs4i_row_of(const gs4i_level *g, int j, int k)
     return ((size_t)(k + 1) * (size_t)(g->n[1] + 1) + (size_t)(j + 1)) * g->stride;
 }
 
-/* --- kernels: strips of one colour ------------------------------------------------------------ */
+/* --- kernels: the cells of a row that have one colour ----------------------------------------- */
 
-#define GS4I_NEIGHBOURS(type)                                             \
-    const type *GS4I_RESTRICT left, const type *GS4I_RESTRICT right,      \
-        const type *GS4I_RESTRICT south, const type *GS4I_RESTRICT north, \
-        const type *GS4I_RESTRICT below, const type *GS4I_RESTRICT above
-#define GS4I_AROUND(v, at, t, g)                                                              \
-    (v) + (at) + (t)-1, (v) + (at) + (t), (v) + (at) - (g)->stride, (v) + (at) + (g)->stride, \
-        (v) + (at) - (g)->plane, (v) + (at) + (g)->plane
-/* faces of the cell itself towards +, of its neighbours towards it */
-#define GS4I_FACES                                                                               \
-    const float *GS4I_RESTRICT wl, const float *GS4I_RESTRICT wr, const float *GS4I_RESTRICT ws, \
-        const float *GS4I_RESTRICT wn, const float *GS4I_RESTRICT wb,                            \
-        const float *GS4I_RESTRICT wa
-#define GS4I_FACES_OF(w, c, at, t, g)                                                 \
-    (w)[0][!(c)] + (at) + (t)-1, (w)[0][c] + (at), (w)[1][!(c)] + (at) - (g)->stride, \
-        (w)[1][c] + (at), (w)[2][!(c)] + (at) - (g)->plane, (w)[2][c] + (at)
-#define GS4I_STRIPS(m, l, n)              \
-    for (m = 0; m < (n); m += GS4I_STRIP) \
-        for (l = m; l < m + GS4I_STRIP; l++)
+/* A row of a level where its liquid is: cells `at` to `at + n` of both colours, whole strips. */
+typedef struct gs4i_span {
+    int level, j, k, n;
+    size_t at;
+} gs4i_span;
+
+GS4I_INLINE const gs4i_stencil *gs4i_stencil_of(const gs4i_level *g, const gs4i_span *row, int c)
+{
+    return &g->stencil[c][(c + row->j + row->k) & 1];
+}
+
+/* Of cell l with value c and its faces f, with w the face and v_j = around_{l + beside[f]}: w v_j,
+ * w (c - v_j), the same in double of v in float, and of v in double */
+GS4I_INLINE float gs4i_neighbour(const gs4i_stencil *q, const float *around, int f, size_t l,
+                                 int uniform)
+{
+    const float v = (around + q->beside[f])[l];
+    return uniform ? v : q->face[f][l] * v;
+}
+
+GS4I_INLINE float gs4i_flux(const gs4i_stencil *q, float c, const float *around, int f, size_t l,
+                            int uniform)
+{
+    const float difference = c - (around + q->beside[f])[l];
+    return uniform ? difference : q->face[f][l] * difference;
+}
+
+/* w in double: two floats in the double build */
+GS4I_INLINE double gs4i_exact_face(const gs4i_stencil *q, int f, size_t l)
+{
+#ifdef GS4_DOUBLE
+    return (double)q->face[f][l] + (double)q->face_low[f][l];
+#else
+    return (double)q->face[f][l];
+#endif
+}
+
+/* uniform: -v_j, which takes half the time in double; the six c are added to the sum */
+GS4I_INLINE double gs4i_exact_flux(const gs4i_stencil *q, double c, const float *around, int f,
+                                   size_t l, int uniform)
+{
+    const double v = (double)(around + q->beside[f])[l];
+    return uniform ? -v : gs4i_exact_face(q, f, l) * (c - v);
+}
+
+GS4I_INLINE double gs4i_exact_flux_of_double(const gs4i_stencil *q, double c, const double *around,
+                                             int f, size_t l, int uniform)
+{
+    const double v = (around + q->beside[f])[l];
+    return uniform ? -v : gs4i_exact_face(q, f, l) * (c - v);
+}
+
+/* Their sums over the faces of a cell, uniform or not. */
+GS4I_INLINE float gs4i_sum_neighbours(const gs4i_stencil *q, const float *around, size_t l,
+                                      int uniform)
+{
+    return (gs4i_neighbour(q, around, 0, l, uniform) + gs4i_neighbour(q, around, 1, l, uniform))
+           + (gs4i_neighbour(q, around, 2, l, uniform) + gs4i_neighbour(q, around, 3, l, uniform))
+           + (gs4i_neighbour(q, around, 4, l, uniform) + gs4i_neighbour(q, around, 5, l, uniform));
+}
+
+GS4I_INLINE float gs4i_sum_fluxes(const gs4i_stencil *q, float c, const float *around, size_t l,
+                                  int uniform)
+{
+    return (gs4i_flux(q, c, around, 0, l, uniform) + gs4i_flux(q, c, around, 1, l, uniform))
+           + (gs4i_flux(q, c, around, 2, l, uniform) + gs4i_flux(q, c, around, 3, l, uniform))
+           + (gs4i_flux(q, c, around, 4, l, uniform) + gs4i_flux(q, c, around, 5, l, uniform));
+}
+
+/* A v in float, and r - A v; 0 where there is no unknown. */
+GS4I_INLINE float gs4i_float_product(const gs4i_stencil *q, float c, const float *around, size_t l,
+                                     int uniform)
+{
+    return q->diagonal[l] * c + gs4i_sum_fluxes(q, c, around, l, uniform);
+}
+
+GS4I_INLINE float gs4i_float_residual(const gs4i_stencil *q, float r, float c, const float *around,
+                                      size_t l, int uniform)
+{
+    return (float)(q->diagonal[l] > GS4I_NO_UNKNOWN)
+           * (r - gs4i_float_product(q, c, around, l, uniform));
+}
+
+/* A v in double, of v in float and in double; `low` is what float leaves of the diagonal. */
+GS4I_INLINE double gs4i_product(const gs4i_stencil *q, const float *v, const float *around,
+                                double low, size_t l, int uniform)
+{
+    const double c = (double)v[l];
+    const double flux = (gs4i_exact_flux(q, c, around, 0, l, uniform)
+                         + gs4i_exact_flux(q, c, around, 1, l, uniform))
+                        + (gs4i_exact_flux(q, c, around, 2, l, uniform)
+                           + gs4i_exact_flux(q, c, around, 3, l, uniform))
+                        + (gs4i_exact_flux(q, c, around, 4, l, uniform)
+                           + gs4i_exact_flux(q, c, around, 5, l, uniform));
+    return (double)(q->diagonal[l] > GS4I_NO_UNKNOWN)
+           * (((double)q->diagonal[l] + low + (uniform ? 6.0 : 0.0)) * c + flux);
+}
+
+GS4I_INLINE double gs4i_product_of_double(const gs4i_stencil *q, const double *v,
+                                          const double *around, double low, size_t l, int uniform)
+{
+    const double c = v[l];
+    const double flux = (gs4i_exact_flux_of_double(q, c, around, 0, l, uniform)
+                         + gs4i_exact_flux_of_double(q, c, around, 1, l, uniform))
+                        + (gs4i_exact_flux_of_double(q, c, around, 2, l, uniform)
+                           + gs4i_exact_flux_of_double(q, c, around, 3, l, uniform))
+                        + (gs4i_exact_flux_of_double(q, c, around, 4, l, uniform)
+                           + gs4i_exact_flux_of_double(q, c, around, 5, l, uniform));
+    return (double)(q->diagonal[l] > GS4I_NO_UNKNOWN)
+           * (((double)q->diagonal[l] + low + (uniform ? 6.0 : 0.0)) * c + flux);
+}
 
 static double gs4i_sum_lanes(const double *v)
 {
@@ -1528,187 +1630,115 @@ static double gs4i_sum_lanes(const double *v)
     return ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
 }
 
+/* z = r / a_ii: a sweep where all neighbours are 0, and Jacobi's method */
 static void gs4i_scale_row(float *GS4I_RESTRICT z, const double *GS4I_RESTRICT r,
                            const float *GS4I_RESTRICT inverse, int n)
 {
     int m, l;
-    GS4I_STRIPS(m, l, n) z[l] = (float)r[l] * inverse[l];
+    for (m = 0; m < n; m += GS4I_STRIP)
+        for (l = m; l < m + GS4I_STRIP; l++) z[l] = (float)r[l] * inverse[l];
 }
 
-static void gs4i_smooth_uniform(float *GS4I_RESTRICT z, GS4I_NEIGHBOURS(float),
-                                const double *GS4I_RESTRICT r, const float *GS4I_RESTRICT inverse,
-                                int n)
+/* A Gauss-Seidel sweep of one colour: z = (r + sum of w z_j) / a_ii */
+static void gs4i_smooth_row(float *GS4I_RESTRICT z, const float *GS4I_RESTRICT around,
+                            const double *GS4I_RESTRICT r, const float *GS4I_RESTRICT inverse,
+                            const gs4i_stencil *q, const gs4i_span *row)
 {
-    int m, l;
-    GS4I_STRIPS(m, l, n)
-        z[l] =
-            ((float)r[l] + ((left[l] + right[l]) + (south[l] + north[l]) + (below[l] + above[l])))
-            * inverse[l];
-}
-
-static void gs4i_smooth_weighted(float *GS4I_RESTRICT z, GS4I_NEIGHBOURS(float), GS4I_FACES,
-                                 const double *GS4I_RESTRICT r, const float *GS4I_RESTRICT inverse,
-                                 int n)
-{
-    int m, l;
-    GS4I_STRIPS(m, l, n)
-        z[l] = ((float)r[l]
-                + ((wl[l] * left[l] + wr[l] * right[l]) + (ws[l] * south[l] + wn[l] * north[l])
-                   + (wb[l] * below[l] + wa[l] * above[l])))
-               * inverse[l];
-}
-
-static void gs4i_red_residual_uniform(float *GS4I_RESTRICT out, const float *GS4I_RESTRICT z,
-                                      GS4I_NEIGHBOURS(float), const double *GS4I_RESTRICT r,
-                                      const float *GS4I_RESTRICT degree,
-                                      const float *GS4I_RESTRICT diagonal, int n)
-{
-    int m, l;
-    GS4I_STRIPS(m, l, n) {
-        const float around = (left[l] + right[l]) + (south[l] + north[l]) + (below[l] + above[l]);
-        out[l] =
-            (float)(degree[l] > 0) * (((float)r[l] - (degree[l] + diagonal[l]) * z[l]) + around);
+    const size_t end = row->at + (size_t)row->n;
+    size_t m, l;
+    for (m = row->at; m < end; m += GS4I_STRIP) {
+        if (q->uniform)
+            for (l = 0; l < GS4I_STRIP; l++)
+                z[m + l] =
+                    ((float)r[m + l] + gs4i_sum_neighbours(q, around, m + l, 1)) * inverse[m + l];
+        else
+            for (l = 0; l < GS4I_STRIP; l++)
+                z[m + l] =
+                    ((float)r[m + l] + gs4i_sum_neighbours(q, around, m + l, 0)) * inverse[m + l];
     }
 }
 
-static void gs4i_red_residual_weighted(float *GS4I_RESTRICT out, const float *GS4I_RESTRICT z,
-                                       GS4I_NEIGHBOURS(float), GS4I_FACES,
-                                       const double *GS4I_RESTRICT r,
-                                       const float *GS4I_RESTRICT diagonal, int n)
+/* r - A z in float, from the beginning of `out` on; 0 where there is no unknown. */
+static void gs4i_float_residual_row(float *GS4I_RESTRICT out, const float *GS4I_RESTRICT z,
+                                    const float *GS4I_RESTRICT around,
+                                    const double *GS4I_RESTRICT r, const gs4i_stencil *q,
+                                    const gs4i_span *row)
 {
-    int m, l;
-    GS4I_STRIPS(m, l, n) {
-        const float c = z[l], flow = (wl[l] * (c - left[l]) + wr[l] * (c - right[l]))
-                                     + (ws[l] * (c - south[l]) + wn[l] * (c - north[l]))
-                                     + (wb[l] * (c - below[l]) + wa[l] * (c - above[l]));
-        out[l] = (float)(diagonal[l] >= 0) * ((float)r[l] - (diagonal[l] * c + flow));
+    const size_t end = row->at + (size_t)row->n;
+    size_t m, l;
+    for (m = row->at; m < end; m += GS4I_STRIP, out += GS4I_STRIP) {
+        if (q->uniform)
+            for (l = 0; l < GS4I_STRIP; l++)
+                out[l] = gs4i_float_residual(q, (float)r[m + l], z[m + l], around, m + l, 1);
+        else
+            for (l = 0; l < GS4I_STRIP; l++)
+                out[l] = gs4i_float_residual(q, (float)r[m + l], z[m + l], around, m + l, 0);
     }
 }
 
-/* The matrix times v in double. In the double build faces are two floats. Without a diagonal
- * `has_diagonal` is 0 where this is inlined. */
-#define GS4I_TIMES_UNIFORM(q, v)                                                              \
-    const double c = (double)(v)[l], around = ((double)left[l] + (double)right[l])            \
-                                              + ((double)south[l] + (double)north[l])         \
-                                              + ((double)below[l] + (double)above[l]);        \
-    const double q = (has_diagonal ? ((double)diagonal[l] + (double)diagonal_low[l]) * c : 0) \
-                     + (double)(degree[l] > 0) * ((double)degree[l] * c - around)
-#ifdef GS4_DOUBLE
-#define GS4I_LOW_FACES                                                                             \
-    , const float *GS4I_RESTRICT ll, const float *GS4I_RESTRICT lr, const float *GS4I_RESTRICT ls, \
-        const float *GS4I_RESTRICT ln, const float *GS4I_RESTRICT lb,                              \
-        const float *GS4I_RESTRICT la
-#define GS4I_LOW_FACES_OF(w, c, at, t, g) , GS4I_FACES_OF(w, c, at, t, g)
-#define GS4I_FACE(w, low) ((double)(w) + (double)(low))
-#else
-#define GS4I_LOW_FACES
-#define GS4I_LOW_FACES_OF(w, c, at, t, g)
-#define GS4I_FACE(w, low) ((double)(w))
-#endif
-#define GS4I_TIMES_WEIGHTED(q, v)                                               \
-    const double c = (double)(v)[l],                                            \
-                 flow = (GS4I_FACE(wl[l], ll[l]) * (c - (double)left[l])        \
-                         + GS4I_FACE(wr[l], lr[l]) * (c - (double)right[l]))    \
-                        + (GS4I_FACE(ws[l], ls[l]) * (c - (double)south[l])     \
-                           + GS4I_FACE(wn[l], ln[l]) * (c - (double)north[l]))  \
-                        + (GS4I_FACE(wb[l], lb[l]) * (c - (double)below[l])     \
-                           + GS4I_FACE(wa[l], la[l]) * (c - (double)above[l])); \
-    const double q =                                                            \
-        (double)(diagonal[l] >= 0) * (((double)diagonal[l] + (double)diagonal_low[l]) * c + flow)
-#define GS4I_UNIFORM_MATRIX                                                 \
-    const float *GS4I_RESTRICT degree, const float *GS4I_RESTRICT diagonal, \
-        const float *GS4I_RESTRICT diagonal_low, const int has_diagonal
-#define GS4I_WEIGHTED_MATRIX                                        \
-    GS4I_FACES GS4I_LOW_FACES, const float *GS4I_RESTRICT diagonal, \
-        const float *GS4I_RESTRICT diagonal_low
-
-/* p.Ap, from differences in float: it sets the length of a step alone. Faces that do not conduct
- * have p = 0 behind them. */
-static double gs4i_p_dot_ap_uniform(const float *GS4I_RESTRICT p, GS4I_NEIGHBOURS(float),
-                                    const float *GS4I_RESTRICT degree,
-                                    const float *GS4I_RESTRICT diagonal, int n)
+/* p.Ap from differences in float: it sets the length of a step alone. */
+static double gs4i_p_dot_ap_row(const float *GS4I_RESTRICT p, const float *GS4I_RESTRICT around,
+                                const gs4i_stencil *q, const gs4i_span *row)
 {
+    const size_t end = row->at + (size_t)row->n;
     double sum[GS4I_STRIP] = { 0 };
-    int m, l;
-    GS4I_STRIPS(m, l, n) {
-        const float c = p[l], flow = ((c - left[l]) + (c - right[l]))
-                                     + ((c - south[l]) + (c - north[l]))
-                                     + ((c - below[l]) + (c - above[l]));
-        sum[l - m] += (double)c * (double)(flow + (diagonal[l] - (6 - degree[l])) * c);
+    size_t m, l;
+    for (m = row->at; m < end; m += GS4I_STRIP) {
+        if (q->uniform)
+            for (l = 0; l < GS4I_STRIP; l++)
+                sum[l] +=
+                    (double)p[m + l] * (double)gs4i_float_product(q, p[m + l], around, m + l, 1);
+        else
+            for (l = 0; l < GS4I_STRIP; l++)
+                sum[l] +=
+                    (double)p[m + l] * (double)gs4i_float_product(q, p[m + l], around, m + l, 0);
     }
     return gs4i_sum_lanes(sum);
 }
 
-static double gs4i_p_dot_ap_weighted(const float *GS4I_RESTRICT p, GS4I_NEIGHBOURS(float),
-                                     GS4I_FACES, const float *GS4I_RESTRICT diagonal, int n)
+static const float gs4i_zeros[GS4I_STRIP] = { 0 };
+
+/* x += alpha p, r -= alpha A p; gives r.r */
+static double gs4i_update_row(double *GS4I_RESTRICT x, double *GS4I_RESTRICT r, double alpha,
+                              const float *GS4I_RESTRICT p, const float *GS4I_RESTRICT around,
+                              const gs4i_stencil *q, const gs4i_span *row)
 {
+    const size_t end = row->at + (size_t)row->n;
     double sum[GS4I_STRIP] = { 0 };
-    int m, l;
-    GS4I_STRIPS(m, l, n) {
-        const float c = p[l], flow = (wl[l] * (c - left[l]) + wr[l] * (c - right[l]))
-                                     + (ws[l] * (c - south[l]) + wn[l] * (c - north[l]))
-                                     + (wb[l] * (c - below[l]) + wa[l] * (c - above[l]));
-        sum[l - m] += (double)c * (double)(diagonal[l] * c + flow);
+    size_t m, l;
+    for (m = row->at; m < end; m += GS4I_STRIP) {
+        const float *low = q->diagonal_low ? q->diagonal_low + m : gs4i_zeros;
+        if (q->uniform)
+            for (l = 0; l < GS4I_STRIP; l++)
+                r[m + l] -= alpha * gs4i_product(q, p, around, (double)low[l], m + l, 1);
+        else
+            for (l = 0; l < GS4I_STRIP; l++)
+                r[m + l] -= alpha * gs4i_product(q, p, around, (double)low[l], m + l, 0);
+        for (l = 0; l < GS4I_STRIP; l++) {
+            x[m + l] += alpha * (double)p[m + l];
+            sum[l] += r[m + l] * r[m + l];
+        }
     }
     return gs4i_sum_lanes(sum);
 }
 
-/* x += alpha p, r -= alpha Ap; gives r.r */
-GS4I_INLINE double gs4i_update_uniform(double *GS4I_RESTRICT x, double *GS4I_RESTRICT r,
-                                       double alpha, const float *GS4I_RESTRICT p,
-                                       GS4I_NEIGHBOURS(float), GS4I_UNIFORM_MATRIX, int n)
+/* r -= A x; gives r.r */
+static double gs4i_residual_row(double *GS4I_RESTRICT r, const double *GS4I_RESTRICT x,
+                                const double *GS4I_RESTRICT around, const gs4i_stencil *q,
+                                const gs4i_span *row)
 {
+    const size_t end = row->at + (size_t)row->n;
     double sum[GS4I_STRIP] = { 0 };
-    int m, l;
-    GS4I_STRIPS(m, l, n) {
-        GS4I_TIMES_UNIFORM(q, p);
-        const double rest = r[l] - alpha * q;
-        x[l] += alpha * c;
-        r[l] = rest;
-        sum[l - m] += rest * rest;
-    }
-    return gs4i_sum_lanes(sum);
-}
-
-static double gs4i_update_weighted(double *GS4I_RESTRICT x, double *GS4I_RESTRICT r, double alpha,
-                                   const float *GS4I_RESTRICT p, GS4I_NEIGHBOURS(float),
-                                   GS4I_WEIGHTED_MATRIX, int n)
-{
-    double sum[GS4I_STRIP] = { 0 };
-    int m, l;
-    GS4I_STRIPS(m, l, n) {
-        GS4I_TIMES_WEIGHTED(q, p);
-        const double rest = r[l] - alpha * q;
-        x[l] += alpha * c;
-        r[l] = rest;
-        sum[l - m] += rest * rest;
-    }
-    return gs4i_sum_lanes(sum);
-}
-
-/* r -= Ax; gives r.r */
-static double gs4i_residual_uniform(double *GS4I_RESTRICT r, const double *GS4I_RESTRICT x,
-                                    GS4I_NEIGHBOURS(double), GS4I_UNIFORM_MATRIX, int n)
-{
-    double sum[GS4I_STRIP] = { 0 };
-    int m, l;
-    GS4I_STRIPS(m, l, n) {
-        GS4I_TIMES_UNIFORM(q, x);
-        r[l] -= q;
-        sum[l - m] += r[l] * r[l];
-    }
-    return gs4i_sum_lanes(sum);
-}
-
-static double gs4i_residual_weighted(double *GS4I_RESTRICT r, const double *GS4I_RESTRICT x,
-                                     GS4I_NEIGHBOURS(double), GS4I_WEIGHTED_MATRIX, int n)
-{
-    double sum[GS4I_STRIP] = { 0 };
-    int m, l;
-    GS4I_STRIPS(m, l, n) {
-        GS4I_TIMES_WEIGHTED(q, x);
-        r[l] -= q;
-        sum[l - m] += r[l] * r[l];
+    size_t m, l;
+    for (m = row->at; m < end; m += GS4I_STRIP) {
+        const float *low = q->diagonal_low ? q->diagonal_low + m : gs4i_zeros;
+        if (q->uniform)
+            for (l = 0; l < GS4I_STRIP; l++)
+                r[m + l] -= gs4i_product_of_double(q, x, around, (double)low[l], m + l, 1);
+        else
+            for (l = 0; l < GS4I_STRIP; l++)
+                r[m + l] -= gs4i_product_of_double(q, x, around, (double)low[l], m + l, 0);
+        for (l = 0; l < GS4I_STRIP; l++) sum[l] += r[m + l] * r[m + l];
     }
     return gs4i_sum_lanes(sum);
 }
@@ -1717,7 +1747,8 @@ static double gs4i_dot_row(const double *GS4I_RESTRICT r, const float *GS4I_REST
 {
     double sum[GS4I_STRIP] = { 0 };
     int m, l;
-    GS4I_STRIPS(m, l, n) sum[l - m] += r[l] * (double)z[l];
+    for (m = 0; m < n; m += GS4I_STRIP)
+        for (l = 0; l < GS4I_STRIP; l++) sum[l] += r[m + l] * (double)z[m + l];
     return gs4i_sum_lanes(sum);
 }
 
@@ -1725,7 +1756,8 @@ static double gs4i_square_row(const double *GS4I_RESTRICT r, int n)
 {
     double sum[GS4I_STRIP] = { 0 };
     int m, l;
-    GS4I_STRIPS(m, l, n) sum[l - m] += r[l] * r[l];
+    for (m = 0; m < n; m += GS4I_STRIP)
+        for (l = 0; l < GS4I_STRIP; l++) sum[l] += r[m + l] * r[m + l];
     return gs4i_sum_lanes(sum);
 }
 
@@ -1733,71 +1765,8 @@ static void gs4i_update_direction(float *GS4I_RESTRICT p, const float *GS4I_REST
                                   int n)
 {
     int m, l;
-    GS4I_STRIPS(m, l, n) p[l] = z[l] + beta * p[l];
-}
-
-/* --- passes: a plane of a level --------------------------------------------------------------- */
-
-/* What all passes know of a row: where its liquid is. */
-#define GS4I_EACH_ROW(g, k, j, at, n)                                                    \
-    for (j = 0; j < (g)->n[1]; j++)                                                      \
-        if (at = gs4i_row_of(g, j, k)                                                    \
-                 + (size_t)(g)->span[2 * ((size_t)(k) * (size_t)(g)->n[1] + (size_t)j)], \
-            n = (g)->span[2 * ((size_t)(k) * (size_t)(g)->n[1] + (size_t)j) + 1]         \
-                - (g)->span[2 * ((size_t)(k) * (size_t)(g)->n[1] + (size_t)j)],          \
-            n > 0)
-
-typedef void (*gs4i_pass_fn)(gs4i_solver *s, int level, int k);
-
-static void gs4i_pass_first_red(gs4i_solver *s, int level, int k)
-{
-    const gs4i_level *g = &s->level[level];
-    size_t at;
-    int j, n;
-    GS4I_EACH_ROW(g, k, j, at, n) gs4i_scale_row(g->z[0] + at, g->r[0] + at, g->inverse[0] + at, n);
-}
-
-static void gs4i_smooth(gs4i_solver *s, int level, int c, int k)
-{
-    const gs4i_level *g = &s->level[level];
-    size_t at;
-    int j, n;
-    GS4I_EACH_ROW(g, k, j, at, n) {
-        const int t = (c + j + k) & 1;
-        if (g->degree[0])
-            gs4i_smooth_uniform(g->z[c] + at, GS4I_AROUND(g->z[!c], at, t, g), g->r[c] + at,
-                                g->inverse[c] + at, n);
-        else
-            gs4i_smooth_weighted(g->z[c] + at, GS4I_AROUND(g->z[!c], at, t, g),
-                                 GS4I_FACES_OF(g->w, c, at, t, g), g->r[c] + at, g->inverse[c] + at,
-                                 n);
-    }
-}
-
-static void gs4i_pass_red(gs4i_solver *s, int level, int k) { gs4i_smooth(s, level, 0, k); }
-static void gs4i_pass_black(gs4i_solver *s, int level, int k) { gs4i_smooth(s, level, 1, k); }
-
-/* Of red cells; that of black ones is zero after their sweep. */
-static void gs4i_red_residual_row(const gs4i_solver *s, const gs4i_level *g, float *out, size_t at,
-                                  int j, int k, int n)
-{
-    const int t = (j + k) & 1;
-    if (g->degree[0])
-        gs4i_red_residual_uniform(out, g->z[0] + at, GS4I_AROUND(g->z[1], at, t, g), g->r[0] + at,
-                                  g->degree[0] + at,
-                                  g->diagonal[0] ? g->diagonal[0] + at : s->zeros, n);
-    else
-        gs4i_red_residual_weighted(out, g->z[0] + at, GS4I_AROUND(g->z[1], at, t, g),
-                                   GS4I_FACES_OF(g->w, 0, at, t, g), g->r[0] + at,
-                                   g->diagonal[0] + at, n);
-}
-
-static void gs4i_pass_red_residual(gs4i_solver *s, int level, int k)
-{
-    const gs4i_level *g = &s->level[level];
-    size_t at;
-    int j, n;
-    GS4I_EACH_ROW(g, k, j, at, n) gs4i_red_residual_row(s, g, s->red_residual + at, at, j, k, n);
+    for (m = 0; m < n; m += GS4I_STRIP)
+        for (l = m; l < m + GS4I_STRIP; l++) p[l] = z[l] + beta * p[l];
 }
 
 /* Adds cell m of a fine row to coarse cell m, in two colours. */
@@ -1808,33 +1777,6 @@ static void gs4i_add_parents(double *GS4I_RESTRICT even, double *GS4I_RESTRICT o
     for (m = 0; m < n / 2; m++) {
         even[m] += (double)fine[2 * m];
         odd[m] += (double)fine[2 * m + 1];
-    }
-}
-
-/* A plane of level 1 once both planes below are done. */
-static void gs4i_pass_restrict(gs4i_solver *s, int level, int k)
-{
-    const gs4i_level *g = &s->level[level], *h = &s->level[level + 1];
-    float out[16 * GS4I_STRIP];
-    const int above = k / 2;
-    int j, f, i, n;
-    if (!(k & 1) && k + 1 < g->n[2]) return;
-    for (j = 0; j < h->n[1]; j++) {
-        const size_t to = gs4i_row_of(h, j, above);
-        const int32_t *wide = h->span + 2 * ((size_t)above * (size_t)h->n[1] + (size_t)j);
-        const int even = (j + above) & 1;
-        memset(h->r[0] + to + wide[0], 0, (size_t)(wide[1] - wide[0]) * sizeof(double));
-        memset(h->r[1] + to + wide[0], 0, (size_t)(wide[1] - wide[0]) * sizeof(double));
-        for (f = 0; f < 4; f++) {
-            const int fj = 2 * j + (f & 1), fk = 2 * above + (f >> 1);
-            const int32_t *span = g->span + 2 * ((size_t)fk * (size_t)g->n[1] + (size_t)fj);
-            if (fj >= g->n[1] || fk >= g->n[2]) continue;
-            for (i = span[0]; i < span[1]; i += n) {
-                n = span[1] - i < 16 * GS4I_STRIP ? span[1] - i : 16 * GS4I_STRIP;
-                gs4i_red_residual_row(s, g, out, gs4i_row_of(g, fj, fk) + (size_t)i, fj, fk, n);
-                gs4i_add_parents(h->r[even] + to + i / 2, h->r[!even] + to + i / 2, out, n);
-            }
-        }
     }
 }
 
@@ -1849,145 +1791,145 @@ static void gs4i_add_children(float *GS4I_RESTRICT z, const float *GS4I_RESTRICT
     }
 }
 
-/* To red cells; black ones follow from them. */
-static void gs4i_pass_prolong(gs4i_solver *s, int level, int k)
+/* --- passes: what is done to a row, adding to `sum` where something is summed ----------------- */
+
+typedef void (*gs4i_pass_fn)(gs4i_solver *s, const gs4i_span *row, double *sum);
+
+/* The first red sweep: black z are 0. */
+static void gs4i_pass_first_red(gs4i_solver *s, const gs4i_span *row, double *sum)
 {
-    const gs4i_level *g = &s->level[level], *h = &s->level[level + 1];
-    size_t at;
-    int j, n;
-    GS4I_EACH_ROW(g, k, j, at, n) {
-        const int even = (j / 2 + k / 2) & 1;
-        const size_t from = gs4i_row_of(h, j / 2, k / 2) + (at - gs4i_row_of(g, j, k)) / 2;
-        gs4i_add_children(g->z[0] + at, g->inverse[0] + at, h->z[even] + from, h->z[!even] + from,
-                          n);
+    const gs4i_level *g = &s->level[row->level];
+    (void)sum;
+    gs4i_scale_row(g->z[0] + row->at, g->r[0] + row->at, g->inverse[0] + row->at, row->n);
+}
+
+static void gs4i_smooth(const gs4i_solver *s, const gs4i_span *row, int c)
+{
+    const gs4i_level *g = &s->level[row->level];
+    gs4i_smooth_row(g->z[c], g->z[!c], g->r[c], g->inverse[c], gs4i_stencil_of(g, row, c), row);
+}
+
+static void gs4i_pass_red(gs4i_solver *s, const gs4i_span *row, double *sum)
+{
+    (void)sum;
+    gs4i_smooth(s, row, 0);
+}
+
+static void gs4i_pass_black(gs4i_solver *s, const gs4i_span *row, double *sum)
+{
+    (void)sum;
+    gs4i_smooth(s, row, 1);
+}
+
+/* Of red cells; that of black ones is zero after their sweep. */
+static void gs4i_pass_red_residual(gs4i_solver *s, const gs4i_span *row, double *sum)
+{
+    const gs4i_level *g = &s->level[row->level];
+    (void)sum;
+    gs4i_float_residual_row(s->red_residual + row->at, g->z[0], g->z[1], g->r[0],
+                            gs4i_stencil_of(g, row, 0), row);
+}
+
+/* Red residuals of a row of level 0, added to their row of level 1; the first of its four rows,
+ * which may be empty, clears it. */
+static void gs4i_pass_restrict(gs4i_solver *s, const gs4i_span *row, double *sum)
+{
+    const gs4i_level *g = &s->level[0], *h = &s->level[1];
+    const size_t up = gs4i_row_of(h, row->j / 2, row->k / 2);
+    const int even = (row->j / 2 + row->k / 2) & 1;
+    float out[16 * GS4I_STRIP];
+    gs4i_span part = *row;
+    int c;
+    (void)sum;
+    if (!(row->j & 1) && !(row->k & 1))
+        for (c = 0; c < 2; c++) memset(h->r[c] + up, 0, (size_t)h->width * sizeof(double));
+    for (; part.at < row->at + (size_t)row->n; part.at += (size_t)part.n) {
+        const size_t left = row->at + (size_t)row->n - part.at,
+                     to = up + (part.at - gs4i_row_of(g, row->j, row->k)) / 2;
+        part.n = left < 16 * GS4I_STRIP ? (int)left : 16 * GS4I_STRIP;
+        gs4i_float_residual_row(out, g->z[0], g->z[1], g->r[0], gs4i_stencil_of(g, row, 0), &part);
+        gs4i_add_parents(h->r[even] + to, h->r[!even] + to, out, part.n);
     }
 }
 
-static void gs4i_pass_prolong_graph(gs4i_solver *s, int level, int k)
+/* To red cells; black ones follow from them. */
+static void gs4i_pass_prolong(gs4i_solver *s, const gs4i_span *row, double *sum)
 {
-    const gs4i_level *g = &s->level[level];
-    size_t at;
-    int j, n, m;
-    GS4I_EACH_ROW(g, k, j, at, n)
-        for (m = 0; m < n; m++) {
-            const int32_t parent = s->parent[0][at + (size_t)m];
-            if (parent >= 0) g->z[0][at + (size_t)m] += s->graph[0].x[parent];
-        }
+    const gs4i_level *g = &s->level[0], *h = &s->level[1];
+    const int even = (row->j / 2 + row->k / 2) & 1;
+    const size_t from =
+        gs4i_row_of(h, row->j / 2, row->k / 2) + (row->at - gs4i_row_of(g, row->j, row->k)) / 2;
+    (void)sum;
+    gs4i_add_children(g->z[0] + row->at, g->inverse[0] + row->at, h->z[even] + from,
+                      h->z[!even] + from, row->n);
 }
 
-static void gs4i_pass_dot(gs4i_solver *s, int level, int k)
+/* The same from graph 0 to level 1. */
+static void gs4i_pass_prolong_graph(gs4i_solver *s, const gs4i_span *row, double *sum)
 {
-    const gs4i_level *g = &s->level[level];
-    double sum = 0;
-    size_t at;
-    int j, n, c;
-    GS4I_EACH_ROW(g, k, j, at, n)
-        for (c = 0; c < 2; c++) sum += gs4i_dot_row(g->r[c] + at, g->z[c] + at, n);
-    s->sums[k] = sum;
+    const int32_t *parent = s->parent[0] + row->at;
+    float *z = s->level[1].z[0] + row->at;
+    int m;
+    (void)sum;
+    for (m = 0; m < row->n; m++)
+        if (parent[m] >= 0) z[m] += s->graph[0].x[parent[m]];
 }
 
-static void gs4i_pass_direction(gs4i_solver *s, int level, int k)
+/* r.z */
+static void gs4i_pass_dot(gs4i_solver *s, const gs4i_span *row, double *sum)
 {
-    const gs4i_level *g = &s->level[level];
-    size_t at;
-    int j, n, c;
-    GS4I_EACH_ROW(g, k, j, at, n)
-        for (c = 0; c < 2; c++) gs4i_update_direction(s->p[c] + at, g->z[c] + at, s->beta, n);
+    const gs4i_level *g = &s->level[0];
+    int c;
+    for (c = 0; c < 2; c++) *sum += gs4i_dot_row(g->r[c] + row->at, g->z[c] + row->at, row->n);
 }
 
-#define GS4I_DIAGONALS(s, g, c, at)                          \
-    (g)->diagonal[c] ? (g)->diagonal[c] + (at) : (s)->zeros, \
-        (g)->diagonal_low[c] ? (g)->diagonal_low[c] + (at) : (s)->zeros
-#define GS4I_UNIFORM(s, g, c, at) (g)->degree[c] + (at), GS4I_DIAGONALS(s, g, c, at)
-#define GS4I_WEIGHTS(s, g, c, at, t)   \
-    GS4I_FACES_OF((g)->w, c, at, t, g) \
-    GS4I_LOW_FACES_OF((g)->w_low, c, at, t, g), GS4I_DIAGONALS(s, g, c, at)
-
-static void gs4i_pass_p_dot_ap(gs4i_solver *s, int level, int k)
+static void gs4i_pass_direction(gs4i_solver *s, const gs4i_span *row, double *sum)
 {
-    const gs4i_level *g = &s->level[level];
-    double sum = 0;
-    size_t at;
-    int j, n, c;
-    GS4I_EACH_ROW(g, k, j, at, n)
-        for (c = 0; c < 2; c++) {
-            const int t = (c + j + k) & 1;
-            if (g->degree[0])
-                sum += gs4i_p_dot_ap_uniform(s->p[c] + at, GS4I_AROUND(s->p[!c], at, t, g),
-                                             g->degree[c] + at,
-                                             g->diagonal[c] ? g->diagonal[c] + at : s->zeros, n);
-            else
-                sum += gs4i_p_dot_ap_weighted(s->p[c] + at, GS4I_AROUND(s->p[!c], at, t, g),
-                                              GS4I_FACES_OF(g->w, c, at, t, g), g->diagonal[c] + at,
-                                              n);
-        }
-    s->sums[k] = sum;
+    int c;
+    (void)sum;
+    for (c = 0; c < 2; c++)
+        gs4i_update_direction(s->p[c] + row->at, s->level[0].z[c] + row->at, s->beta, row->n);
 }
 
-static void gs4i_pass_update(gs4i_solver *s, int level, int k)
+static void gs4i_pass_p_dot_ap(gs4i_solver *s, const gs4i_span *row, double *sum)
 {
-    const gs4i_level *g = &s->level[level];
-    double sum = 0;
-    size_t at;
-    int j, n, c;
-    GS4I_EACH_ROW(g, k, j, at, n)
-        for (c = 0; c < 2; c++) {
-            const int t = (c + j + k) & 1;
-            if (g->degree[0] && g->diagonal[0])
-                sum += gs4i_update_uniform(s->x[c] + at, g->r[c] + at, s->alpha, s->p[c] + at,
-                                           GS4I_AROUND(s->p[!c], at, t, g),
-                                           GS4I_UNIFORM(s, g, c, at), 1, n);
-            else if (g->degree[0])
-                sum += gs4i_update_uniform(s->x[c] + at, g->r[c] + at, s->alpha, s->p[c] + at,
-                                           GS4I_AROUND(s->p[!c], at, t, g),
-                                           GS4I_UNIFORM(s, g, c, at), 0, n);
-            else
-                sum += gs4i_update_weighted(s->x[c] + at, g->r[c] + at, s->alpha, s->p[c] + at,
-                                            GS4I_AROUND(s->p[!c], at, t, g),
-                                            GS4I_WEIGHTS(s, g, c, at, t), n);
-        }
-    s->sums[k] = sum;
+    int c;
+    for (c = 0; c < 2; c++) {
+        *sum += gs4i_p_dot_ap_row(s->p[c], s->p[!c], gs4i_stencil_of(&s->level[0], row, c), row);
+    }
 }
 
-static void gs4i_pass_residual(gs4i_solver *s, int level, int k)
+static void gs4i_pass_update(gs4i_solver *s, const gs4i_span *row, double *sum)
 {
-    const gs4i_level *g = &s->level[level];
-    double sum = 0;
-    size_t at;
-    int j, n, c;
-    GS4I_EACH_ROW(g, k, j, at, n)
-        for (c = 0; c < 2; c++) {
-            const int t = (c + j + k) & 1;
-            if (g->degree[0])
-                sum += gs4i_residual_uniform(g->r[c] + at, s->x[c] + at,
-                                             GS4I_AROUND(s->x[!c], at, t, g),
-                                             GS4I_UNIFORM(s, g, c, at), 1, n);
-            else
-                sum += gs4i_residual_weighted(g->r[c] + at, s->x[c] + at,
-                                              GS4I_AROUND(s->x[!c], at, t, g),
-                                              GS4I_WEIGHTS(s, g, c, at, t), n);
-        }
-    s->sums[k] = sum;
+    int c;
+    for (c = 0; c < 2; c++) {
+        *sum += gs4i_update_row(s->x[c], s->level[0].r[c], s->alpha, s->p[c], s->p[!c],
+                                gs4i_stencil_of(&s->level[0], row, c), row);
+    }
 }
 
-static void gs4i_pass_norm(gs4i_solver *s, int level, int k)
+static void gs4i_pass_residual(gs4i_solver *s, const gs4i_span *row, double *sum)
 {
-    const gs4i_level *g = &s->level[level];
-    double sum = 0;
-    size_t at;
-    int j, n, c;
-    GS4I_EACH_ROW(g, k, j, at, n)
-        for (c = 0; c < 2; c++) sum += gs4i_square_row(g->r[c] + at, n);
-    s->sums[k] = sum;
+    int c;
+    for (c = 0; c < 2; c++) {
+        *sum += gs4i_residual_row(s->level[0].r[c], s->x[c], s->x[!c],
+                                  gs4i_stencil_of(&s->level[0], row, c), row);
+    }
 }
 
-static void gs4i_pass_jacobi(gs4i_solver *s, int level, int k)
+static void gs4i_pass_norm(gs4i_solver *s, const gs4i_span *row, double *sum)
 {
-    const gs4i_level *g = &s->level[level];
-    size_t at;
-    int j, n, c;
-    GS4I_EACH_ROW(g, k, j, at, n)
-        for (c = 0; c < 2; c++) gs4i_scale_row(g->z[c] + at, g->r[c] + at, g->inverse[c] + at, n);
+    int c;
+    for (c = 0; c < 2; c++) *sum += gs4i_square_row(s->level[0].r[c] + row->at, row->n);
+}
+
+static void gs4i_pass_jacobi(gs4i_solver *s, const gs4i_span *row, double *sum)
+{
+    const gs4i_level *g = &s->level[0];
+    int c;
+    (void)sum;
+    for (c = 0; c < 2; c++)
+        gs4i_scale_row(g->z[c] + row->at, g->r[c] + row->at, g->inverse[c] + row->at, row->n);
 }
 
 /* --- wavefronts: passes one behind the other through the planes -------------------------------- *
@@ -2010,6 +1952,24 @@ typedef struct gs4i_wavefront {
     int count;
 } gs4i_wavefront;
 
+/* A pass through a plane; what it sums is summed in the order of rows. */
+static void gs4i_wavefront_plane(const gs4i_wavefront *w, int q, int k)
+{
+    const gs4i_level *g = &w->s->level[w->level];
+    const int32_t *span = g->span + 2 * (size_t)k * (size_t)g->n[1];
+    const gs4i_pass_fn pass = w->pass[q];
+    gs4i_span row;
+    double sum = 0;
+    row.level = w->level;
+    row.k = k;
+    for (row.j = 0; row.j < g->n[1]; row.j++, span += 2) {
+        row.n = span[1] - span[0];
+        row.at = gs4i_row_of(g, row.j, k) + (size_t)span[0];
+        if (row.n > 0 || pass == gs4i_pass_restrict) pass(w->s, &row, &sum);
+    }
+    w->s->sums[k] = sum;
+}
+
 GS4I_INLINE int gs4i_even_plane(const gs4i_wavefront *w, int q, int k, int up)
 {
     return w->pass[q] != gs4i_pass_restrict ? k : up ? (k + 1) & ~1 : k & ~1;
@@ -2026,7 +1986,7 @@ static void gs4i_wavefront_slab(int index, void *context)
             const int k = step - q;
             if (k >= (first ? a : gs4i_even_plane(w, q, a + q, 1))
                 && k < (last ? b : gs4i_even_plane(w, q, b - q, 0)))
-                w->pass[q](w->s, w->level, k);
+                gs4i_wavefront_plane(w, q, k);
         }
 }
 
@@ -2037,7 +1997,7 @@ static void gs4i_wavefront_cut(int index, void *context)
     int q, k;
     for (q = 1; q < w->count; q++)
         for (k = gs4i_even_plane(w, q, cut - q, 0); k < gs4i_even_plane(w, q, cut + q, 1); k++)
-            w->pass[q](w->s, w->level, k);
+            gs4i_wavefront_plane(w, q, k);
 }
 
 static void gs4i_wavefront_run(gs4i_solver *s, int level, const gs4i_pass_fn *pass, int count)
@@ -2148,14 +2108,16 @@ static void gs4i_restrict_to_graph(int bk, void *context)
     gs4i_solver *s = (gs4i_solver *)context;
     const gs4i_level *g = &s->level[1];
     float *b = s->graph[0].b;
-    size_t at;
-    int j, k, n, m;
+    int j, k, m;
     for (k = 2 * bk; k < 2 * bk + 2 && k < g->n[2]; k++)
-        GS4I_EACH_ROW(g, k, j, at, n)
-            for (m = 0; m < n; m++) {
-                const int32_t parent = s->parent[0][at + (size_t)m];
-                if (parent >= 0) b[parent] += s->red_residual[at + (size_t)m];
+        for (j = 0; j < g->n[1]; j++) {
+            const int32_t *span = g->span + 2 * (k * g->n[1] + j);
+            const size_t row = gs4i_row_of(g, j, k);
+            for (m = span[0]; m < span[1]; m++) {
+                const int32_t parent = s->parent[0][row + (size_t)m];
+                if (parent >= 0) b[parent] += s->red_residual[row + (size_t)m];
             }
+        }
 }
 
 /* z = (about the inverse of A) r, symmetric and positive; gives r.z */
@@ -2252,6 +2214,29 @@ static void gs4i_shape_level(gs4i_level *g, const int n[3])
     g->count = g->plane * (size_t)(n[2] + 2);
 }
 
+static void gs4i_set_stencil(gs4i_level *g, int c, int t)
+{
+    const ptrdiff_t low[3] = { t - 1, -(ptrdiff_t)g->stride, -(ptrdiff_t)g->plane },
+                    high[3] = { t, (ptrdiff_t)g->stride, (ptrdiff_t)g->plane };
+    gs4i_stencil *q = &g->stencil[c][t];
+    int a;
+    q->uniform = !g->w[0][0];
+    q->diagonal = g->diagonal[c];
+    q->diagonal_low = g->diagonal_low[c];
+    for (a = 0; a < 3; a++) {
+        q->beside[2 * a] = low[a];
+        q->beside[2 * a + 1] = high[a];
+        if (g->w[a][c]) {
+            q->face[2 * a] = g->w[a][!c] + low[a];
+            q->face[2 * a + 1] = g->w[a][c];
+        }
+        if (g->w_low[a][c]) {
+            q->face_low[2 * a] = g->w_low[a][!c] + low[a];
+            q->face_low[2 * a + 1] = g->w_low[a][c];
+        }
+    }
+}
+
 /* All arrays of both levels; gives their bytes. */
 static size_t gs4i_lay_out(gs4i_solver *s, char *base)
 {
@@ -2263,14 +2248,11 @@ static size_t gs4i_lay_out(gs4i_solver *s, char *base)
         gs4i_carve_two(base, &used, g->count, g->inverse);
         for (c = 0; c < 2; c++)
             g->r[c] = (double *)gs4i_carve(base, &used, g->count, sizeof(double));
-        if (l == 0 && s->uniform)
-            gs4i_carve_two(base, &used, g->count, g->degree);
-        else
+        if (l == 1 || !s->uniform)
             for (a = 0; a < 3; a++) gs4i_carve_two(base, &used, g->count, g->w[a]);
         if (l == 0 && !s->uniform && sizeof(gs4_real) == 8)
             for (a = 0; a < 3; a++) gs4i_carve_two(base, &used, g->count, g->w_low[a]);
-        if (l == 1 || !s->uniform || s->has_diagonal)
-            gs4i_carve_two(base, &used, g->count, g->diagonal);
+        gs4i_carve_two(base, &used, g->count, g->diagonal);
         if (l == 0 && s->has_diagonal) gs4i_carve_two(base, &used, g->count, g->diagonal_low);
     }
     gs4i_carve_two(base, &used, s->level[0].count, s->p);
@@ -2296,6 +2278,7 @@ static int gs4i_reserve_levels(gs4i_solver *s)
     if (gs4i_reserve(s, &s->grid, gs4i_lay_out(s, NULL), fresh) != GS4_OK) return GS4_ERROR_MEMORY;
     memcpy(s->shape, shape, sizeof shape);
     gs4i_lay_out(s, (char *)s->grid.data);
+    for (c = 0; c < 8; c++) gs4i_set_stencil(&s->level[c >> 2], c >> 1 & 1, c & 1);
     for (c = 0; c < 2 && !fresh; c++) {
         gs4i_clear(s, g[0].z[c], g[0].count * sizeof(float));
         gs4i_clear(s, s->p[c], g[0].count * sizeof(float));
@@ -2509,7 +2492,6 @@ static int gs4i_read_problem(gs4i_setup *u)
         }
         s->sums = (double *)gs4i_carve(base, &used, (size_t)n[2], sizeof(double));
         s->given = (double *)gs4i_carve(base, &used, 3 * (size_t)n[2], sizeof(double));
-        s->zeros = (float *)gs4i_carve(base, &used, s->level[0].stride, sizeof(float));
         u->range = (gs4i_range *)gs4i_carve(base, &used, (size_t)n[2], sizeof(gs4i_range));
         u->counts = (int32_t *)gs4i_carve(base, &used, (size_t)n[2] + 2, sizeof(int32_t));
         if (!laid && gs4i_reserve(s, &s->planes, used, 1) != GS4_OK) return GS4_ERROR_MEMORY;
@@ -2623,7 +2605,7 @@ static void gs4i_build_cells(gs4i_built *GS4I_RESTRICT b, const gs4i_given_row *
             + (((b->w[0][l] + b->w[1][l]) + (b->w[2][l] + b->w[3][l])) + (b->w[4][l] + b->w[5][l]));
         const double unknown = (double)(kind[l] / GS4I_IS_LIQUID) * (sum > 0 ? 1.0 : 0.0);
         b->inverse[l] = (float)(unknown / (sum + (1 - unknown)));
-        b->diagonal[l] = (float)(unknown * b->exact[l] - (1 - unknown));
+        b->diagonal[l] = (float)(unknown * b->exact[l] + (double)GS4I_NO_UNKNOWN * (1 - unknown));
         b->diagonal_low[l] = (float)(b->exact[l] - (double)(float)b->exact[l]);
     }
     for (f = 0; f < 3; f++)
@@ -2664,7 +2646,7 @@ static void gs4i_build_row(gs4i_solver *s, const gs4_poisson_desc *d, int j, int
             gs4i_build_cells(&b, &q, i, n);
         else {
             memset(&b, 0, sizeof b);
-            for (l = 0; l < n; l++) b.diagonal[l] = -1;
+            for (l = 0; l < n; l++) b.diagonal[l] = GS4I_NO_UNKNOWN;
         }
         gs4i_split_colours(g->inverse[c] + at, g->inverse[!c] + at, b.inverse, n);
         gs4i_split_colours(g->diagonal[c] + at, g->diagonal[!c] + at, b.diagonal, n);
@@ -2718,8 +2700,8 @@ GS4I_INLINE void gs4i_build_diagonal(const gs4i_solver *s, const gs4i_given_row 
     const int c = (i + j + k) & 1;
     const double diagonal = (double)q->diagonal[i] * q->diagonal_unit;
     if (!(diagonal > 0)) return;
-    g->diagonal[c][at] = (float)diagonal;
-    g->diagonal_low[c][at] = (float)(diagonal - (double)(float)diagonal);
+    g->diagonal[c][at] = (float)(diagonal + degree - 6);
+    g->diagonal_low[c][at] = (float)(diagonal + degree - 6 - (double)g->diagonal[c][at]);
     g->inverse[c][at] = (float)(1 / (degree + diagonal));
     h->diagonal[(i / 2 + j / 2 + k / 2) & 1][gs4i_row_of(h, j / 2, k / 2) + (size_t)(i / 4)] +=
         (float)diagonal;
@@ -2740,9 +2722,8 @@ static void gs4i_build_uniform_row(gs4i_solver *s, const gs4_poisson_desc *d, in
     gs4i_find_row(&q, s, d, j, k);
     for (c = 0; c < 2; c++) {
         memset(g->inverse[c] + row, 0, (size_t)g->width * sizeof(float));
-        memset(g->degree[c] + row, 0, (size_t)g->width * sizeof(float));
-        if (!g->diagonal[c]) continue;
-        memset(g->diagonal[c] + row, 0, (size_t)g->width * sizeof(float));
+        for (m = 0; m < g->stride; m++) g->diagonal[c][row + m] = GS4I_NO_UNKNOWN;
+        if (!g->diagonal_low[c]) continue;
         memset(g->diagonal_low[c] + row, 0, (size_t)g->width * sizeof(float));
     }
     for (i = begin; i < end; i++) {
@@ -2753,7 +2734,7 @@ static void gs4i_build_uniform_row(gs4i_solver *s, const gs4_poisson_desc *d, in
         if (!(i & 7) && i + 8 <= end && gs4i_is_deep(v, ny, nz)) { /* eight at once */
             for (c = 0; c < 2; c++)
                 for (m = 0; m < 4; m++) {
-                    g->degree[c][at + m] = 6;
+                    g->diagonal[c][at + m] = 0;
                     g->inverse[c][at + m] = inverse[6];
                 }
             for (m = 0; m < 8 && q.diagonal; m++) gs4i_build_diagonal(s, &q, j, k, i + (int)m, 6);
@@ -2771,7 +2752,7 @@ static void gs4i_build_uniform_row(gs4i_solver *s, const gs4_poisson_desc *d, in
         open = (v[-1] & 1) + (v[1] & 1) + (v[-ny] & 1) + (v[ny] & 1) + (v[-nz] & 1) + (v[nz] & 1);
         wet = (v[-1] >> 1) + (v[1] >> 1) + (v[-ny] >> 1) + (v[ny] >> 1) + (v[-nz] >> 1)
               + (v[nz] >> 1);
-        g->degree[c][at] = (float)open;
+        g->diagonal[c][at] = open ? (float)(open - 6) : GS4I_NO_UNKNOWN;
         g->inverse[c][at] = inverse[open];
         if (q.diagonal) gs4i_build_diagonal(s, &q, j, k, i, open);
         if (i & 1) h->w[0][up][to] += 0.5f * (float)(v[1] >> 1);
@@ -15636,7 +15617,6 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
     gs4i_free(&memory, p, 1, sizeof *p);
 }
 
-#undef GS4I_AROUND
 #undef GS4I_BATCH_LOOP
 #undef GS4I_BLOCK_NODES
 #undef GS4I_BLOCK_SIDE
@@ -15652,17 +15632,12 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_DEFAULT_TOLERANCE
 #undef GS4I_DENSE
 #undef GS4I_DESTINATION
-#undef GS4I_DIAGONALS
 #undef GS4I_DIFFERENCE
 #undef GS4I_DIVERGENCE_BOUND
 #undef GS4I_EACH
-#undef GS4I_EACH_ROW
 #undef GS4I_EPSILON
 #undef GS4I_EULER_SOUND_EIGENVALUE
 #undef GS4I_EULER_VISCOUS_EIGENVALUE
-#undef GS4I_FACE
-#undef GS4I_FACES
-#undef GS4I_FACES_OF
 #undef GS4I_GRAPHS
 #undef GS4I_GREATER
 #undef GS4I_HUGE
@@ -15681,8 +15656,6 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_LOAD
 #undef GS4I_LONG_ROWS
 #undef GS4I_LOWEST_BITS
-#undef GS4I_LOW_FACES
-#undef GS4I_LOW_FACES_OF
 #undef GS4I_MAD
 #undef GS4I_MAX_PARTICLES
 #undef GS4I_MAX_STEPS
@@ -15692,12 +15665,12 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_MOST_STRAIN
 #undef GS4I_MOST_STRETCH
 #undef GS4I_MUL
-#undef GS4I_NEIGHBOURS
 #undef GS4I_NEVER_MELTS
 #undef GS4I_NODE_REALS
 #undef GS4I_NO_HEAT
 #undef GS4I_NO_POM_POM
 #undef GS4I_NO_SOLID_PHASE
+#undef GS4I_NO_UNKNOWN
 #undef GS4I_NTH
 #undef GS4I_NTH_CONST
 #undef GS4I_PAIRS
@@ -15726,26 +15699,19 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_STICKY_REACH
 #undef GS4I_STORE
 #undef GS4I_STRIP
-#undef GS4I_STRIPS
 #undef GS4I_STRONG
 #undef GS4I_SUM
 #undef GS4I_SURFACE_DEPTH
 #undef GS4I_THREAD_LOCAL
 #undef GS4I_TILE
 #undef GS4I_TILE_REALS
-#undef GS4I_TIMES_UNIFORM
-#undef GS4I_TIMES_WEIGHTED
 #undef GS4I_TINY
 #undef GS4I_TO_REAL
 #undef GS4I_TRUNCATE
 #undef GS4I_TRY
-#undef GS4I_UNIFORM
-#undef GS4I_UNIFORM_MATRIX
 #undef GS4I_VECTORS
 #undef GS4I_VISCOUS_EIGENVALUE
 #undef GS4I_VISITED
-#undef GS4I_WEIGHTED_MATRIX
-#undef GS4I_WEIGHTS
 #undef GS4I_WIDE_MAX
 #undef GS4I_WIDE_MIN
 #undef GS4I_WIDTH

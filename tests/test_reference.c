@@ -51,7 +51,7 @@ static const reference_scene reference_scenes[] = {
       { 3, 3, 3 }, { 6, 6, 6 }, 1, 0, 0, { 2, 1, -1 }, 40, 0, 12 },
     { "mix", { 8, 9, 7 }, { STICK, SLIP, APART, APART, SLIP, STICK }, 0, 0, 0.03,
       { 0, 0, 1 }, { 8, 7, 5 }, 0.5, 1, 0, { 1, -2, 1 }, 12, 0.3, 12 },
-    { "mix, near Crank-Nicolson", { 8, 9, 7 }, { SLIP, STICK, STICK, SLIP, STICK, SLIP }, 0.8, 0.2, 0,
+    { "mix, near Crank-Nicolson", { 8, 9, 7 }, { SLIP, STICK, STICK, SLIP, STICK, SLIP }, 0.9, 0.7, 0,
       { 0, 0, 1 }, { 8, 7, 5 }, 0.5, 1, 0, { 1, -2, 1 }, 12, 0.3, 12 },
     { "spray", { 12, 12, 9 }, ALL(STICK), 0.5, 0, 0.1,
       { 0, 0, 0 }, { 12, 12, 9 }, 0, 0, 0, { 1, -2, 1 }, 3, 0.97, 14 },

@@ -9173,19 +9173,18 @@ static void gs4i_find_contact(const gs4i_boundary *b, const gs4i_grid *g, int wa
 
 /* Behind two walls, or behind one and a periodic one, a mirror node is in contact with each as
  * the node is that it mirrors in the other: so no axis comes first, and the seam is no place.
- * Twice, for nodes behind three. */
+ * Once is enough, behind three walls too: there z takes from nodes that x and y have done. */
 static void gs4i_share_contact(const gs4i_boundary *b, const gs4i_grid *g)
 {
-    int pass, wall, i;
-    for (pass = 0; pass < 2; pass++)
-        for (wall = 0; wall < 6; wall++) {
-            const uint8_t others = (uint8_t)(7 & ~(1 << wall / 2));
-            for (i = 0; i < b->mirror_count[wall]; i++) {
-                const gs4i_mirror_pair *pair = &b->mirrors[wall][i];
-                uint8_t *flags = &g->flags[pair->mirror];
-                *flags = (uint8_t)((*flags & ~others) | (g->flags[pair->inner] & others));
-            }
+    int wall, i;
+    for (wall = 0; wall < 6; wall++) {
+        const uint8_t others = (uint8_t)(7 & ~(1 << wall / 2));
+        for (i = 0; i < b->mirror_count[wall]; i++) {
+            const gs4i_mirror_pair *pair = &b->mirrors[wall][i];
+            uint8_t *flags = &g->flags[pair->mirror];
+            *flags = (uint8_t)((*flags & ~others) | (g->flags[pair->inner] & others));
         }
+    }
 }
 
 /* The jump of a mirror node in contact has 1 as fourth number. */

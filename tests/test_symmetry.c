@@ -64,6 +64,14 @@ static gs4_vec3 symmetry_stir(gs4_vec3 p)
               0.1 + 0.7 * cos(6 * x + 5 * y));
 }
 
+/* The same, out through an open wall at low x. */
+static gs4_vec3 symmetry_leave(gs4_vec3 p)
+{
+    gs4_vec3 v = symmetry_stir(p);
+    v.x -= 3;
+    return v;
+}
+
 static gs4_vec3 symmetry_stir_fast(gs4_vec3 p)
 {
     const gs4_vec3 v = symmetry_stir(p);
@@ -159,31 +167,29 @@ static void symmetry_walls(symmetry_world *w, int n)
         O = GS4_WALL_OPEN,
         P = GS4_WALL_PERIODIC
     };
-    static const int walls[5][6] = { { K, L, S, O, K, S },
-                                     { P, P, K, L, S, K },
-                                     { L, S, P, P, O, K },
-                                     { S, K, L, K, P, P },
-                                     { O, O, P, P, L, S } };
+    static const int walls[6][6] = { { K, L, S, O, K, S }, { P, P, K, L, S, K },
+                                     { L, S, P, P, O, K }, { S, K, L, K, P, P },
+                                     { O, K, P, P, L, S }, { S, S, S, L, K, S } };
     const gs4_material m = scene_liquid(1000, 20, 10);
-    gs4_sim_desc d = symmetry_box(6, 5, 4, physics_integrators[n / 5 == 2]);
+    gs4_sim_desc d = symmetry_box(6, 5, 4, physics_integrators[n / 6 == 2]);
     int i;
-    for (i = 0; i < 6; i++) d.walls[i] = (gs4_wall)walls[n % 5][i];
-    if (n / 5 == 1) {
+    for (i = 0; i < 6; i++) d.walls[i] = (gs4_wall)walls[n % 6][i];
+    if (n / 6 == 1) {
         d.rho_inf = (gs4_real)0.8;
         d.rho_inf_spurious = (gs4_real)0.3;
         d.sharp_gradients = 1;
     }
-    if (n % 5 == 1 && n / 5 < 2) d.flip_decay_time = INFINITY;
+    if (n % 6 == 1 && n / 6 < 2) d.flip_decay_time = INFINITY;
     symmetry_create(w, &d);
     symmetry_material(w, &m);
     symmetry_fill_box(w, 0, 6, 5, 4);
-    symmetry_edit(w, symmetry_stir, NULL);
+    symmetry_edit(w, n % 6 == 4 ? symmetry_leave : symmetry_stir, NULL);
 }
 
 static void test_symmetry_walls(void)
 {
     int n;
-    for (n = 0; n < 15; n++) symmetry_check("walls", symmetry_walls, n, 6);
+    for (n = 0; n < 18; n++) symmetry_check("walls", symmetry_walls, n, 6);
 }
 
 /* --- bodies ----------------------------------------------------------------------------------- */

@@ -148,7 +148,8 @@
  *     correct    dr = (R - r) / alpha_m;   y += dt r + gamma dt dr;   r += dr
  *
  * The rate belongs to t + (1/2 - gamma) dt. The first step, and the first after an edit, has
- * alpha_m = gamma = 1, alpha_f = 1/2. Where R depends on y~ itself, linearly, (4) is solved for it:
+ * alpha_m = gamma = 1, alpha_f = 1/2 and no rates. Where R depends on y~ itself, linearly, (4) is
+ * solved for it:
  *     (y~ - y**) / s = R(y~),   y** = y + (alpha_f dt - s) r,   s = alpha_f gamma dt / alpha_m
  *
  * THE STEP, as in gs4i_make_step:
@@ -12409,6 +12410,26 @@ static int gs4i_make_room(gs4_sim *sim, int64_t n)
     return GS4_OK;
 }
 
+/* After a change by hand the next step is a first step, without rates. With old ones nodes would
+ * have alpha_f dt a from the prediction and acc_i in full on top, as ag_i is 0 there. The rates of
+ * J, F and heat drop out of a step with alpha_m = gamma = 1 by themselves. */
+static void gs4i_restart(gs4_sim *sim)
+{
+    gs4i_particles *p = &sim->particles;
+    const size_t n = (size_t)p->count;
+    size_t i;
+    if (!sim->restart && p->with_rates) {
+        memset(p->rate, 0, 4 * n * sizeof *p->rate);
+        memset(p->position_residual, 0, 4 * n * sizeof *p->position_residual);
+        for (i = 0; i < n && p->elastic_reals; i++)
+            memset(p->elastic + (size_t)p->elastic_reals * i + 6, 0, 6 * sizeof *p->elastic);
+        for (i = 0; i < n && p->deformation_reals; i++)
+            memset(p->deformation + (size_t)p->deformation_reals * i + 21, 0,
+                   3 * sizeof *p->deformation);
+    }
+    sim->restart = sim->needs_sort = sim->limits_stale = 1;
+}
+
 /* Particles of `mass` (kg) at xyz, which turn about `centre`. How many, or an error. */
 static int gs4i_add_points(gs4_sim *sim, const gs4_real *xyz, int64_t count, gs4_real mass,
                            gs4_vec3 centre, const gs4_fill *f)
@@ -12420,7 +12441,7 @@ static int gs4i_add_points(gs4_sim *sim, const gs4_real *xyz, int64_t count, gs4
                          "other units, or define GS4_DOUBLE");
     GS4I_TRY(gs4i_make_room(sim, count));
     for (i = 0; i < count; i++) gs4i_fill_one(sim, xyz + 3 * i, centre, f, mass);
-    if (count) sim->restart = sim->needs_sort = sim->limits_stale = 1;
+    if (count) gs4i_restart(sim);
     return (int)count;
 }
 
@@ -15118,7 +15139,10 @@ GS4_API gs4_edit gs4_edit_particles(gs4_sim *sim, gs4_field field)
         sim->needs_spin = 1;
         gs4i_forget_spin(sim);
     }
-    if (e.data) sim->needs_check = sim->restart = sim->needs_sort = sim->limits_stale = 1;
+    if (e.data) {
+        gs4i_restart(sim);
+        sim->needs_check = 1;
+    }
     return e;
 }
 

@@ -549,6 +549,23 @@ static void ref_correct_particles(ref_sim *s)
     s->shift = shift;
 }
 
+/* After an edit by hand the next step is a first step: no rates. */
+static void ref_restart(ref_sim *s)
+{
+    int k;
+    s->restart = 1;
+    s->shift = 0;
+    for (k = 0; k < s->count; k++) {
+        ref_particle *p = &s->p[k];
+        p->dJ = 0;
+        memset(p->a, 0, sizeof p->a);
+        memset(p->lag, 0, sizeof p->lag);
+        memset(p->M, 0, sizeof p->M);
+        memset(p->dw, 0, sizeof p->dw);
+        memset(p->ds, 0, sizeof p->ds);
+    }
+}
+
 static void ref_step(ref_sim *s, double dt)
 {
     ref_rule(s, dt);

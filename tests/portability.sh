@@ -9,8 +9,8 @@ set -u
 cd "$(dirname "$0")/.." || exit 1
 CC=${CC:-cc}
 
-quick='form layout names snippets few_warnings few_hashes link'
-full='warnings tsan hashes asan arm hashes_double wasm windows tiny musl i386 form layout names units snippets link frames examples'
+quick='form layout names snippets few_warnings few_hashes few_fused link'
+full='warnings tsan fused hashes asan arm hashes_double wasm windows tiny musl i386 form layout names units snippets link frames examples'
 
 # A transfer kernel may be longer than 60 lines; nothing else.
 long_functions=''
@@ -284,7 +284,7 @@ all_hashes() {
     same "GS4_NO_VECTORS" "$CC -O2 -DGS4_NO_VECTORS" ""
     threads_and_checkpoint
 }
-hashes() { all_hashes ""; bunnies; history; contraction; }
+hashes() { all_hashes ""; bunnies; history; }
 hashes_double() { all_hashes -DGS4_DOUBLE; }
 
 bunnies() {
@@ -306,15 +306,43 @@ history() {
     scene=''
 }
 
-# Whether the user's own products and sums are still fused where they asked for it
-contraction() {
-    have objdump || return
+# Products and sums rounded once: what x86-64 and aarch64 call them
+fused_product='^[[:space:]]*v?f(n?m(add|sub|la|ls|ad|sb)|cmla)'
+
+# unfused COMPILER...: the header holds none of them, whatever a user asks for
+unfused() { "$@" -I. -S "$tmp/implementation.c" -o "$tmp/unfused.s" && refused grep -E "$fused_product" "$tmp/unfused.s"; }
+
+# fuses COMPILER...: the user's own are still fused where they asked for it
+fuses() { "$@" -I. -S "$tmp/fused.c" -o "$tmp/fused.s" && sed -n '/^users_own:/,/ret/p' "$tmp/fused.s" | grep -E "$fused_product"; }
+
+few_fused() {
+    $CC -march=x86-64-v3 -E -x c /dev/null > /dev/null 2>&1 || { skip "needs $CC for x86-64"; return; }
+    check "no fused product" unfused $CC -O2 -march=x86-64-v3
+}
+
+# each level of optimization for each machine, in both precisions
+fused_levels() {
+    for real in '' -DGS4_DOUBLE; do for machine in $machines; do for level in $levels; do
+        check "$1 $level $machine $real" unfused $1 $level $machine $real
+    done; done; done
+}
+fused() {
+    machines='-march=x86-64-v3 -march=x86-64-v4' levels='-O1 -O2 -O3'
     for cc in gcc clang; do
         have $cc || continue
-        check "$cc: contraction of the code around is as it was" fuses $cc
+        $cc $machines -E -x c /dev/null > /dev/null 2>&1 || { skip "needs $cc for x86-64"; continue; }
+        check "$cc: contraction of the code around is as it was" fuses $cc -O2 -mfma -ffp-contract=fast
+        check "$cc -O0" unfused $cc -O0 -mfma
+        fused_levels $cc
     done
+    # as much as gcc vectorizes and fuses by any flag; clang's -ffp-contract=fast does not ask the source
+    check "gcc, eager" unfused gcc -O3 -march=x86-64-v4 -ffp-contract=fast -ftree-slp-vectorize -fvect-cost-model=unlimited
+    machines='-march=armv8-a -march=armv8.3-a' levels='-O2 -O3'
+    have aarch64-linux-gnu-gcc || return
+    check "aarch64: contraction of the code around is as it was" fuses aarch64-linux-gnu-gcc -O2
+    fused_levels aarch64-linux-gnu-gcc
+    have clang && fused_levels "clang --target=aarch64-linux-gnu -isystem /usr/aarch64-linux-gnu/include"
 }
-fuses() { $1 -O2 -mfma -ffp-contract=fast -I. -c "$tmp/fused.c" -o "$tmp/fused.o" && objdump -d "$tmp/fused.o" | sed -n '/<users_own>:/,/ret/p' | grep fmadd; }
 
 # ==== sanitizers ===============================================================================================
 

@@ -281,7 +281,7 @@
  *
  * DETERMINISM. Same binary, same input, same bits. No fused multiply-add is used, decided in this
  * file and undone at its end, so that -O0, -O2 and -O3 -march=native of one compiler agree too. Not
- * with -ffast-math, nor where doubles are kept in x87 registers.
+ * with -ffast-math, clang's -ffp-contract=fast, nor where doubles are kept in x87 registers.
  *
  * LIMITS. 2^30 particles, 2^36 cells, 256 materials. Time steps follow sound: viscosities above
  * some 100 Pa s at millimetre cells mean steps of microseconds. There is one velocity at a node:

@@ -5365,7 +5365,7 @@ GS4I_INLINE int64_t gs4i_surrounding_node(const gs4i_surroundings *t, int x, int
  * Each of the four transfers of a step sees 1 - (k h)^2/8 of a wave exp(ikx). S v = v - sum_a
  * share_a D_a v, D_a the second difference along axis a, gives that back: gradients are those of
  * S v, and forces of stress go through the transpose of S, so that stress gives to motion what
- * it takes from it. D_a of a linear field is 0: momentum, turning and uniform strain stay what
+ * it takes from it. D_a of a linear field is 0: momentum, spin and uniform strain stay what
  * they are. share_a is the least `full` of the three nodes of D_a: 1/4 where they are filled to
  * 80 % (by mass, of the densest material), 0 where one is to less than 40 %, smooth between. */
 
@@ -5956,7 +5956,7 @@ typedef struct gs4i_particles {
      * none */
     gs4_real *elastic;
     int elastic_reals;
-    /* 24, see [[solid]]: F, row-major, M (1/s), turning w (rad/s) and its rate; 9 for Euler; 0:
+    /* 24, see [[solid]]: F, row-major, M (1/s), spin (rad/s) and its rate; 9 for Euler; 0:
      * none */
     gs4_real *deformation;
     int deformation_reals;
@@ -6367,7 +6367,7 @@ typedef struct gs4i_batch_constants {
 } gs4i_batch_constants;
 
 /* Consecutive batches mostly have the same materials: only what differs is looked up. What is
- * solid in a scene with heat goes by `frozen`. */
+ * solid in a scene with heat goes by `solid_phase`. */
 GS4I_INLINE void gs4i_load_constants(const gs4i_material_constants *constants,
                                      const gs4i_material_constants *solid_phase,
                                      const gs4i_particles *p, size_t i, int n,
@@ -6788,7 +6788,7 @@ static int gs4i_is_round(const double m[6])
     return minors > 0 && det > 1e-11 * (m[0] + m[1] + m[2]) * minors;
 }
 
-/* With f frozen dc/dt = -[alpha c^2 + (f - 2 alpha) c - (1 - alpha)], t in units of lambda_b, is
+/* With f fixed dc/dt = -[alpha c^2 + (f - 2 alpha) c - (1 - alpha)], t in units of lambda_b, is
  * Riccati's equation: c = u v^-1 of the linear (u, v)' = [[-g, 1 - alpha], [alpha, g]] (u, v), g
  * = f/2 - alpha, whose exponential e has no negative entry for alpha in [0, 1]. Exact, and
  * positive definite as c is: (e00 c + e01)(e10 c + e11)^-1. */
@@ -6821,7 +6821,7 @@ static void gs4i_relax_fixed(double alpha, double f, double t, const double c[6]
 }
 
 /* The same for alpha > 1, and where rounding could make an eigenvalue negative: each by itself,
- * dc/dt = -(g c - (1 - alpha)), g = f + alpha (c - 2) frozen too, and held inside the bounds. */
+ * dc/dt = -(g c - (1 - alpha)), g = f + alpha (c - 2) fixed too, and held inside the bounds. */
 static void gs4i_relax_values(gs4i_split *p, double f, double t, const double now[3],
                               const double c[3], double next[3])
 {
@@ -6852,7 +6852,7 @@ static void gs4i_recompose(double Q[3][3], const double values[3], double m[6])
                                   + Q[i][2] * values[2] * Q[j][2];
 }
 
-/* Relax for the time h: with f frozen, twice, half way ahead, then all the way with f from
+/* Relax for the time h: with f fixed, twice, half way ahead, then all the way with f from
  * there. */
 static void gs4i_relax(gs4i_split *p, double m[6], double h)
 {
@@ -7062,13 +7062,37 @@ typedef struct gs4i_elastic_count {
     int split, bounded, failed;
 } gs4i_elastic_count;
 
+/* A batch whose particles may need the split: constants, G (Pa), L, stress before; the time and,
+ * for the rate, gamma of the rule. */
+typedef struct gs4i_split_batch {
+    const gs4i_elastic_constants *constants;
+    const gs4i_wide *G;
+    gs4i_lanes *L;
+    const gs4i_elastic *e;
+    double dt, gamma;
+} gs4i_split_batch;
+
+static gs4i_split_batch gs4i_batch_to_split(const gs4i_elastic_constants *constants,
+                                            const gs4i_wide *G, gs4i_gradient L,
+                                            const gs4i_elastic *e, double dt)
+{
+    gs4i_split_batch batch;
+    batch.constants = constants;
+    batch.G = G;
+    batch.L = L[0];
+    batch.e = e;
+    batch.dt = dt;
+    batch.gamma = 1;
+    return batch;
+}
+
 /* Particle n of a batch by the split over dt; `after`: its stress then, and with `rate` the rate
  * that belongs to rule 1. */
-static void gs4i_split_one(const gs4i_elastic_constants *l, gs4i_lanes G, gs4i_gradient L,
-                           const gs4i_elastic *e, int n, double dt, double gamma,
-                           gs4i_symmetric after, gs4i_lanes *rate, gs4i_elastic_count *count)
+static void gs4i_split_one(const gs4i_split_batch *batch, int n, gs4i_symmetric after,
+                           gs4i_lanes *rate, gs4i_elastic_count *count)
 {
-    const double modulus = (double)GS4I_NTH(G, n);
+    const gs4i_elastic_constants *l = batch->constants;
+    const double modulus = (double)GS4I_NTH_CONST(batch->G, n), dt = batch->dt;
     double c[6], before[6], end[6], fast = 0, gap = 1e-290, slope;
     gs4i_split p;
     int i, j;
@@ -7078,9 +7102,9 @@ static void gs4i_split_one(const gs4i_elastic_constants *l, gs4i_lanes G, gs4i_g
     p.alpha = (double)GS4I_NTH_CONST(l->alpha, n);
     p.bounded = 0;
     for (i = 0; i < 3; i++)
-        for (j = 0; j < 3; j++) p.L[i][j] = (double)GS4I_NTH(L[i][j], n);
+        for (j = 0; j < 3; j++) p.L[i][j] = (double)GS4I_NTH(batch->L[3 * i + j], n);
     for (i = 0; i < 6; i++)
-        before[i] = c[i] = (double)GS4I_NTH_CONST(e->s[i], n) / modulus + (i < 3);
+        before[i] = c[i] = (double)GS4I_NTH_CONST(batch->e->s[i], n) / modulus + (i < 3);
     count->split++;
     if (gs4i_split_advance(&p, c, dt) != GS4_OK) count->failed = n + 1;
     for (i = 0; i < 6; i++) GS4I_NTH(after[i], n) = GS4I_C(modulus * (c[i] - (i < 3)));
@@ -7092,7 +7116,7 @@ static void gs4i_split_one(const gs4i_elastic_constants *l, gs4i_lanes G, gs4i_g
         gap = fmax(gap, fabs((c[i] - before[i]) / dt - end[i]));
     }
     /* a transient that is over does not belong into the rate */
-    slope = (2 * gamma - 1) * fmin(1, fast / gap);
+    slope = (2 * batch->gamma - 1) * fmin(1, fast / gap);
     for (i = 0; i < 6; i++)
         GS4I_NTH(rate[i], n) =
             GS4I_C(modulus * (slope * (c[i] - before[i]) / dt + (1 - slope) * end[i]));
@@ -7156,6 +7180,7 @@ static void gs4i_stage_elastic(const gs4i_elastic_constants *l, gs4i_lanes G, co
     const gs4_real ahead = integrator->prediction.ahead, w = integrator->s;
     gs4i_symmetric R;
     gs4i_lanes relax, stiff;
+    gs4i_split_batch batch;
     int b, c, ok[GS4I_BATCH];
     for (c = 0; c < 6; c++)
         GS4I_BATCH_LOOP(b) s[c][b] = e->s[c][b] + ahead * e->rate[c][b];
@@ -7166,8 +7191,9 @@ static void gs4i_stage_elastic(const gs4i_elastic_constants *l, gs4i_lanes G, co
                 (e->s[c][b] + (ahead - w) * e->rate[c][b] + w * (R[c][b] + relax[b] * s[c][b]))
                 / (GS4I_C(1) + w * relax[b]);
     if (gs4i_resolved(G, l->alpha, L, s, relax, stiff, integrator, ok)) return;
+    batch = gs4i_batch_to_split(l, G, L, e, (double)ahead);
     for (b = 0; b < n; b++)
-        if (!ok[b]) gs4i_split_one(l, G, L, e, b, (double)ahead, 1, s, NULL, count);
+        if (!ok[b]) gs4i_split_one(&batch, b, s, NULL, count);
 }
 
 /* S7: s by rule 1, (alpha_m + w relax) ds' = R(y) + relax (y - s*) - s' with w = alpha_f gamma
@@ -7182,6 +7208,7 @@ static void gs4i_correct_elastic(const gs4i_elastic_constants *l, gs4i_elastic *
     const gs4i_elastic old = *e;
     gs4i_symmetric star, y, R, change;
     gs4i_lanes G, relax, stiff;
+    gs4i_split_batch batch;
     int b, c, ok[GS4I_BATCH], pass, passes = integrator->gamma > GS4I_C(0.66) ? 1 : 5;
     gs4i_moduli(l, L, G);
     for (c = 0; c < 6; c++)
@@ -7207,10 +7234,10 @@ static void gs4i_correct_elastic(const gs4i_elastic_constants *l, gs4i_elastic *
             e->rate[c][b] += change[c][b];
         }
     if (gs4i_resolved(G, l->alpha, L, e->s, relax, stiff, integrator, ok)) return;
+    batch = gs4i_batch_to_split(l, G, L, &old, (double)dt);
+    batch.gamma = (double)integrator->gamma;
     for (b = 0; b < n; b++)
-        if (!ok[b])
-            gs4i_split_one(l, G, L, &old, b, (double)dt, (double)integrator->gamma, e->s, e->rate,
-                           count);
+        if (!ok[b]) gs4i_split_one(&batch, b, e->s, e->rate, count);
 }
 
 /* Elastic waves of each particle: density times squared speed at most, 2 G0 c_max, by the
@@ -7277,7 +7304,7 @@ static void gs4i_store_elastic(gs4_real *to, int reals, int n, gs4i_elastic *e)
  * To first order in X that is rule 1 for F itself, implicit in F at the stage. But a rotation
  * stays one, whatever dt; where |X| > 1 exp(X) takes the place of the fraction, so that det F >
  * 0 after any step; and what happens to F from the right - yielding, F <- F P, or forgetting all
- * strain, F <- J^(1/3) I - leaves M as it is, so that nothing needs to start afresh.
+ * strain, F <- J^(1/3) I - leaves M as it is, so that nothing needs a restart.
  *     Yield (2014, 5.1), after each step: singular values of F are clamped to
  *     [1 - theta_c, 1 + theta_s], then all scaled to det F = J.
  *     Solids also keep how they turn, w (rad/s), with its rate: S3, gs4i_correct_spin. */
@@ -7299,7 +7326,7 @@ typedef struct gs4i_solid_constants {
 /* F, M, w and dw/dt of a batch. */
 typedef struct gs4i_deformation {
     gs4i_matrix F, rate;
-    gs4i_lanes spin[3], turning_rate[3];
+    gs4i_lanes spin[3], spin_rate[3];
 } gs4i_deformation;
 
 /* How many particles took the exponential, how many had to be bounded; 1 + the last of the batch
@@ -7593,13 +7620,13 @@ static void gs4i_stage_solid(const gs4i_solid_constants *l, gs4i_deformation *e,
 
 /* F of particle n after a step X from `old`, to the volume ratio J, as plasticity and bounds let
  * it be; `now` is what the fraction made of it. */
-static void gs4i_correct_one(const gs4i_material_constants *mat, gs4i_matrix X, double squared,
-                             gs4i_matrix old, gs4i_matrix now, double J, int n, gs4i_matrix F,
+static void gs4i_correct_one(const gs4i_material_constants *mat, gs4i_matrix X,
+                             gs4i_lanes (*old)[3], gs4i_matrix now, double J, int n, gs4i_matrix F,
                              gs4i_solid_count *count)
 {
     double one[3][3], scale;
     int i;
-    if (squared < (double)GS4I_SMALL_STEP)
+    if (!old)
         gs4i_matrix_of(now, n, one);
     else {
         gs4i_matrix_of(old, n, one);
@@ -7655,7 +7682,7 @@ static int gs4i_fit_volume(const gs4i_solid_constants *l, gs4i_matrix now, const
     return all;
 }
 
-/* S7 of liquids alone: F = J^(1/3) I, M = L, no turning. */
+/* S7 of liquids alone: F = J^(1/3) I, M = L, no spin. */
 static void gs4i_let_flow(gs4i_gradient L, const gs4i_wide *J, gs4i_deformation *e)
 {
     int b, i;
@@ -7692,7 +7719,7 @@ static void gs4i_correct_solid(const gs4i_solid_constants *l, gs4i_deformation *
         if (!(GS4I_NTH_CONST(l->modulus, b) > 0)
             || (GS4I_NTH(squared, b) < GS4I_SMALL_STEP && GS4I_NTH(verdict, b) > 0))
             continue;
-        gs4i_correct_one(l->of[b], X, (double)GS4I_NTH(squared, b), old, now,
+        gs4i_correct_one(l->of[b], X, GS4I_NTH(squared, b) < GS4I_SMALL_STEP ? NULL : old, now,
                          (double)GS4I_NTH_CONST(J, b), b, e->F, count);
     }
 }
@@ -7834,7 +7861,7 @@ static void gs4i_correct_spin(const gs4i_solid_constants *l, gs4i_deformation *e
     for (i = 0; i < 3; i++) {
         const int j = (i + 1) % 3, k = (i + 2) % 3;
         GS4I_BATCH_LOOP(b) {
-            const gs4i_wide w = e->spin[i][b], r = e->turning_rate[i][b], zero = w - w,
+            const gs4i_wide w = e->spin[i][b], r = e->spin_rate[i][b], zero = w - w,
                             seen = GS4I_C(0.5) * (L[k][j][b] - L[j][k][b]);
             const gs4i_wide LL =
                 (L[k][0][b] * L[0][j][b] + L[k][1][b] * L[1][j][b] + L[k][2][b] * L[2][j][b])
@@ -7854,7 +7881,7 @@ static void gs4i_correct_spin(const gs4i_solid_constants *l, gs4i_deformation *e
                       * (w + integrator->before * r + integrator->s * stage - seen);
             const gs4i_wide_mask solid = l->modulus[b] > GS4I_C(0);
             GS4I_CHOOSE(e->spin[i][b], solid, next, zero);
-            GS4I_CHOOSE(e->turning_rate[i][b], solid, next_rate, zero);
+            GS4I_CHOOSE(e->spin_rate[i][b], solid, next_rate, zero);
         }
     }
 }
@@ -7880,7 +7907,7 @@ static void gs4i_store_deformation(gs4_real *to, int reals, int n, gs4i_deformat
         gs4i_lanes_to_numbers(l, 9, n, to);
 }
 
-/* No strain but that of the volume: F = J^(1/3) I; M = 0, and no turning. */
+/* No strain but that of the volume: F = J^(1/3) I; M = 0, and no spin. */
 static void gs4i_undeform(const gs4i_particles *p, size_t i, gs4_real J)
 {
     gs4_real *F = p->deformation + (size_t)p->deformation_reals * i;
@@ -8564,7 +8591,8 @@ typedef struct gs4i_mirror_pair {
     uint32_t mirror, inner;
 } gs4i_mirror_pair;
 
-/* A body or a mouth: a shape with a pose. World point p is shape point R^T (p - at) + pivot. */
+/* A collider or an emitter: a shape with a pose. World point p is shape point
+ * R^T (p - at) + pivot. */
 /* sampled distance of a mesh: trilinear in n[0] x n[1] x n[2] samples */
 typedef struct gs4i_field {
     int n[3];
@@ -9398,8 +9426,8 @@ static void gs4i_put_back(const gs4i_boundary *b, const gs4i_grid *g, gs4_real x
     }
 }
 
-/* In the mouth of an emitter a particle goes with the flow: at its velocity, uncompressed,
- * without rates. The mouth, NULL outside of all. */
+/* In an emitter a particle goes with the flow: at its velocity, uncompressed, without rates.
+ * Returns the emitter, NULL outside of all. */
 static const gs4i_collider *gs4i_hold_in_emitter(const gs4i_boundary *b, const gs4_real x[3],
                                                  gs4_real v[4])
 {
@@ -11134,7 +11162,7 @@ static int gs4i_may_touch(const gs4i_boundary *b, const gs4_real *x, int n, gs4_
     return 0;
 }
 
-/* Walls, bodies and mouths on each particle after the step. */
+/* Walls, colliders and emitters on each particle after the step. */
 static void gs4i_correct_contact(gs4_sim *sim, size_t i, int n, gs4i_stored *o, gs4i_gathered *L,
                                  gs4i_report *report)
 {

@@ -203,6 +203,12 @@ static gs4_real symmetry_egg(gs4_vec3 p, void *user)
     return (gs4_real)(sqrt(x * x + 1.2 * y * y + 1.5 * z * z + 0.3 * x * y - 0.2 * y * z) - 0.19);
 }
 
+/* By gs4_shape_kind; then a slab and a disc, whose faces are flat as far as particles can tell. */
+enum {
+    SYMMETRY_SLAB = GS4_SHAPE_MESH + 1,
+    SYMMETRY_DISC
+};
+
 static gs4_shape symmetry_body(int kind)
 {
     static const int triangles[3 * 8] = { 0, 2, 4, 2, 1, 4, 1, 3, 4, 3, 0, 4,
@@ -226,6 +232,9 @@ static gs4_shape symmetry_body(int kind)
     case GS4_SHAPE_PLANE: return gs4_plane(symmetry_place(3.5, 2.9, 3.2), at(0.2, 1, -0.15));
     case GS4_SHAPE_SDF:
         return gs4_sdf(symmetry_egg, NULL, symmetry_place(1, -1, 1), symmetry_place(6, 4, 6));
+    case SYMMETRY_SLAB: return gs4_box(symmetry_place(-20, -6, -20), symmetry_place(24, 3.1, 26));
+    case SYMMETRY_DISC:
+        return gs4_cylinder(symmetry_place(4.1, -6, 3), symmetry_place(4, 3, 3.2), (gs4_real)2);
     default: return gs4_mesh(vertices, 6, triangles, 8);
     }
 }
@@ -238,7 +247,7 @@ static void symmetry_turn_back(symmetry_world *w)
 /* A block falls and slides on a body that moves and turns. */
 static void symmetry_bodies(symmetry_world *w, int n)
 {
-    const int kind = GS4_SHAPE_BOX + n % 6, contact = n / 6 % 3, euler = n / 18;
+    const int kind = GS4_SHAPE_BOX + n % 8, contact = n / 8 % 3, euler = n / 24;
     const double low[3] = { 2, 3, 2 };
     const int size[3] = { 4, 2, 3 };
     const gs4_material m = scene_liquid(1000, 20, 10);
@@ -262,7 +271,7 @@ static void symmetry_bodies(symmetry_world *w, int n)
 static void test_symmetry_bodies(void)
 {
     int n;
-    for (n = 0; n < 36; n++) symmetry_check("bodies", symmetry_bodies, n, 6);
+    for (n = 0; n < 48; n++) symmetry_check("bodies", symmetry_bodies, n, 6);
 }
 
 /* --- solids ----------------------------------------------------------------------------------- */

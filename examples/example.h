@@ -22,7 +22,9 @@
 #ifndef GS4_PTHREADS
 #define GS4_PTHREADS
 #endif
+#ifndef GS4_LINKED /* the implementation is compiled here, or linked from gs4mpm.o: see README */
 #define GS4MPM_IMPLEMENTATION
+#endif
 #include "gs4mpm.h"
 #include "preview.h"
 #include <errno.h>

@@ -495,10 +495,10 @@ needs_only() {
 
 # builds FILE PROGRAM FLAGS...: by the line in the comment at its head, which must be there, but quickly
 builds() {
-    line=$(sed -n 's/^[ *]*g*cc -O3 \(.*\) -o .*/\1/p' "$1" | head -n 1) program=$2
+    line=$(sed -n 's/^[ *]*g*cc -O3 \(.*\)/\1/p' "$1" | head -n 1 | sed 's/ -o .*//; s/\\$//') program=$2
     [ -n "$line" ] || { echo "no line to build it with"; return 1; }
     shift 2
-    $CC -O1 $line -Wall -Wno-unused-function -Werror "$@" -o "$program"
+    $CC -O1 $line -Wall -Wno-unused-function -Werror "$@" -lm -lpthread -o "$program"
 }
 
 # shows FILE PROGRAM [ROW]: one frame, and whether picture and particles are there where it writes such
@@ -509,9 +509,14 @@ shows() {
     [ -s "$tmp/out/${name}_0001.png" ] && [ -s "$tmp/out/${name}_0001.ply" ] || { echo "no picture or no particles"; return 1; }
 }
 
+# The implementation is compiled once for all examples that can be linked with it.
 examples() {
-    for file in bench/*.c examples/*.c; do check "$file is built" builds "$file" "$tmp/$(basename "$file" .c)"; done
-    check "one is built with -DGS4_PTHREADS" builds examples/drop.c "$tmp/drop" -DGS4_PTHREADS
+    check "one object" $CC -O1 -Wall -Werror -DGS4MPM_IMPLEMENTATION -DGS4_PTHREADS -I. -x c -c gs4mpm.h -o "$tmp/gs4mpm.o"
+    for file in bench/*.c examples/*.c; do
+        linked=; grep -q '"example.h"' "$file" && linked="-DGS4_LINKED $tmp/gs4mpm.o"
+        check "$file is built" builds "$file" "$tmp/$(basename "$file" .c)" $linked
+    done
+    check "an example is built as its comment says" builds examples/drop.c "$tmp/drop"
     for file in examples/*.c; do
         program=$tmp/$(basename "$file" .c)
         rows=$(sed -n 's/.*e\.rows = \([0-9]*\);.*/\1/p' "$file")

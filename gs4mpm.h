@@ -1073,6 +1073,19 @@ static int gs4i_fail_memory(gs4i_error *e)
     return gs4i_fail(e, GS4_ERROR_MEMORY, "out of memory; nothing has changed");
 }
 
+/* A rule that holds, or the sentence that says what would do. */
+static int gs4i_require(gs4i_error *e, int holds, const char *otherwise)
+{
+    return holds ? GS4_OK : gs4i_fail(e, GS4_ERROR_ARGUMENT, otherwise);
+}
+
+/* The sentence is "<before><value><after>". */
+static int gs4i_require_value(gs4i_error *e, int holds, const char *before, double value,
+                              const char *after)
+{
+    return holds ? GS4_OK : gs4i_fail_value(e, GS4_ERROR_ARGUMENT, before, value, after);
+}
+
 #define GS4I_TRY(call)                       \
     do {                                     \
         int gs4i_r = (call);                 \
@@ -8722,19 +8735,19 @@ static gs4_real gs4i_field_distance(const gs4i_field *f, gs4_vec3 p)
     int c[3], a, i;
     gs4i_to_double(p, x);
     for (a = 0; a < 3; a++) {
-        double t = (x[a] - f->low[a]) / f->spacing, inside = t < 0             ? 0
-                                                             : t > f->n[a] - 1 ? f->n[a] - 1
-                                                                               : t;
+        const double t = (x[a] - f->low[a]) / f->spacing,
+                     inside = fmax(0, fmin(t, f->n[a] - 1)); /* the last cell, where t is NaN */
         out += (t - inside) * (t - inside);
         c[a] = (int)inside;
         if (c[a] > f->n[a] - 2) c[a] = f->n[a] - 2;
         x[a] = inside - c[a];
     }
     for (i = 0; i < 8; i++) {
-        size_t at = ((size_t)(c[2] + (i >> 2)) * (size_t)f->n[1] + (size_t)(c[1] + (i >> 1 & 1)))
-                        * (size_t)f->n[0]
-                    + (size_t)(c[0] + (i & 1));
-        value += (double)f->distance[at] * (i & 1 ? x[0] : 1 - x[0]) * (i & 2 ? x[1] : 1 - x[1])
+        const gs4_real *row =
+            f->distance
+            + ((size_t)(c[2] + (i >> 2)) * (size_t)f->n[1] + (size_t)(c[1] + (i >> 1 & 1)))
+                  * (size_t)f->n[0];
+        value += (double)row[c[0] + (i & 1)] * (i & 1 ? x[0] : 1 - x[0]) * (i & 2 ? x[1] : 1 - x[1])
                  * (i & 4 ? x[2] : 1 - x[2]);
     }
     return GS4I_C(value + sqrt(out) * f->spacing);
@@ -8793,63 +8806,89 @@ static gs4_vec3 gs4i_collider_normal(const gs4i_collider *b, gs4_vec3 p, gs4_rea
 
 /* --- closed triangle meshes ------------------------------------------------------------------- */
 
-static const char *const gs4i_mesh_faults[] = {
-    NULL,
-    "has a vertex that is not a finite number",
-    "has a triangle with a vertex index out of range",
-    "is not closed: an edge belongs to one triangle only, or to more than two, or to two that "
-    "disagree about the outside",
-    "is inside out: its triangles face inwards; swap two vertices of each",
-    "encloses no volume"
-};
-
-/* 0 when the surface is closed and faces outwards, the number of its fault, or GS4_ERROR_MEMORY. */
-static int gs4i_mesh_check(gs4i_memory *m, const gs4_shape *s)
+static void gs4i_mesh_corner(const gs4_shape *s, size_t i, double at[3])
 {
-    size_t nv = (size_t)s->vertex_count, edges = 3 * (size_t)s->triangle_count, i, k;
-    size_t *first = NULL;
-    int *target = NULL, fault = 0;
-    double volume = 0, extent = 0;
-    for (i = 0; i < 3 * nv; i++) {
-        if (!gs4i_finite(s->vertices[i])) return 1;
-        if (fabs((double)s->vertices[i]) > extent) extent = fabs((double)s->vertices[i]);
-    }
-    for (i = 0; i < edges; i++)
-        if (s->triangles[i] < 0 || s->triangles[i] >= s->vertex_count) return 2;
-    first = (size_t *)gs4i_alloc(m, nv + 2, sizeof *first);
-    target = (int *)gs4i_alloc(m, edges, sizeof *target);
-    if (!first || !target)
-        fault = GS4_ERROR_MEMORY;
-    else {
+    const gs4_real *v = s->vertices + 3 * (size_t)s->triangles[i];
+    int a;
+    for (a = 0; a < 3; a++) at[a] = (double)v[a];
+}
+
+/* Where the edge leads that begins at corner i and goes round its triangle. */
+static int gs4i_mesh_edge_end(const gs4_shape *s, size_t i)
+{
+    return s->triangles[i % 3 == 2 ? i - 2 : i + 1];
+}
+
+/* Is each directed edge there once, and its reverse once? -1: out of memory. */
+static int gs4i_mesh_is_closed(gs4i_memory *m, const gs4_shape *s)
+{
+    const size_t vertices = (size_t)s->vertex_count, edges = 3 * (size_t)s->triangle_count;
+    /* edges from vertex v end at end[first[v]] to end[first[v + 1]] */
+    size_t *first = (size_t *)gs4i_alloc(m, vertices + 2, sizeof *first), i, k;
+    int *end = (int *)gs4i_alloc(m, edges, sizeof *end), result = first && end ? 1 : -1;
+    if (result > 0) {
         for (i = 0; i < edges; i++) first[s->triangles[i] + 2]++;
-        for (i = 2; i < nv + 2; i++) first[i] += first[i - 1];
-        /* directed edge i: triangles[i] -> next corner */
-        for (i = 0; i < edges; i++)
-            target[first[s->triangles[i] + 1]++] = s->triangles[i % 3 == 2 ? i - 2 : i + 1];
-        for (i = 0; i < edges && !fault; i++) { /* each edge once, its reverse once */
-            int from = s->triangles[i], to = s->triangles[i % 3 == 2 ? i - 2 : i + 1], same = 0,
-                reverse = 0;
-            for (k = first[from]; k < first[from + 1]; k++) same += target[k] == to;
-            for (k = first[to]; k < first[to + 1]; k++) reverse += target[k] == from;
-            if (same != 1 || reverse != 1) fault = 3;
-        }
-        for (i = 0; i < edges; i += 3) {
-            const gs4_real *a = s->vertices + 3 * (size_t)s->triangles[i],
-                           *b = s->vertices + 3 * (size_t)s->triangles[i + 1];
-            const gs4_real *c = s->vertices + 3 * (size_t)s->triangles[i + 2];
-            const double p[9] = { (double)a[0], (double)a[1], (double)a[2],
-                                  (double)b[0], (double)b[1], (double)b[2],
-                                  (double)c[0], (double)c[1], (double)c[2] };
-            volume += (p[0] * (p[4] * p[8] - p[5] * p[7]) + p[1] * (p[5] * p[6] - p[3] * p[8])
-                       + p[2] * (p[3] * p[7] - p[4] * p[6]))
-                      / 6;
-        }
-        if (!fault && fabs(volume) <= 1e-12 * extent * extent * extent) fault = 5;
-        if (!fault && volume < 0) fault = 4;
+        for (i = 2; i < vertices + 2; i++) first[i] += first[i - 1];
+        for (i = 0; i < edges; i++) end[first[s->triangles[i] + 1]++] = gs4i_mesh_edge_end(s, i);
     }
-    gs4i_free(m, first, nv + 2, sizeof *first);
-    gs4i_free(m, target, edges, sizeof *target);
-    return fault;
+    for (i = 0; i < edges && result > 0; i++) {
+        const int from = s->triangles[i], to = gs4i_mesh_edge_end(s, i);
+        int same = 0, reverse = 0;
+        for (k = first[from]; k < first[from + 1]; k++) same += end[k] == to;
+        for (k = first[to]; k < first[to + 1]; k++) reverse += end[k] == from;
+        result = same == 1 && reverse == 1;
+    }
+    gs4i_free(m, first, vertices + 2, sizeof *first);
+    gs4i_free(m, end, edges, sizeof *end);
+    return result;
+}
+
+/* Enclosed by the mesh: the sum of a . (b x c) / 6 over its triangles; below 0 inside out. */
+static double gs4i_mesh_volume(const gs4_shape *s)
+{
+    double volume = 0, a[3], b[3], c[3];
+    size_t i;
+    for (i = 0; i < 3 * (size_t)s->triangle_count; i += 3) {
+        gs4i_mesh_corner(s, i, a);
+        gs4i_mesh_corner(s, i + 1, b);
+        gs4i_mesh_corner(s, i + 2, c);
+        volume += (a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2])
+                   + a[2] * (b[0] * c[1] - b[1] * c[0]))
+                  / 6;
+    }
+    return volume;
+}
+
+/* Closed, faces outwards, and encloses more than rounding. */
+static int gs4i_check_mesh(gs4i_error *e, gs4i_memory *m, const gs4_shape *s)
+{
+    double extent = 0, volume;
+    int is_finite = 1, is_in_range = 1, is_closed;
+    size_t i;
+    GS4I_TRY(gs4i_require(
+        e, s->vertices && s->triangles && s->vertex_count >= 4 && s->triangle_count >= 4,
+        "shape: a mesh needs vertices and triangles, at least four of each"));
+    for (i = 0; i < 3 * (size_t)s->vertex_count; i++) {
+        is_finite &= gs4i_finite(s->vertices[i]);
+        extent = fmax(extent, fabs((double)s->vertices[i]));
+    }
+    GS4I_TRY(
+        gs4i_require(e, is_finite, "shape: the mesh has a vertex that is not a finite number"));
+    for (i = 0; i < 3 * (size_t)s->triangle_count; i++)
+        is_in_range &= s->triangles[i] >= 0 && s->triangles[i] < s->vertex_count;
+    GS4I_TRY(gs4i_require(e, is_in_range,
+                          "shape: the mesh has a triangle with a vertex index out of range"));
+    is_closed = gs4i_mesh_is_closed(m, s);
+    if (is_closed < 0) return gs4i_fail_memory(e);
+    GS4I_TRY(gs4i_require(e, is_closed,
+                          "shape: the mesh is not closed: an edge belongs to one triangle only, or "
+                          "to more than two, or to two that disagree about the outside"));
+    volume = gs4i_mesh_volume(s);
+    GS4I_TRY(gs4i_require(e, fabs(volume) > 1e-12 * extent * extent * extent,
+                          "shape: the mesh encloses no volume"));
+    return gs4i_require(e, volume > 0,
+                        "shape: the mesh is inside out: its triangles face inwards; swap two "
+                        "vertices of each");
 }
 
 /* Squared distance of p to triangle abc: Voronoi regions of corners, edges and face. */
@@ -8917,101 +8956,122 @@ static int gs4i_edge_side(const gs4_shape *s, int i, int j, double y, double z)
     return (i < j) == positive;
 }
 
-/* Distances exact within `band` of the surface, +-band beyond; inside by counting crossings
- * along rows of x. */
-static void gs4i_field_sample(gs4i_field *f, const gs4_shape *s)
+static gs4_real *gs4i_field_row(const gs4i_field *f, int j, int k)
 {
-    int t, a, i, j, k;
-    size_t n = f->count, e;
-    for (e = 0; e < n; e++) f->distance[e] = GS4I_C(f->band);
-    for (t = 0; t < s->triangle_count; t++) {
-        const int *v = s->triangles + 3 * (size_t)t;
-        double corner[3][3];
-        int lo[3], hi[3], c;
-        for (a = 0; a < 3; a++) {
-            double mn = 1e300, mx = -1e300;
-            for (c = 0; c < 3; c++) {
-                corner[c][a] = (double)s->vertices[3 * (size_t)v[c] + (size_t)a];
-                if (corner[c][a] < mn) mn = corner[c][a];
-                if (corner[c][a] > mx) mx = corner[c][a];
-            }
-            lo[a] = (int)ceil((mn - f->band - f->low[a]) / f->spacing);
-            if (lo[a] < 0) lo[a] = 0;
-            hi[a] = (int)floor((mx + f->band - f->low[a]) / f->spacing);
-            if (hi[a] > f->n[a] - 1) hi[a] = f->n[a] - 1;
-        }
-        for (k = lo[2]; k <= hi[2]; k++)
-            for (j = lo[1]; j <= hi[1]; j++)
-                for (i = lo[0]; i <= hi[0]; i++) {
-                    gs4_real *d = f->distance
-                                  + ((size_t)k * (size_t)f->n[1] + (size_t)j) * (size_t)f->n[0]
-                                  + (size_t)i;
-                    double p[3], r2;
-                    p[0] = f->low[0] + i * f->spacing;
-                    p[1] = f->low[1] + j * f->spacing;
-                    p[2] = f->low[2] + k * f->spacing;
-                    r2 = gs4i_triangle_distance2(p, corner[0], corner[1], corner[2]);
-                    if (r2 < (double)*d * (double)*d) *d = GS4I_C(sqrt(r2));
-                }
-    }
-    /* each crossing flips the sign of all samples behind it */
-    for (t = 0; t < s->triangle_count; t++) {
-        const int *v = s->triangles + 3 * (size_t)t;
-        double q[3][3]; /* the corners */
-        int j0, j1, k0, k1;
-        for (i = 0; i < 9; i++)
-            q[i / 3][i % 3] = (double)s->vertices[3 * (size_t)v[i / 3] + (size_t)(i % 3)];
-        j0 = (int)floor((fmin(q[0][1], fmin(q[1][1], q[2][1])) - f->low[1]) / f->spacing);
-        j1 = (int)ceil((fmax(q[0][1], fmax(q[1][1], q[2][1])) - f->low[1]) / f->spacing);
-        k0 = (int)floor((fmin(q[0][2], fmin(q[1][2], q[2][2])) - f->low[2]) / f->spacing);
-        k1 = (int)ceil((fmax(q[0][2], fmax(q[1][2], q[2][2])) - f->low[2]) / f->spacing);
-        for (k = k0 < 0 ? 0 : k0; k <= k1 && k < f->n[2]; k++)
-            for (j = j0 < 0 ? 0 : j0; j <= j1 && j < f->n[1]; j++) {
-                double y = f->low[1] + j * f->spacing, z = f->low[2] + k * f->spacing, area, w1, w2,
-                       x;
-                int side = gs4i_edge_side(s, v[0], v[1], y, z), from;
-                if (side != gs4i_edge_side(s, v[1], v[2], y, z)
-                    || side != gs4i_edge_side(s, v[2], v[0], y, z))
-                    continue;
-                area = (q[1][1] - q[0][1]) * (q[2][2] - q[0][2])
-                       - (q[2][1] - q[0][1]) * (q[1][2] - q[0][2]);
-                if (area == 0) continue;
-                w1 = ((y - q[0][1]) * (q[2][2] - q[0][2]) - (q[2][1] - q[0][1]) * (z - q[0][2]))
-                     / area;
-                w2 = ((q[1][1] - q[0][1]) * (z - q[0][2]) - (y - q[0][1]) * (q[1][2] - q[0][2]))
-                     / area;
-                x = q[0][0] + w1 * (q[1][0] - q[0][0]) + w2 * (q[2][0] - q[0][0]);
-                from = (int)ceil((x - f->low[0]) / f->spacing);
-                for (i = from < 0 ? 0 : from; i < f->n[0]; i++) {
-                    gs4_real *d = f->distance
-                                  + ((size_t)k * (size_t)f->n[1] + (size_t)j) * (size_t)f->n[0]
-                                  + (size_t)i;
-                    *d = -*d;
-                }
-            }
-    }
+    return f->distance + ((size_t)k * (size_t)f->n[1] + (size_t)j) * (size_t)f->n[0];
 }
 
-/* Sample the mesh `s` every `spacing` (coarser where that would be more than 12 MB). */
+/* First and last sample that is, along `axis`, between the lowest and the highest corner, and
+ * `margin` (m) beyond them. */
+static void gs4i_field_range(const gs4i_field *f, double corner[3][3], int axis, double margin,
+                             int range[2])
+{
+    const double low = fmin(corner[0][axis], fmin(corner[1][axis], corner[2][axis])),
+                 high = fmax(corner[0][axis], fmax(corner[1][axis], corner[2][axis]));
+    range[0] = (int)ceil((low - margin - f->low[axis]) / f->spacing);
+    range[1] = (int)floor((high + margin - f->low[axis]) / f->spacing);
+    if (range[0] < 0) range[0] = 0;
+    if (range[1] > f->n[axis] - 1) range[1] = f->n[axis] - 1;
+}
+
+/* Samples within `band` of a triangle learn how far it is. */
+static void gs4i_field_approach(gs4i_field *f, double corner[3][3])
+{
+    int x[2], y[2], z[2], i, j, k;
+    gs4i_field_range(f, corner, 0, f->band, x);
+    gs4i_field_range(f, corner, 1, f->band, y);
+    gs4i_field_range(f, corner, 2, f->band, z);
+    for (k = z[0]; k <= z[1]; k++)
+        for (j = y[0]; j <= y[1]; j++)
+            for (i = x[0]; i <= x[1]; i++) {
+                gs4_real *d = gs4i_field_row(f, j, k) + i;
+                const double p[3] = { f->low[0] + i * f->spacing, f->low[1] + j * f->spacing,
+                                      f->low[2] + k * f->spacing };
+                const double r2 = gs4i_triangle_distance2(p, corner[0], corner[1], corner[2]);
+                if (r2 < (double)*d * (double)*d) *d = GS4I_C(sqrt(r2));
+            }
+}
+
+/* Does the line along x at (y, z) cross triangle t? Then where. Of two triangles that share an
+ * edge it crosses one. */
+static int gs4i_mesh_crossing(const gs4_shape *s, int t, double q[3][3], double y, double z,
+                              double *x)
+{
+    const int *v = s->triangles + 3 * (size_t)t;
+    const int side = gs4i_edge_side(s, v[0], v[1], y, z);
+    double area, w1, w2;
+    if (side != gs4i_edge_side(s, v[1], v[2], y, z) || side != gs4i_edge_side(s, v[2], v[0], y, z))
+        return 0;
+    area = (q[1][1] - q[0][1]) * (q[2][2] - q[0][2]) - (q[2][1] - q[0][1]) * (q[1][2] - q[0][2]);
+    if (area == 0) return 0;
+    w1 = ((y - q[0][1]) * (q[2][2] - q[0][2]) - (q[2][1] - q[0][1]) * (z - q[0][2])) / area;
+    w2 = ((q[1][1] - q[0][1]) * (z - q[0][2]) - (y - q[0][1]) * (q[1][2] - q[0][2])) / area;
+    *x = q[0][0] + w1 * (q[1][0] - q[0][0]) + w2 * (q[2][0] - q[0][0]);
+    return 1;
+}
+
+/* Each crossing turns the sign of all samples of its row behind it. */
+static void gs4i_field_turn_signs(gs4i_field *f, const gs4_shape *s, int t, double corner[3][3])
+{
+    int y[2], z[2], i, j, k;
+    double x;
+    gs4i_field_range(f, corner, 1, f->spacing, y);
+    gs4i_field_range(f, corner, 2, f->spacing, z);
+    for (k = z[0]; k <= z[1]; k++)
+        for (j = y[0]; j <= y[1]; j++) {
+            gs4_real *d = gs4i_field_row(f, j, k);
+            if (!gs4i_mesh_crossing(s, t, corner, f->low[1] + j * f->spacing,
+                                    f->low[2] + k * f->spacing, &x))
+                continue;
+            i = (int)ceil((x - f->low[0]) / f->spacing);
+            for (i = i < 0 ? 0 : i; i < f->n[0]; i++) d[i] = -d[i];
+        }
+}
+
+/* Distances exact within `band` of the surface, +-band beyond. */
+static void gs4i_field_sample(gs4i_field *f, const gs4_shape *s)
+{
+    double corner[3][3];
+    int t, pass, i;
+    size_t e;
+    for (e = 0; e < f->count; e++) f->distance[e] = GS4I_C(f->band);
+    for (pass = 0; pass < 2; pass++)
+        for (t = 0; t < s->triangle_count; t++) {
+            for (i = 0; i < 3; i++) gs4i_mesh_corner(s, 3 * (size_t)t + (size_t)i, corner[i]);
+            if (pass == 0)
+                gs4i_field_approach(f, corner);
+            else
+                gs4i_field_turn_signs(f, s, t, corner);
+        }
+}
+
+#define GS4I_FIELD_BYTES \
+    12e6 /* of the samples of a mesh, at most; chosen: 144^3 of them in float */
+
+static double gs4i_field_bytes(const double size[3], double spacing)
+{
+    return (size[0] / spacing + 14) * (size[1] / spacing + 14) * (size[2] / spacing + 14)
+           * (double)sizeof(gs4_real);
+}
+
+/* Sample the mesh `s` every `spacing` (m), coarser where that would be too much, and seven samples
+ * around it. */
 static int gs4i_field_create(gs4i_memory *m, gs4i_field *f, const gs4_shape *s, double spacing)
 {
     gs4_vec3 low, high;
-    double lo[3], hi[3], extent = 1;
+    double size[3];
     int a;
     gs4i_shape_bounds(s, &low, &high);
-    gs4i_to_double(low, lo);
-    gs4i_to_double(high, hi);
-    for (a = 0; a < 3; a++) extent *= (hi[a] - lo[a]) / spacing + 14;
-    while (extent * sizeof(gs4_real) > 12e6) {
-        spacing *= 1.1;
-        for (extent = 1, a = 0; a < 3; a++) extent *= (hi[a] - lo[a]) / spacing + 14;
-    }
+    gs4i_to_double(low, f->low);
+    gs4i_to_double(high, size);
+    for (a = 0; a < 3; a++) size[a] -= f->low[a];
+    while (gs4i_field_bytes(size, spacing) > GS4I_FIELD_BYTES) spacing *= 1.1;
     f->spacing = spacing;
     f->band = 6 * spacing;
     f->count = 1;
     for (a = 0; a < 3; a++) {
-        f->low[a] = lo[a] - 6.49 * spacing;
-        f->n[a] = (int)ceil((hi[a] - lo[a]) / spacing) + 14;
+        f->low[a] -= 6.49 * spacing; /* low faces of a box lie between samples */
+        f->n[a] = (int)ceil(size[a] / spacing) + 14;
         f->count *= (size_t)f->n[a];
     }
     f->distance = (gs4_real *)gs4i_alloc(m, f->count, sizeof *f->distance);
@@ -13962,54 +14022,42 @@ static void gs4i_release_state(gs4_sim *sim)
     gs4i_free_conduction(m, &sim->conduction);
 }
 
-/* Make the state of the file beside the present one, and put it in its place when it is whole. */
-static int gs4i_restore(gs4_sim *sim, const gs4i_head *h, const gs4i_pieces *p)
+/* A copy that has no particles and no nodes yet, but says what they will carry. */
+static void gs4i_copy_without_state(const gs4_sim *sim, const gs4i_head *h, gs4_sim *next)
 {
-    gs4_sim next = *sim;
-    gs4i_grid empty = sim->grid;
-    int i, result;
-    memset(&next.particles, 0, sizeof next.particles);
-    next.particles.with_rates = sim->particles.with_rates;
-    next.particles.with_subgrid = sim->particles.with_subgrid;
-    next.particles.elastic_reals = h->elastic_reals;
-    next.particles.deformation_reals = h->deformation_reals;
-    next.particles.with_heat = sim->particles.with_heat;
-    next.particles.with_flux = sim->particles.with_flux;
-    memset(&next.grid, 0, sizeof next.grid);
-    memcpy(next.grid.cells, empty.cells, sizeof empty.cells);
-    memcpy(next.grid.blocks, empty.blocks, sizeof empty.blocks);
-    memcpy(next.grid.periodic, empty.periodic, sizeof empty.periodic);
-    next.grid.with_deconvolution = empty.with_deconvolution;
-    next.grid.h = empty.h;
-    next.grid.inv_h = empty.inv_h;
-    next.grid.origin = empty.origin;
-    next.grid.table_count = empty.table_count;
+    const gs4i_particles *p = &sim->particles;
+    const gs4i_grid *g = &sim->grid;
+    int i;
+    *next = *sim;
+    memset(&next->particles, 0, sizeof next->particles);
+    next->particles.with_rates = p->with_rates;
+    next->particles.with_subgrid = p->with_subgrid;
+    next->particles.elastic_reals = h->elastic_reals;
+    next->particles.deformation_reals = h->deformation_reals;
+    next->particles.with_heat = p->with_heat;
+    next->particles.with_flux = p->with_flux;
+    memset(&next->grid, 0, sizeof next->grid);
+    memcpy(next->grid.cells, g->cells, sizeof g->cells);
+    memcpy(next->grid.blocks, g->blocks, sizeof g->blocks);
+    memcpy(next->grid.periodic, g->periodic, sizeof g->periodic);
+    next->grid.with_deconvolution = g->with_deconvolution;
+    next->grid.h = g->h;
+    next->grid.inv_h = g->inv_h;
+    next->grid.origin = g->origin;
+    next->grid.table_count = g->table_count;
     for (i = 0; i < 6; i++) {
-        next.boundary.mirrors[i] = NULL;
-        next.boundary.mirror_count[i] = next.boundary.mirror_capacity[i] = 0;
+        next->boundary.mirrors[i] = NULL;
+        next->boundary.mirror_count[i] = next->boundary.mirror_capacity[i] = 0;
     }
-    next.reports = NULL;
-    next.report_capacity = 0;
-    memset(&next.image_particles, 0, sizeof next.image_particles);
-    memset(&next.conduction, 0, sizeof next.conduction);
-    next.conduction.with_viscous_heating = sim->conduction.with_viscous_heating;
-    result = gs4i_rebuild(&next, h, p);
-    if (result != GS4_OK) {
-        gs4i_release_state(&next);
-        return result == GS4_ERROR_MEMORY
-                   ? gs4i_fail_memory(&sim->error)
-                   : gs4i_fail(&sim->error, GS4_ERROR_FORMAT,
-                               "the checkpoint is damaged: its blocks are out of order");
-    }
-    {
-        /* free the old with the new count of bytes */
-        gs4_sim old = *sim;
-        old.memory = next.memory;
-        gs4i_release_state(&old);
-        next.memory = old.memory;
-    }
-    *sim = next;
-    gs4i_restore_scene(sim, p);
+    next->reports = NULL;
+    next->report_capacity = 0;
+    memset(&next->image_particles, 0, sizeof next->image_particles);
+    memset(&next->conduction, 0, sizeof next->conduction);
+    next->conduction.with_viscous_heating = sim->conduction.with_viscous_heating;
+}
+
+static void gs4i_restore_head(gs4_sim *sim, const gs4i_head *h)
+{
     sim->time = h->time;
     sim->last_dt = h->last_dt;
     sim->steps = h->steps;
@@ -14025,6 +14073,29 @@ static int gs4i_restore(gs4_sim *sim, const gs4i_head *h, const gs4i_pieces *p)
     sim->top_speed = GS4I_C(h->top_speed);
     sim->shift = GS4I_C(h->shift);
     sim->limits = h->limits;
+}
+
+/* Make the state of the file beside the present one, and put it in its place when it is whole. */
+static int gs4i_restore(gs4_sim *sim, const gs4i_head *h, const gs4i_pieces *p)
+{
+    gs4_sim next, old;
+    int result;
+    gs4i_copy_without_state(sim, h, &next);
+    result = gs4i_rebuild(&next, h, p);
+    if (result != GS4_OK) {
+        gs4i_release_state(&next);
+        return result == GS4_ERROR_MEMORY
+                   ? gs4i_fail_memory(&sim->error)
+                   : gs4i_fail(&sim->error, GS4_ERROR_FORMAT,
+                               "the checkpoint is damaged: its blocks are out of order");
+    }
+    old = *sim;
+    old.memory = next.memory; /* the count of bytes is with the new state */
+    gs4i_release_state(&old);
+    next.memory = old.memory;
+    *sim = next;
+    gs4i_restore_scene(sim, p);
+    gs4i_restore_head(sim, h);
     return GS4_OK;
 }
 
@@ -14149,18 +14220,6 @@ static int gs4i_check3(gs4i_error *e, const char *field, gs4_vec3 v)
     return gs4i_check(e, field, v.z, GS4I_FINITE);
 }
 
-static int gs4i_require(gs4i_error *e, int holds, const char *otherwise)
-{
-    return holds ? GS4_OK : gs4i_fail(e, GS4_ERROR_ARGUMENT, otherwise);
-}
-
-/* The sentence is "<before><value><after>". */
-static int gs4i_require_value(gs4i_error *e, int holds, const char *before, double value,
-                              const char *after)
-{
-    return holds ? GS4_OK : gs4i_fail_value(e, GS4_ERROR_ARGUMENT, before, value, after);
-}
-
 static int gs4i_require_between(gs4i_error *e, double low, double high, const char *before,
                                 double value, const char *after)
 {
@@ -14226,22 +14285,6 @@ static int gs4i_check_plane(gs4i_error *e, gs4_shape *s)
         gs4i_require(e, n > 0 && gs4i_finite(n), "shape: the normal of the plane has no length"));
     s->b = gs4i_scale(s->b, 1 / n);
     return GS4_OK;
-}
-
-static int gs4i_check_mesh(gs4i_error *e, gs4i_memory *memory, const gs4_shape *s)
-{
-    int fault;
-    gs4i_text t;
-    GS4I_TRY(gs4i_require(
-        e, s->vertices && s->triangles && s->vertex_count >= 4 && s->triangle_count >= 4,
-        "shape: a mesh needs vertices and triangles, at least four of each"));
-    fault = gs4i_mesh_check(memory, s);
-    if (fault == 0) return GS4_OK;
-    if (fault == GS4_ERROR_MEMORY) return gs4i_fail_memory(e);
-    t = gs4i_begin_error(e);
-    gs4i_put(&t, "shape: the mesh ");
-    gs4i_put(&t, gs4i_mesh_faults[fault]);
-    return gs4i_end_error(e, GS4_ERROR_ARGUMENT);
 }
 
 static int gs4i_check_shape(gs4i_error *e, gs4i_memory *memory, gs4_shape *s)
@@ -15712,6 +15755,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_EPSILON
 #undef GS4I_EULER_SOUND_EIGENVALUE
 #undef GS4I_EULER_VISCOUS_EIGENVALUE
+#undef GS4I_FIELD_BYTES
 #undef GS4I_GRAPHS
 #undef GS4I_GREATER
 #undef GS4I_HUGE

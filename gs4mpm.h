@@ -391,30 +391,28 @@ typedef struct gs4_vec3 {
     gs4_real x, y, z;
 } gs4_vec3;
 
-/* 0 is success, every error is negative, so an id-returning call needs no second channel. */
+/* 0 is success and every error is negative, so that a call that returns an id or a count needs no
+ * second channel. gs4_last_error has a sentence for each error. */
 typedef enum gs4_result {
     GS4_OK = 0,
-    /* a field is out of its range; gs4_last_error names it and its value */
-    GS4_ERROR_ARGUMENT = -1,
+    GS4_ERROR_ARGUMENT = -1, /* a value is out of its range; the sentence names it and the range */
     GS4_ERROR_MEMORY = -2,
     GS4_ERROR_IO = -3,     /* a file could not be opened, written whole or read */
     GS4_ERROR_FORMAT = -4, /* a file is not what it says it is, or is damaged */
-    /* dt is above the stability limit, or the state would become non-finite or leave the
-     * physical range: the step was not taken, the state is that of the last good step */
+    /* dt is above the stability limit, or the state would become non-finite or leave the physical
+     * range: the step was not taken, the state is that of the last good step */
     GS4_ERROR_UNSTABLE = -5,
-    GS4_ERROR_NOT_CONVERGED = -6, /* a linear solve did not reach its tolerance; same promise */
-    /* header and implementation were compiled with different settings */
-    GS4_ERROR_ABI = -7
+    GS4_ERROR_NOT_CONVERGED = -6, /* a linear solve did not reach its tolerance; likewise */
+    GS4_ERROR_ABI = -7 /* header and implementation were compiled with different settings */
 } gs4_result;
 
 GS4_API const char *gs4_result_string(int result);
 GS4_API int gs4_version(void);   /* GS4_VERSION of the implementation */
 GS4_API int gs4_real_size(void); /* bytes of gs4_real in the implementation */
 
-/* A shape is its signed distance (m, negative inside): for filling, obstacles and nozzles alike.
- * A plain value, copied; build it with the functions below, its fields are the implementation's. */
-/* called from several threads at once when there are */
+/* Signed distance (m, negative inside) of a point; from several threads at once when there are. */
 typedef gs4_real (*gs4_sdf_fn)(gs4_vec3 point, void *user);
+
 typedef enum gs4_shape_kind {
     GS4_SHAPE_NONE = 0,
     GS4_SHAPE_BOX,
@@ -424,6 +422,9 @@ typedef enum gs4_shape_kind {
     GS4_SHAPE_SDF,
     GS4_SHAPE_MESH
 } gs4_shape_kind;
+
+/* A shape is its signed distance: for filling, colliders and emitters alike. It is a plain value,
+ * which is copied; build it with the functions below, its fields are the implementation's. */
 typedef struct gs4_shape {
     gs4_shape_kind kind;
     gs4_vec3 a, b; /* corners, ends, or point and outward normal */
@@ -434,235 +435,276 @@ typedef struct gs4_shape {
     const int *triangles;
     int vertex_count, triangle_count;
 } gs4_shape;
+
 GS4_API gs4_shape gs4_box(gs4_vec3 low, gs4_vec3 high);
 GS4_API gs4_shape gs4_sphere(gs4_vec3 centre, gs4_real radius);
-/* capped, from a to b */
-GS4_API gs4_shape gs4_cylinder(gs4_vec3 a, gs4_vec3 b, gs4_real radius);
-/* solid behind the plane */
-GS4_API gs4_shape gs4_plane(gs4_vec3 point, gs4_vec3 outward_normal);
-/* bounds of the zero set */
-GS4_API gs4_shape gs4_sdf(gs4_sdf_fn distance, void *user, gs4_vec3 low, gs4_vec3 high);
-/* closed triangle surface, counter-clockwise */
-GS4_API gs4_shape gs4_mesh(const gs4_real *vertices_xyz, int vertex_count,
-                           /* from outside; arrays must outlive the simulation */
-                           const int *triangles, int triangle_count);
 
-typedef struct gs4_allocator { /* both functions or neither */
+/* From a to b, with flat ends. */
+GS4_API gs4_shape gs4_cylinder(gs4_vec3 a, gs4_vec3 b, gs4_real radius);
+
+/* All that is behind the plane. */
+GS4_API gs4_shape gs4_plane(gs4_vec3 point, gs4_vec3 outward_normal);
+
+/* low and high bound where the distance is negative. */
+GS4_API gs4_shape gs4_sdf(gs4_sdf_fn distance, void *user, gs4_vec3 low, gs4_vec3 high);
+
+/* A closed surface: 3 coordinates a vertex; 3 vertices a triangle, counter-clockwise from outside.
+ * Both arrays must outlive the simulation. */
+GS4_API gs4_shape gs4_mesh(const gs4_real *vertices_xyz, int vertex_count, const int *triangles,
+                           int triangle_count);
+
+/* Both functions or neither. */
+typedef struct gs4_allocator {
     void *(*alloc_fn)(size_t bytes, size_t alignment, void *user);
     void (*free_fn)(void *memory, size_t bytes, void *user);
     void *user;
 } gs4_allocator;
+
+/* Runs task(0, context) to task(count - 1, context), in any order; returns when all are done. */
 typedef void (*gs4_task_fn)(int index, void *context);
-/* runs all, in any order, then returns */
 typedef void (*gs4_parallel_for_fn)(int count, gs4_task_fn task, void *context, void *user);
-/* level 0: information, 1: warning, 2: error */
+
+/* Level 0: information, 1: warning, 2: error. */
 typedef void (*gs4_log_fn)(int level, const char *message, void *user);
-/* seconds; absent: timings stay 0 */
+
+/* A clock in seconds; without one all timings are 0. */
 typedef double (*gs4_now_fn)(void *user);
 
-/* ==== [[materials]] =========================================================================== */
+/* ==== [[materials]] what matter is ============================================================ */
 
-/* UCM: Oldroyd-B, F_v 0 */
+/* What stress a liquid has beside 2 mu D; UCM is Oldroyd-B with local_fraction 0. */
 typedef enum gs4_liquid {
     GS4_NEWTONIAN = 0,
     GS4_OLDROYD_B,
     GS4_POM_POM
 } gs4_liquid;
+
 typedef enum gs4_solid {
     GS4_NO_SOLID = 0,
     GS4_NEO_HOOKEAN,
     GS4_FIXED_COROTATED
 } gs4_solid;
+
 typedef enum gs4_viscosity_law {
     GS4_VISCOSITY_CONSTANT = 0,
     GS4_VISCOSITY_CROSS_WLF,
     GS4_VISCOSITY_CALLBACK
 } gs4_viscosity_law;
-/* Pa s of temperature and 1/s; thread-safe */
+
+/* Pa s, of a temperature and a shear rate (1/s); from several threads at once when there are. */
 typedef gs4_real (*gs4_viscosity_fn)(gs4_real temperature, gs4_real shear_rate, void *user);
 
+/* All zero but `density`: an inviscid liquid. The equations are in MODEL at the top; what a field
+ * is for and the material has not must be 0. */
 typedef struct gs4_material {
-    gs4_real density; /* kg/m^3, required, > 0 */
-    /* liquid phase */
+    gs4_real density; /* rho0, kg/m^3, above 0 */
+
+    /* Liquid phase, (2) and (5). Viscoelastic: G0 = (1 - local_fraction) viscosity /
+     * relaxation_time, Pa. */
     gs4_liquid liquid;
-    gs4_real viscosity;      /* total mu, Pa s, >= 0 */
-    gs4_real local_fraction; /* F_v in [0,1]; ignored (taken as 1) for GS4_NEWTONIAN */
-    /* lambda_b, s, > 0 for viscoelastic liquids; G0 = (1 - F_v) mu / lambda_b */
-    gs4_real relaxation_time;
-    gs4_real stretch_time; /* lambda_0s, s, > 0 for GS4_POM_POM */
-    gs4_real anisotropy;   /* alpha, 0 to 1e6 */
-    gs4_real arms;         /* Q, >= 1; nu = 2/Q */
+    gs4_real viscosity;       /* mu in all, Pa s, 0 or above */
+    gs4_real local_fraction;  /* F_v, 0 to 1; of GS4_NEWTONIAN 1, whatever is here */
+    gs4_real relaxation_time; /* lambda_b, s, above 0 where it is viscoelastic */
+    gs4_real stretch_time;    /* lambda_0s, s, above 0; GS4_POM_POM, as the next two */
+    gs4_real anisotropy;      /* alpha, 0 to 1e6 */
+    gs4_real arms;            /* Q, 1 or above */
+
+    /* Cross-WLF: mu = mu0 / (1 + a (mu0 rate)^n), mu0 = d1 exp(-a1 (T - t1) / (T - t2)). All zero:
+     * the constants of "GS4 viscoelastic MPM" (SOURCES), for degrees Celsius. */
     gs4_viscosity_law viscosity_law;
-    /* mu = mu0 / (1 + a (mu0 rate)^n), mu0 = d1 exp(-a1 (T - t1) / (T - t2)); */
     struct {
-        gs4_real a, n, d1, a1, t1, t2; /* all zero: the constants of the paper */
+        gs4_real a, n, d1, a1, t1, t2;
     } cross_wlf;
-    gs4_viscosity_fn viscosity_fn;
+    gs4_viscosity_fn viscosity_fn; /* of GS4_VISCOSITY_CALLBACK */
     void *viscosity_user;
-    /* volume response, both phases */
-    gs4_real bulk_modulus; /* K, Pa; 0: density * sound_speed^2 */
-    /* c0, m/s, of the Tait equation (gamma 7); 0: 10 sqrt(2 g H + v^2), H the height of the
-     * domain, v the fastest speed given so far: flow compresses by 1 %, impact by more; solids:
-     * at least sqrt(10 G/rho) */
-    gs4_real sound_speed;
-    /* non-zero: K is infinite (partitioned and semi-implicit schemes) */
-    int incompressible;
-    /* solid phase, below melting_temperature or always when the material never melts */
-    /* with liquid GS4_NEWTONIAN; its viscosity then damps the solid */
+
+    /* Volume response of both phases, (3): give one of the two, or neither. Then c0 = 10 sqrt(2 g H
+     * + v^2), H the height of the domain and v the greatest speed given so far: flow compresses by
+     * 1 %, impact by more; of solids at least sqrt(10 G/rho0). */
+    gs4_real bulk_modulus; /* K = rho0 c0^2, Pa */
+    gs4_real sound_speed;  /* c0, m/s */
+    int incompressible;    /* for partitioned and semi-implicit schemes: K is infinite */
+
+    /* Solid phase, (6): below melting_temperature, or always where it never melts. Then `liquid`
+     * is GS4_NEWTONIAN and `viscosity` damps the solid. */
     gs4_solid solid;
-    gs4_real shear_modulus;     /* G, Pa, > 0 for a solid */
+    gs4_real shear_modulus;     /* G, Pa, above 0 for a solid */
     gs4_real yield_compression; /* theta_c, below 1; 0: elastic */
     gs4_real yield_stretch;     /* theta_s; 0: elastic */
-    /* heat: a scene with no conductivity and no heat source carries no temperature at all */
+
+    /* Heat, (7). A scene where no material conducts, melts or is heated by viscosity carries no
+     * temperature at all; in one that does every material needs a heat_capacity. */
     gs4_real heat_capacity;        /* c, J/(kg K) */
     gs4_real conductivity;         /* k, W/(m K) */
-    gs4_real flux_relaxation_time; /* tau, s; 0: Fourier */
-    gs4_real fourier_fraction;     /* F_T in [0,1]; 0 with tau > 0: Cattaneo */
+    gs4_real flux_relaxation_time; /* t of (7), s; 0: Fourier */
+    gs4_real fourier_fraction;     /* F_T, 0 to 1; 0 with a relaxation time: Cattaneo */
     gs4_real melting_temperature;  /* T_m */
-    gs4_real latent_heat;          /* L, J/kg; 0: sharp switch at T_m */
-    /* non-zero: phase follows temperature; zero: phase is fixed by `solid` */
-    int can_melt;
-    /* non-zero: the work of its stress, without the pressure, heats the material */
-    int viscous_heating;
+    gs4_real latent_heat;          /* L, J/kg; 0: it melts at T_m at once */
+    int can_melt;        /* non-zero: phase follows temperature; zero: it is fixed by `solid` */
+    int viscous_heating; /* non-zero: the work of its stress, without the pressure, heats it */
 } gs4_material;
 
 /* ==== [[sim]] description, scene, stepping, views, files ====================================== */
 
+/* This version has GS4_EXPLICIT; the others are refused. */
 typedef enum gs4_scheme {
     GS4_EXPLICIT = 0,
     GS4_PARTITIONED,
     GS4_SEMI_IMPLICIT
 } gs4_scheme;
+
+/* Second order in time; first order, of the schemes that are refused so far; first order with one
+ * transfer each way, the fast tier of the explicit scheme. */
 typedef enum gs4_integrator {
-    GS4_INTEGRATOR_GS4 = 0,        /* second order */
-    GS4_INTEGRATOR_BACKWARD_EULER, /* first order; partitioned and semi-implicit schemes */
-    /* first order, one transfer each way: the fast tier of the explicit scheme */
+    GS4_INTEGRATOR_GS4 = 0,
+    GS4_INTEGRATOR_BACKWARD_EULER,
     GS4_INTEGRATOR_SYMPLECTIC_EULER
 } gs4_integrator;
+
+/* What a wall does to material, see CONTACT. Particles that leave through an open one are dropped;
+ * both walls of an axis are periodic, or neither. */
 typedef enum gs4_wall {
     GS4_WALL_STICK = 0,
     GS4_WALL_SLIP,
     GS4_WALL_SEPARATE,
-    GS4_WALL_OPEN /* particles leave and are dropped */,
-    GS4_WALL_PERIODIC /* both walls of an axis */
+    GS4_WALL_OPEN,
+    GS4_WALL_PERIODIC
 } gs4_wall;
 
 typedef struct gs4_sim gs4_sim;
 
+/* All zero but `cells` and `cell_size`: a closed box of sticky walls without gravity. */
 typedef struct gs4_sim_desc {
-    int cells[3];       /* required, each >= 4 */
-    gs4_real cell_size; /* m, required, > 0 */
-    gs4_vec3 origin;    /* low corner of the grid */
+    int cells[3];       /* of each axis, 4 or more */
+    gs4_real cell_size; /* h, m, 1e-9 to 1e9 */
+    gs4_vec3 origin;    /* low corner of the grid, m */
     gs4_vec3 gravity;   /* m/s^2 */
     gs4_scheme scheme;
     gs4_integrator integrator;
-    /* 0 <= spurious <= rho_inf <= 1; explicit: their product at most 0.98, or no step is stable */
+    /* The member of the GS4 family, see TIME: 0 <= rho_inf_spurious <= rho_inf <= 1. Their product
+     * is at most 0.98, or no explicit step is stable. */
     gs4_real rho_inf, rho_inf_spurious;
-    /* s over which particle motion that the grid cannot see fades; 0: 0.5 s (symplectic Euler:
-     * at once, affine PIC); INFINITY: pure FLIP */
+    /* s, in which motion of particles that the grid cannot see decays; INFINITY: never, FLIP.
+     * 0: 0.5 s. Symplectic Euler has an affine velocity (APIC) in its place. */
     gs4_real flip_decay_time;
-    gs4_wall walls[6]; /* -x +x -y +y -z +z */
+
+    /* Walls -x +x -y +y -z +z, and the air. What is not isothermal is insulated. */
+    gs4_wall walls[6];
     gs4_real wall_temperature[6];
-    int wall_is_isothermal[6]; /* 0: insulated */
-    gs4_real ambient_temperature;
-    int air_is_isothermal; /* 0: insulated free surface */
-    /* fraction of the stability limit that gs4_advance uses; 0: 0.5 */
-    gs4_real cfl;
-    gs4_real max_dt;           /* s; 0: no bound but stability */
-    gs4_real solver_tolerance; /* relative residual; 0: 1e-6 double, 1e-4 float */
+    int wall_is_isothermal[6];
+    gs4_real ambient_temperature; /* of the air */
+    int air_is_isothermal;
+
+    gs4_real cfl;              /* fraction of the stable dt that gs4_advance takes; 0: 0.5 */
+    gs4_real max_dt;           /* s, for gs4_advance; 0: none */
+    gs4_real solver_tolerance; /* relative residual of solves; 0: 1e-6 in double, 1e-4 in float */
     int solver_max_iterations; /* 0: 200 */
     int max_particles;         /* 0: grows as needed */
-    /* 0 or 1: serial; more needs GS4_PTHREADS or parallel_for; results do not depend on it */
+
+    /* More threads than 0 or 1 need GS4_PTHREADS or parallel_for; the results do not depend on
+     * them. Without an allocator malloc and free are used; without log and now it is silent. */
     int threads;
     gs4_parallel_for_fn parallel_for;
     void *parallel_user;
-    gs4_allocator allocator; /* zero: malloc and free */
+    gs4_allocator allocator;
     gs4_log_fn log;
-    void *log_user; /* silent when absent */
+    void *log_user;
     gs4_now_fn now;
     void *now_user;
-    /* 1: the transfers' own error of second order is taken out of gradients and forces. Waves of
-     * elasticity and sound keep their speed (32 cells a wave: within 0.1 % instead of 1.1 %),
-     * the error of a drop that breathes halves, for 1.2 times the time of a step and 1.5 (sound)
-     * to 2.3 (viscosity) times the steps. Liquids alone, no Euler */
+
+    /* 1: the error of second order of the transfers is taken out of gradients and forces, of
+     * liquids alone and not with symplectic Euler. Waves of elasticity and sound are within 0.1 %
+     * at 32 cells a wave instead of 1.1 %; the error of a drop that breathes halves. A step takes
+     * 1.2 times as long, and there are 1.5 (sound) to 2.3 (viscosity) times as many. */
     int sharp_gradients;
 } gs4_sim_desc;
 
 GS4_API int gs4_create(const gs4_sim_desc *desc, gs4_sim **sim);
 GS4_API void gs4_destroy(gs4_sim *sim); /* NULL is fine */
-/* a sentence: what was wrong, which field, what value; NULL sim: of gs4_create */
+
+/* Why the last call that failed did: which field, its value, what would be accepted. NULL: of the
+ * last call without a simulation on this thread. */
 GS4_API const char *gs4_last_error(const gs4_sim *sim);
-GS4_API gs4_sim_desc gs4_get_desc(const gs4_sim *sim); /* with every default filled in */
-/* of the whole state; equal for any thread count */
+
+/* With every default filled in. */
+GS4_API gs4_sim_desc gs4_get_desc(const gs4_sim *sim);
+
+/* Of the whole state: equal for any number of threads, and after loading. */
 GS4_API uint64_t gs4_state_hash(const gs4_sim *sim);
 
-/* id >= 0, or an error */
+/* The id of the new material, from 0; up to 256. */
 GS4_API int gs4_add_material(gs4_sim *sim, const gs4_material *material);
-/* water, olive oil, glycerol, honey; viscoelastic: cream, ice cream, boger fluid, polymer melt;
- * melting, in degrees Celsius, with solids much softer than real ones: chocolate, wax, butter,
- * lava. Sources: [[liquid]] */
+
+/* Liquids: water, olive oil, glycerol, honey. Viscoelastic: cream, ice cream, boger fluid, polymer
+ * melt. Melting, in degrees Celsius, with solids much softer than real ones: chocolate, wax,
+ * butter, lava. Sources are in [[liquid]]. */
 GS4_API int gs4_material_preset(const char *name, gs4_material *material);
 
 typedef struct gs4_fill {
-    int material;
-    gs4_real spacing; /* m between particles; 0: half a cell (8 per cell) */
+    int material;     /* id */
+    gs4_real spacing; /* m between particles, up to a cell; 0: half a cell, 8 particles a cell */
     gs4_vec3 velocity;
-    gs4_vec3 angular_velocity; /* about the shape's centre, rad/s */
-    gs4_real temperature;
-    gs4_real jitter; /* 0..1 of the spacing */
+    gs4_vec3 angular_velocity; /* rad/s, about the centre of the shape */
+    gs4_real temperature;      /* in scenes with heat */
+    gs4_real jitter;           /* 0 to 1, of the spacing */
     uint32_t random_seed;
 } gs4_fill;
-/* count added, or an error */
+
+/* Particles in a shape, or at points that fill `volume_each` (m^3). How many there are now more. */
 GS4_API int gs4_add_particles(gs4_sim *sim, gs4_shape shape, const gs4_fill *fill);
 GS4_API int gs4_add_points(gs4_sim *sim, const gs4_real *xyz, int count, gs4_real volume_each,
                            const gs4_fill *fill);
 
+/* A rigid body that moves as it is told, whatever the material does. */
 typedef struct gs4_collider {
     gs4_shape shape;
     gs4_wall contact;                    /* stick, slip or separate */
-    gs4_real friction;                   /* Coulomb, for separate */
-    gs4_vec3 velocity, angular_velocity; /* of the body; its pose follows */
-    gs4_vec3 pivot;
+    gs4_real friction;                   /* Coulomb's coefficient, for separate */
+    gs4_vec3 velocity, angular_velocity; /* m/s of the pivot; rad/s about it */
+    gs4_vec3 pivot;                      /* where it is at first, m */
     gs4_real temperature;
-    int is_isothermal;
+    int is_isothermal; /* 0: insulated */
 } gs4_collider;
-/* id */
+
+/* The id of the new collider; later changes of its velocities. */
 GS4_API int gs4_add_collider(gs4_sim *sim, const gs4_collider *collider);
-/* from now on */
 GS4_API int gs4_move_collider(gs4_sim *sim, int collider, gs4_vec3 velocity,
                               gs4_vec3 angular_velocity);
 
-/* a nozzle: it is full at `start`, and what leaves it has fill.velocity, of the world */
+/* A source of material, such as a nozzle: its shape is full at `start` and is filled again as
+ * material leaves it with fill.velocity, which is of the world. */
 typedef struct gs4_emitter {
-    gs4_shape shape; /* the mouth's volume; refilled as material leaves */
+    gs4_shape shape;
     gs4_fill fill;
-    gs4_vec3 travel;      /* velocity of the nozzle itself */
+    gs4_vec3 travel;      /* velocity of the emitter itself, m/s */
     gs4_real start, stop; /* s; stop 0: never */
 } gs4_emitter;
-/* id */
+
+/* The id of the new emitter; later changes of its velocity. */
 GS4_API int gs4_add_emitter(gs4_sim *sim, const gs4_emitter *emitter);
 GS4_API int gs4_move_emitter(gs4_sim *sim, int emitter, gs4_vec3 travel);
 
-/* one step of exactly dt; beyond gs4_stable_dt it is refused */
+/* One step of exactly dt (s), at most gs4_stable_dt; or as many as it takes to end after exactly
+ * `duration` (s). What is refused with GS4_ERROR_UNSTABLE has not been done. */
 GS4_API int gs4_step(gs4_sim *sim, gs4_real dt);
-/* as many stable steps as it takes; ends exactly there */
 GS4_API int gs4_advance(gs4_sim *sim, gs4_real duration);
-GS4_API gs4_real gs4_stable_dt(const gs4_sim *sim); /* the limit itself, before `cfl` */
+GS4_API gs4_real gs4_stable_dt(const gs4_sim *sim); /* s, see STABILITY; without `cfl` */
 
-/* No copies; a view stays valid until the next call that changes the simulation; looking changes
- * nothing. */
+/* Of each particle; SI. A scene has stress to flux only where a material needs them. */
 typedef enum gs4_field {
     GS4_FIELD_POSITION = 0,
     GS4_FIELD_VELOCITY,
-    GS4_FIELD_VOLUME_RATIO /* J */,
-    GS4_FIELD_STRESS /* non-local, xx yy zz xy xz yz */,
-    GS4_FIELD_DEFORMATION /* F, row-major, det F = J; of liquids J^(1/3) I */,
+    GS4_FIELD_VOLUME_RATIO, /* J */
+    GS4_FIELD_STRESS,       /* s, non-local: xx yy zz xy xz yz */
+    GS4_FIELD_DEFORMATION,  /* F, row-major, det F = J; of liquids J^(1/3) I */
     GS4_FIELD_TEMPERATURE,
-    GS4_FIELD_LIQUID_FRACTION,
-    GS4_FIELD_FLUX /* non-local */,
+    GS4_FIELD_LIQUID_FRACTION, /* 0 to 1 */
+    GS4_FIELD_FLUX,            /* q_NL, W/m^2 */
     GS4_FIELD_MASS
 } gs4_field;
-/* element i: data + i*stride; data NULL: no such field */
+
+/* No copies: element i begins at data + i stride. data is NULL where there is no such field. Both
+ * are valid until the next call that changes the simulation. */
 typedef struct gs4_view {
     const gs4_real *data;
     int count, components, stride;
@@ -671,88 +713,92 @@ typedef struct gs4_edit {
     gs4_real *data;
     int count, components, stride;
 } gs4_edit;
+
 GS4_API gs4_view gs4_particles(const gs4_sim *sim, gs4_field field);
-/* position, velocity; the next step starts the integrator afresh */
+
+/* Position, velocity and temperature. The next call checks what was written; the next step starts
+ * the integrator anew. */
 GS4_API gs4_edit gs4_edit_particles(gs4_sim *sim, gs4_field field);
-/* stable names: order changes as particles are sorted */
+
+/* Sorting changes the order of particles and not their ids. */
 GS4_API const uint32_t *gs4_particle_ids(const gs4_sim *sim);
 GS4_API const uint8_t *gs4_particle_materials(const gs4_sim *sim);
 
 typedef struct gs4_stats {
-    double time;
+    double time; /* s */
     uint64_t steps;
-    double dt;
+    double dt; /* s, of the last step */
     int particles, active_cells;
     uint64_t memory_bytes;
-    double mass, momentum[3], angular_momentum[3] /* about the origin of coordinates */,
-        kinetic_energy, thermal_energy, volume;
+    /* sums over particles, SI; angular momentum about the origin of coordinates */
+    double mass, momentum[3], angular_momentum[3], kinetic_energy, thermal_energy, volume;
     double max_speed, min_volume_ratio, max_volume_ratio, min_temperature, max_temperature;
-    /* explicit: heat alone */
+    /* of the last solves; the explicit scheme solves for heat alone */
     int pressure_iterations, viscous_iterations, heat_iterations, elastic_iterations;
     double solver_residual;
-    uint64_t stress_substeps; /* particles that needed the robust local integrator so far */
-    /* whose stretch had to be bounded: liquids where anisotropy > 1, solids that do not yield
-     * beyond 512 */
+    /* So far: particles whose stress needed substeps; whose stretch had to be bounded, of liquids
+     * with anisotropy above 1 and of solids without yield beyond 512. */
+    uint64_t stress_substeps;
     uint64_t stress_bounded;
-    /* so far */
+    /* so far; stress is evaluated within the transfers */
     double seconds_transfer, seconds_stress, seconds_solve, seconds_sort, seconds_total;
 } gs4_stats;
 GS4_API gs4_stats gs4_get_stats(gs4_sim *sim);
 
-/* Frames and checkpoints are written beside the target and renamed, so a reader never sees half
- * a file. */
-/* binary little-endian PLY: x y z, vx vy vz, and the fields the scene has */
+/* Frames: binary little-endian PLY with x y z, vx vy vz and the other fields that the scene has; or
+ * NumPy's .npy, one record a particle: numpy.load(path)['velocity']. They and checkpoints are
+ * written beside the target and renamed, so that a reader never sees half a file. */
 GS4_API int gs4_write_ply(gs4_sim *sim, const char *path);
-/* NumPy .npy, one record a particle: numpy.load(path)['velocity'] */
 GS4_API int gs4_write_raw(gs4_sim *sim, const char *path);
-/* whole state: loading it continues bit for bit */
+
+/* Checkpoints: the whole state, into a simulation with the same description, materials, colliders
+ * and emitters. It continues bit for bit. */
 GS4_API int gs4_save(gs4_sim *sim, const char *path);
-/* into one made with the same description, materials, colliders and emitters */
 GS4_API int gs4_load(gs4_sim *sim, const char *path);
 
-/* One material point: the same code that particles run, for rheometry and teaching. All zero: at
- * rest. A step starts afresh where stress_rate is zero; set it to zero where the flow changes at
+/* One material point, by the code that particles run: for rheometry and teaching. All zero: at
+ * rest. A step starts anew where stress_rate is zero; set it to zero where the flow changes at
  * once. Errors have a sentence in gs4_last_error(NULL). */
 typedef struct gs4_point {
     gs4_real stress[6], stress_rate[6]; /* non-local: xx yy zz xy xz yz, Pa and Pa/s */
-    /* F of solids, elastic part, det F > 0; all zero means identity */
-    gs4_real deformation[9];
-    gs4_real temperature; /* for viscosity laws */
+    gs4_real deformation[9];            /* F of solids, elastic part, det F > 0; all zero: I */
+    gs4_real temperature;               /* for viscosity laws */
 } gs4_point;
-/* L[3*i+j] = dv_i/dx_j */
+
+/* A step of dt (s) in the flow L[3 i + j] = dv_i/dx_j (1/s). */
 GS4_API int gs4_point_step(const gs4_material *material, gs4_point *point,
                            const gs4_real velocity_gradient[9], gs4_real dt, gs4_real rho_inf,
                            gs4_real rho_inf_spurious);
+
+/* (2) without the pressure: 2 F_v mu D, non-local stress and stress of F; xx yy zz xy xz yz, Pa. */
 GS4_API int gs4_point_stress(const gs4_material *material, const gs4_point *point,
-                             const gs4_real velocity_gradient[9],
-                             /* 2 F_v mu D, non-local stress, stress of F; Pa; without the
-                              * pressure */
-                             gs4_real cauchy[6]);
+                             const gs4_real velocity_gradient[9], gs4_real cauchy[6]);
 
 /* ==== [[poisson]] the elliptic solver by itself =============================================== */
 
-/* (diagonal - div coefficient grad) x = rhs in the liquid cells of a box of cubic cells: for
- * each of them
- *     diagonal_i x_i + sum over its faces of coefficient_f (x_i - x_j) / cell_size^2 = rhs_i,
- * where a neighbour in the air has x given at its centre, and solids and what is beyond the box
- * let nothing through. */
+/* (diagonal - div coefficient grad) x = rhs in the liquid cells of a box of cubic cells. For each
+ *     diagonal_i x_i + sum over its faces of coefficient_f (x_i - x_j) / cell_size^2 = rhs_i
+ * where a neighbour in the air has x given at its centre; into solids and beyond the box nothing
+ * flows. */
 typedef enum gs4_cell {
-    GS4_CELL_AIR = 0 /* x given */,
-    GS4_CELL_LIQUID = 1 /* unknown */,
-    GS4_CELL_SOLID = 2 /* no flux */
+    GS4_CELL_AIR = 0,    /* x is given */
+    GS4_CELL_LIQUID = 1, /* x is unknown */
+    GS4_CELL_SOLID = 2
 } gs4_cell;
 
-typedef struct gs4_poisson_desc { /* the arrays are read by gs4_poisson_create alone */
-    int cells[3];
-    gs4_real cell_size;
-    /* gs4_cell per cell, x fastest, then y; beyond the box is GS4_CELL_SOLID */
-    const uint8_t *kind;
-    const gs4_real *diagonal; /* per cell, >= 0; NULL: 0 */
-    /* per face of each axis, (n+1) along that axis, face i before cell i, >= 0; NULL: 1 */
+/* Arrays have x fastest, then y. gs4_poisson_create alone reads them. */
+typedef struct gs4_poisson_desc {
+    int cells[3];             /* of each axis, up to 2^21 */
+    gs4_real cell_size;       /* 1e-9 to 1e9 */
+    const uint8_t *kind;      /* gs4_cell, per cell */
+    const gs4_real *diagonal; /* per cell, 0 or above; NULL: 0 */
+    /* per face of each axis, of which there is one more than cells along that axis: face i is
+     * before cell i; 0 or above; NULL: 1 */
     const gs4_real *coefficient[3];
-    gs4_real tolerance; /* relative residual; 0: 1e-6 double, 1e-4 float */
+    gs4_real tolerance; /* relative residual; 0: 1e-6 in double, 1e-4 in float */
     int max_iterations; /* 0: 200 */
-    int threads;        /* as in gs4_sim_desc, like all that follows */
+    /* as in gs4_sim_desc */
+    int threads;
     gs4_parallel_for_fn parallel_for;
     void *parallel_user;
     gs4_allocator allocator;
@@ -761,27 +807,30 @@ typedef struct gs4_poisson_desc { /* the arrays are read by gs4_poisson_create a
 } gs4_poisson_desc;
 
 typedef struct gs4_poisson gs4_poisson;
+
 typedef struct gs4_solve_stats {
     int iterations;
-    /* |b - A x| / |b| in the 2-norm, b with what flows in from the air; recomputed from x,
-     * before it is rounded to gs4_real */
+    /* |b - A x| / |b| in the 2-norm, b with what flows in from the air; of x before it is rounded
+     * to gs4_real */
     double residual;
     double setup_seconds, solve_seconds;
     uint64_t memory_bytes;
-    /* parts of the liquid with neither air nor diagonal: x has mean 0 there, and ... */
+    /* Parts of the liquid with neither air nor diagonal: x has mean 0 there, and the mean of rhs,
+     * which no x can meet, is taken off. The largest |mean|. */
     int pockets;
-    /* ... the mean of rhs, which no x can meet, is taken off: the largest |mean| */
     double removed_mean;
 } gs4_solve_stats;
 
-/* Every value that matters must be finite; those of solids, rhs in the air, and faces that let
- * nothing through may be anything. Errors have a sentence in gs4_last_error(NULL). After
+/* Every value that matters must be finite. Those of solids, rhs in the air, and coefficients of
+ * faces that nothing flows through may be anything. Errors have a sentence in
+ * gs4_last_error(NULL). */
+GS4_API int gs4_poisson_create(const gs4_poisson_desc *desc, gs4_poisson **solver);
+
+/* x holds a guess and the values in the air, then the solution; stats may be NULL. After
  * GS4_ERROR_NOT_CONVERGED x is the last iterate, the best in the energy norm, and `residual` is
  * true; after other errors x is as it was. */
-GS4_API int gs4_poisson_create(const gs4_poisson_desc *desc, gs4_poisson **solver);
-GS4_API int gs4_poisson_solve(gs4_poisson *solver, const gs4_real *rhs,
-                              gs4_real *x /* in: guess and air values; out: solution */,
-                              gs4_solve_stats *stats /* or NULL */);
+GS4_API int gs4_poisson_solve(gs4_poisson *solver, const gs4_real *rhs, gs4_real *x,
+                              gs4_solve_stats *stats);
 GS4_API void gs4_poisson_destroy(gs4_poisson *solver); /* NULL is fine */
 
 #ifdef __cplusplus
@@ -6462,7 +6511,7 @@ static gs4_real gs4i_viscosity_of(const gs4i_material_constants *mat, gs4_real T
                              : gs4i_cross_wlf(&mat->is, T, rate);
 }
 
-/* What follows from the material alone: Cross-WLF constants of the paper where none are given,
+/* What follows from the material alone: the constants of Cross-WLF where none are given,
  * and both parts of viscosity. */
 static void gs4i_set_material_constants(gs4i_material_constants *l, gs4_real temperature)
 {

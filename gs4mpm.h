@@ -671,7 +671,7 @@ GS4_API int gs4_add_collider(gs4_sim *sim, const gs4_collider *collider);
 GS4_API int gs4_move_collider(gs4_sim *sim, int collider, gs4_vec3 velocity,
                               gs4_vec3 angular_velocity);
 
-/* A source of material, such as a nozzle: its shape is full at `start` and is filled again as
+/* A source of material: its shape is full at `start` and is filled again as
  * material leaves it with fill.velocity, which is of the world. */
 typedef struct gs4_emitter {
     gs4_shape shape;
@@ -8673,9 +8673,7 @@ typedef struct gs4i_mirror_pair {
     uint32_t mirror, inner;
 } gs4i_mirror_pair;
 
-/* A collider or an emitter: a shape with a pose. World point p is shape point
- * R^T (p - at) + pivot. */
-/* sampled distance of a mesh: trilinear in n[0] x n[1] x n[2] samples */
+/* Sampled distance of a mesh: trilinear in n[0] x n[1] x n[2] samples, x fastest. */
 typedef struct gs4i_field {
     int n[3];
     double low[3], spacing, band;
@@ -8683,6 +8681,8 @@ typedef struct gs4i_field {
     size_t count;
 } gs4i_field;
 
+/* A shape with a pose, of a collider or an emitter. World point p is shape point
+ * R^T (p - at) + pivot. */
 typedef struct gs4i_collider {
     gs4_collider is; /* as described */
     /* where the pivot is now; orientation, unit quaternion w x y z */
@@ -8707,7 +8707,7 @@ typedef struct gs4i_image_particle {
     gs4_real carried[4][4];
     /* from them: velocity and acceleration, value and columns of the gradient */
     gs4_real seen[2][4][4];
-    int kind, whole, slot; /* GS4I_GHOST_*; all its nodes exist; block of x */
+    int kind, whole, slot; /* GS4I_IMAGE_*; all its nodes exist; block of x */
 } gs4i_image_particle;
 
 typedef struct gs4i_image_particles {
@@ -9196,7 +9196,7 @@ static int gs4i_list_mirror_nodes(gs4i_memory *m, gs4i_boundary *b, const gs4i_g
  * of nodes just in front would leave liquid next to no node to stick to. */
 #define GS4I_STICKY_REACH GS4I_C(0.75)
 /* particles that have images are within so many cells of a surface; nodes that see one within
- * GHOST_NODES */
+ * GS4I_IMAGE_NODES */
 #define GS4I_IMAGE_REACH GS4I_C(3)
 #define GS4I_IMAGE_NODES GS4I_C(1.5)
 
@@ -10167,8 +10167,8 @@ static void gs4i_place_image_particle(const gs4_sim *sim, gs4_vec3 p, const gs4i
     if (g->slot >= 0) g->kind = GS4I_HOLDS_NODES;
 }
 
-/* The ghosts of occupied block o, NULL where it is near no sticky body; that of its particle i
- * is the (i - first)th. */
+/* The image particles of occupied block o, NULL where it is near no sticky body; that of its
+ * particle i is the (i - first)th. */
 GS4I_INLINE gs4i_image_particle *gs4i_image_particles_of(const gs4_sim *sim, int o)
 {
     const gs4i_image_particles *g = &sim->image_particles;
@@ -10314,7 +10314,7 @@ static int gs4i_find_image_particles(gs4_sim *sim)
     return gs4i_sort_image_particles(sim);
 }
 
-/* The next n ghosts of a slot and their weights. */
+/* The next n image particles of a slot and their weights. */
 static void gs4i_load_image_particles(gs4i_image_particle *all, const int32_t *order, int n,
                                       const gs4i_surroundings *t,
                                       gs4i_image_particle *g[GS4I_BATCH], gs4i_stencils *s)
@@ -11196,7 +11196,7 @@ typedef struct gs4i_corrections {
     gs4i_gathered_rates rates; /* for solids */
 } gs4i_corrections;
 
-/* S7. Velocity by rule 1, the motion that the grid cannot see fading: v~ - V at the rate
+/* S7. Velocity by rule 1, motion that the grid cannot see decays: v~ - V at the rate
  * 1/flip_decay_time, in spray and at walls v - U faster, implicit in itself; J by 2021 (57),
  * implicit in J for known div u; position by rule 1 with the grid's velocity U. In: move is
  * dx/dt; out: what the new dx/dt lags behind v - shift a. */
@@ -12608,8 +12608,8 @@ static int gs4i_add_points(gs4_sim *sim, const gs4_real *xyz, int64_t count, gs4
 /* --- points of a lattice in a shape ----------------------------------------------------------- */
 
 /* Point n of a lattice is at low + (n + 1/2 + jitter) spacing + offset, in coordinates of the
- * shape, which is `moved` (m) from where it was described. The lattices of all fillings are
- * aligned with the cells; that of an emitter begins at its shape and flows through it. */
+ * shape. `moved` is how far that is from where it was described, m. The lattices of all fillings
+ * are aligned with the cells; that of an emitter begins at its shape and flows through it. */
 typedef struct gs4i_lattice {
     const gs4i_collider *shape;
     const gs4_fill *fill;
@@ -12701,8 +12701,8 @@ static int gs4i_meets_domain(const gs4i_grid *g, const gs4_shape *s)
 
 /* --- filling a shape -------------------------------------------------------------------------- */
 
-/* The next point x of a filling that is in the shape; jitter then displaces it, so that it does
- * not change how many there are, and may take it out of the shape, but not out of the domain. */
+/* The next point x of a filling that is in the shape. Jitter then displaces it, so that it does
+ * not change how many there are. It may take them out of the shape, but not out of the domain. */
 static int gs4i_next_filled(const gs4i_grid *g, gs4i_lattice *l, gs4_real x[3])
 {
     const gs4_real amount = l->fill->jitter * l->fill->spacing;
@@ -13271,7 +13271,7 @@ static gs4i_integrator gs4i_make_integrator(const gs4_sim *sim, gs4_real dt)
 
 /* The same for heat, which has steps far beyond its own limit: there a rate is what a step as
  * long as the last one has left to do, and where dt has grown by more than twice, rates start
- * afresh. */
+ * anew. */
 static gs4i_integrator gs4i_make_heat_integrator(const gs4_sim *sim)
 {
     gs4i_integrator k = sim->integrator;
@@ -14754,7 +14754,7 @@ static int gs4i_check_emitter(gs4_sim *sim, gs4_emitter *m)
                           "shape: a plane has no volume to emit from"));
     GS4I_TRY(gs4i_check_fill(sim, &m->fill));
     GS4I_TRY(gs4i_require(e, !(gs4i_length(m->fill.angular_velocity) > 0),
-                          "fill.angular_velocity: a nozzle does not spin, leave it 0"));
+                          "fill.angular_velocity: an emitter does not spin, leave it 0"));
     GS4I_TRY(gs4i_check3(e, "travel", m->travel));
     GS4I_TRY(gs4i_check(e, "start", m->start, GS4I_NOT_NEGATIVE));
     GS4I_TRY(gs4i_check(e, "stop", m->stop, GS4I_NOT_NEGATIVE));
@@ -15111,7 +15111,7 @@ GS4_API int gs4_move_collider(gs4_sim *sim, int collider, gs4_vec3 velocity,
     GS4I_TRY(gs4i_check_id(&sim->error, "collider", collider, sim->boundary.collider_count));
     c = &sim->boundary.colliders[collider];
     GS4I_TRY(gs4i_require(&sim->error, !c->is_emitter,
-                          "that id belongs to the mouth of an emitter, not to a collider"));
+                          "that id belongs to an emitter, not to a collider"));
     GS4I_TRY(gs4i_check3(&sim->error, "velocity", velocity));
     GS4I_TRY(gs4i_check3(&sim->error, "angular_velocity", angular_velocity));
     c->is.velocity = velocity;
@@ -15905,6 +15905,5 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  * OUT OF OR IN CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE SOFTWARE.
  *
  * CHANGES 0.1.0  the explicit scheme: GS4 and symplectic Euler, Newtonian and viscoelastic
- * liquids, solids, walls, colliders, emitters, frames, checkpoints. Checkpoints have a byte of flags
- * a node; those written before cannot be read.
- * */
+ * liquids, solids, walls, colliders, emitters, frames, checkpoints. Checkpoints have a byte of
+ * flags a node; those written before cannot be read. */

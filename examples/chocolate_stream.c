@@ -15,12 +15,12 @@ static gs4_real vertices[BUNNY_VERTEX_COUNT][3];
 
 int main(int argc, char **argv)
 {
-    const double width = 0.24, size = 0.12, faster = 600, mouth_height = 0.165;
+    const double width = 0.24, size = 0.12, faster = 600, outlet_height = 0.165;
     example e = { 0 };
     gs4_sim_desc desc = { 0 };
     gs4_material m;
     gs4_fill fill = { 0 };
-    gs4_emitter mouth = { 0 };
+    gs4_emitter emitter = { 0 };
     preview_solid things[2] = { { 0 } };
     gs4_sim *sim;
     double lowest = 1;
@@ -59,13 +59,13 @@ int main(int argc, char **argv)
                                                  &bunny_triangles[0][0], BUNNY_TRIANGLE_COUNT),
                                         &fill));
 
-    mouth.shape = gs4_cylinder(vec(-0.030, mouth_height, 0.010),
-                               vec(-0.030, mouth_height + 0.015, 0.010), real(0.011));
-    mouth.fill.velocity = vec(0, -0.5, 0);
-    mouth.fill.temperature = 70;
-    mouth.fill.jitter = real(0.5);
-    mouth.stop = real(1.2);
-    example_need(sim, gs4_add_emitter(sim, &mouth));
+    emitter.shape = gs4_cylinder(vec(-0.030, outlet_height, 0.010),
+                                 vec(-0.030, outlet_height + 0.015, 0.010), real(0.011));
+    emitter.fill.velocity = vec(0, -0.5, 0);
+    emitter.fill.temperature = 70;
+    emitter.fill.jitter = real(0.5);
+    emitter.stop = real(1.2);
+    example_need(sim, gs4_add_emitter(sim, &emitter));
 
     things[0].kind = PREVIEW_FLOOR;
     e.look.solids = things;

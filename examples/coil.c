@@ -18,7 +18,7 @@ int main(int argc, char **argv)
     gs4_sim_desc desc = { 0 };
     gs4_material liquid = { 0 };
     gs4_collider plate = { 0 };
-    gs4_emitter mouth = { 0 };
+    gs4_emitter emitter = { 0 };
     preview_solid things[2] = { { 0 } };
     gs4_sim *sim;
     e.name = "coil";
@@ -56,10 +56,10 @@ int main(int argc, char **argv)
     plate.contact = GS4_WALL_STICK;
     example_need(sim, gs4_add_collider(sim, &plate));
 
-    mouth.shape = gs4_cylinder(vec(0, height, 0), vec(0, height + 0.024, 0), real(0.017));
-    mouth.fill.velocity = vec(0, -0.23, 0);
-    mouth.fill.jitter = real(0.5); /* what is symmetric has no side to fall to */
-    example_need(sim, gs4_add_emitter(sim, &mouth));
+    emitter.shape = gs4_cylinder(vec(0, height, 0), vec(0, height + 0.024, 0), real(0.017));
+    emitter.fill.velocity = vec(0, -0.23, 0);
+    emitter.fill.jitter = real(0.5); /* what is symmetric has no side to fall to */
+    example_need(sim, gs4_add_emitter(sim, &emitter));
 
     things[0].kind = PREVIEW_CYLINDER;
     things[0].a[1] = (float)-plate_thickness;

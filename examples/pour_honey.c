@@ -3,7 +3,7 @@
  *     ./pour_honey                        pictures and particles in out/
  *     ./pour_honey --cells 80             finer; the time grows with the fifth power of the cells
  *
- * A rope of 8 mm leaves the mouth at 0.11 m/s and grows thinner as it falls; soon after it has
+ * A rope of 8 mm leaves the emitter at 0.11 m/s and grows thinner as it falls; soon after it has
  * met the plate it buckles, and from then on it lays itself down in coils that sink into the
  * heap. */
 #include "example.h"
@@ -16,7 +16,7 @@ int main(int argc, char **argv)
     gs4_sim_desc desc = { 0 };
     gs4_material honey;
     gs4_collider plate = { 0 };
-    gs4_emitter mouth = { 0 };
+    gs4_emitter emitter = { 0 };
     preview_solid things[2] = { { 0 } };
     gs4_sim *sim;
     e.name = "pour_honey";
@@ -41,10 +41,10 @@ int main(int argc, char **argv)
     plate.contact = GS4_WALL_STICK;
     example_need(sim, gs4_add_collider(sim, &plate));
 
-    mouth.shape = gs4_cylinder(vec(0, height, 0), vec(0, height + 0.006, 0), real(0.004));
-    mouth.fill.velocity = vec(0, -0.11, 0);
-    mouth.fill.jitter = real(0.5); /* what is symmetric has no side to fall to */
-    example_need(sim, gs4_add_emitter(sim, &mouth));
+    emitter.shape = gs4_cylinder(vec(0, height, 0), vec(0, height + 0.006, 0), real(0.004));
+    emitter.fill.velocity = vec(0, -0.11, 0);
+    emitter.fill.jitter = real(0.5); /* what is symmetric has no side to fall to */
+    example_need(sim, gs4_add_emitter(sim, &emitter));
 
     things[0].kind = PREVIEW_CYLINDER;
     things[0].a[1] = (float)-plate_thickness;

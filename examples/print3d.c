@@ -34,7 +34,7 @@ static gs4_vec3 print_on(double *angle, double speed, double climb, double dt)
 
 int main(int argc, char **argv)
 {
-    const double width = 0.25, bed_top = 0.14, bed_half = 0.11, bead = 0.009, mouth_height = 0.009,
+    const double width = 0.25, bed_top = 0.14, bed_half = 0.11, bead = 0.009, outlet_height = 0.009,
                  layer = 0.0105, layers = 3;
     const double speed = 0.5, faster = 1000, cooling = 0.5, dropping = 0.05, drop = 0.12;
     const int chords = 8; /* of the path, a frame */
@@ -45,7 +45,7 @@ int main(int argc, char **argv)
     gs4_emitter nozzle = { 0 };
     preview_solid things[3] = { { 0 } };
     gs4_sim *sim;
-    int body, mouth, more = 1;
+    int collider, emitter, more = 1;
     double angle = 0, dt, low = bed_top + 0.001, lift = 0;
     gs4_vec3 at, travel;
     e.name = "print3d";
@@ -87,7 +87,7 @@ int main(int argc, char **argv)
     bed.friction = 1;
     bed.is_isothermal = 1;
     bed.temperature = 25;
-    body = example_need(sim, gs4_add_collider(sim, &bed));
+    collider = example_need(sim, gs4_add_collider(sim, &bed));
     while (angle < 2 * pi * layers) {
         print_on(&angle, speed, layer, dt);
         nozzle.stop += real(dt);
@@ -95,12 +95,12 @@ int main(int argc, char **argv)
     angle = 0;
     at = star(0, low);
     nozzle.shape =
-        gs4_cylinder(at, vec((double)at.x, low + mouth_height, (double)at.z), real(bead));
+        gs4_cylinder(at, vec((double)at.x, low + outlet_height, (double)at.z), real(bead));
     nozzle.fill.temperature = 200;
-    /* the mouth paints as it goes; what it leaves hardly moves */
+    /* it paints as it goes; what it leaves hardly moves */
     nozzle.fill.velocity = vec(0, -0.05, 0);
     nozzle.fill.jitter = real(0.3);
-    mouth = example_need(sim, gs4_add_emitter(sim, &nozzle));
+    emitter = example_need(sim, gs4_add_emitter(sim, &nozzle));
 
     things[0].kind = PREVIEW_FLOOR;
     things[0].a[1] = 0;
@@ -132,9 +132,10 @@ int main(int argc, char **argv)
                                  && since < dropping - 0.5 * dt;
             travel = printing ? print_on(&angle, speed, layer, dt)
                               : vec(0, t < (double)nozzle.stop + 0.2 ? 0.3 : 0, 0);
-            example_need(sim, gs4_move_emitter(sim, mouth, travel));
-            example_need(sim, gs4_move_collider(sim, body, vec(0, falls ? -drop / dropping : 0, 0),
-                                                vec(0, 0, 0)));
+            example_need(sim, gs4_move_emitter(sim, emitter, travel));
+            example_need(sim,
+                         gs4_move_collider(sim, collider, vec(0, falls ? -drop / dropping : 0, 0),
+                                           vec(0, 0, 0)));
             at = vec((double)at.x + (double)travel.x * dt, (double)at.y + (double)travel.y * dt,
                      (double)at.z + (double)travel.z * dt);
             lift -= falls ? drop / dropping * dt : 0;
@@ -144,7 +145,7 @@ int main(int argc, char **argv)
             }
             things[2].a[0] = things[2].b[0] = (float)at.x;
             things[2].a[2] = things[2].b[2] = (float)at.z;
-            things[2].a[1] = (float)((double)at.y + mouth_height);
+            things[2].a[1] = (float)((double)at.y + outlet_height);
             things[2].b[1] = (float)((double)at.y + 0.05);
             things[2].radius = (float)bead;
             e.look.solid_count = t < (double)nozzle.stop + 0.3 ? 3 : 2;

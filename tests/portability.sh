@@ -16,6 +16,8 @@ full='warnings tsan fused hashes asan arm hashes_double wasm windows tiny musl i
 long_functions=''
 # Tests of tests/main.c that run on foreign machines too: parts of their names. All of them run where it costs no more than here.
 few_tests='free_flight files_continue errors_desc errors_fill solid_stress poisson_shapes heat_walls phase_freezing'
+# Words that stood for two things, or that the field does not use: no identifier or comment of gs4mpm.h has one.
+retired='ghost rehears calm strayed hidden fading unseen turning kick frozen warmth afresh unsorted unturned mouth nozzle obstacle'
 # What the library may ask of libc; all of libm is allowed, and with GS4_PTHREADS what is named here.
 libc='malloc|free|mem(cpy|move|set|cmp)|str(len|cmp|chr)|f(open|close|read|write|flush|error)|rename|remove|stat|__assert_fail'
 pthreads='pthread_((mutex|cond)_[a-z]+|create|join)'
@@ -182,6 +184,8 @@ names() {
         new_macros $flags < "$tmp/implementation.c" 2> /dev/null | grep -vxFf "$tmp/block" | grep -vxE 'GS4_[A-Z0-9_]+|GS4MPM_(H|IMPLEMENTATION)|GS4I_IMPLEMENTED'
     done > "$tmp/m"
     check "so does the implementation, but for its guard" refused grep . "$tmp/m"
+    grep -niE "(^|[^a-z])($(echo $retired | tr ' ' '|'))" gs4mpm.h > "$tmp/m"
+    check "no word that is retired" refused grep . "$tmp/m"
     have ctags || return
     tags_of | grep -v ' __anon' > "$tmp/tags"
     half=$(implementation_line)

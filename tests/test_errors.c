@@ -441,9 +441,9 @@ static gs4_real err_counting_sdf(gs4_vec3 p, void *user)
                : (gs4_real)0.1;
 }
 
-/* The lattice of a mouth must be cut to the grid, or a large mouth takes for ever. Returns how
+/* The lattice of an emitter must be cut to the grid, or a large emitter takes for ever. Returns how
  * often the distance was asked for. */
-static int err_mouth_calls(void)
+static int err_emitter_calls(void)
 {
     gs4_sim *sim = err_sim();
     gs4_emitter e;
@@ -457,7 +457,7 @@ static int err_mouth_calls(void)
     return err_calls;
 }
 
-static void test_errors_large_mouth(void) { CHECK(err_mouth_calls() < 20000); }
+static void test_errors_large_emitter(void) { CHECK(err_emitter_calls() < 20000); }
 
 static void test_errors_emitter(void)
 {
@@ -480,7 +480,7 @@ static void test_errors_emitter(void)
     e.fill.jitter = (gs4_real)0.5;
     e.shape = err_shape(0);
     err_try_all(ERR_EMITTER, &e, sizeof e, fields, ERR_COUNT(fields));
-    if (err_mouth_calls() >= 20000) return; /* huge shapes would take for ever */
+    if (err_emitter_calls() >= 20000) return; /* huge shapes would take for ever */
     for (kind = 0; kind < 4; kind++) {
         e.shape = err_shape(kind);
         err_try_all(ERR_EMITTER, &e, sizeof e, shapes, ERR_COUNT(shapes));
@@ -538,7 +538,7 @@ static void test_errors_calls(void)
                     "collider");
         ERR_REFUSED(sim, gs4_move_emitter(sim, ids[i], good), GS4_ERROR_ARGUMENT, "emitter");
     }
-    /* the mouth's body */
+    /* the emitter's collider */
     ERR_REFUSED(sim, gs4_move_collider(sim, 1, good, good), GS4_ERROR_ARGUMENT, "emitter");
     ERR_REFUSED(sim, gs4_move_emitter(sim, 1, good), GS4_ERROR_ARGUMENT, "emitter");
     CHECK(err_goes_on(sim));
@@ -1394,7 +1394,7 @@ static void run_errors(void)
     RUN(test_errors_material);
     RUN(test_errors_fill);
     RUN(test_errors_collider);
-    RUN(test_errors_large_mouth);
+    RUN(test_errors_large_emitter);
     RUN(test_errors_emitter);
     RUN(test_errors_calls);
     RUN(test_errors_points);

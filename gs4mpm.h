@@ -8009,45 +8009,68 @@ static void gs4i_set_spin(const gs4i_particles *p, size_t i, gs4_vec3 w)
 
 /* ==== [[heat]] temperature, melting and heat flux of particles ================================= *
  *
- *     rho c dT/dt + div q = tau : D + sources,   q = -F_T k grad T + q_NL,
- *     q_NL + t (dq_NL/dt - L q_NL) = -(1 - F_T) k grad T
+ * Equation (7) of the manual for a particle. It has an enthalpy per heat capacity (K),
  *
- * What a particle holds is enthalpy, H/c = T + (L/c) fraction: as heat comes in T rises to T_m,
- * stays there while the liquid fraction of a material with latent heat goes from 0 to 1, and
- * rises again; back the same way. The phase follows with hysteresis: liquid once the fraction
- * has reached 1, solid once it is 0 again. With L = 0 both switch at T_m. Temperature and flux
- * evolve by rule 1 of the manual. With k_eff = k (F_T t + s) / (t + s) the stage on the nodes is
+ *     H/c = T + (latent/c) fraction,     latent heat in J/kg, liquid fraction 0 to 1:
  *
- *     (m c)_i (T~_i - T**_i) / s = sum_p [w_ip V tau:D + grad w_ip . V q** t / (t + s)]
- *                                + (div k_eff grad T~)_i     ([[conduction]])
+ * as heat comes in T rises to T_m, stays there while the fraction goes from 0 to 1, and rises
+ * again; back the same way. The phase has hysteresis: liquid once the fraction has reached 1,
+ * solid once it is 0 again. Without latent heat both switch at T_m.
  *
- * and a particle takes the rate r = sum_i w_ip (R - h^2/4 div grad R)_i, R = (T~ - T**) / s. To
- * nodes and back again a field is smoothed, f + h^2/4 div grad f, and R is made sharper by as
- * much: else modes would decay too slowly, and the stage, T~ = sum w (T + alpha_f dt r) + s (R -
- * r), would have an error of first order in dt. The sharpening moves heat between nodes: what
- * nodes gain particles gain, heat is conserved. */
+ * H/c, with the rate r (K/s), and the non-local flux follow (4); s is the weight of the stage
+ * there. What is implicit in T~ has the conductivity k_eff = k (F_T t_q + s) / (t_q + s). The stage
+ * of the nodes is
+ *
+ *     (m c)_i (T~_i - T**_i) / s = sum_p [w_ip V tau:D + grad w_ip . V q** t_q / (t_q + s)]
+ *                                + V_i (div k_eff grad T~)_i     ([[conduction]])
+ *
+ * and a particle takes the rate sum_i w_ip (R - h^2/4 lap R)_i, R = (T~ - T**) / s. Why the
+ * Laplacian: to nodes and back again a field f becomes f + (h^2/4) lap f. With R as it is modes
+ * decay too slowly, and the stage, T~ = sum w (T + alpha_f dt r) + s (R - r), has an error of
+ * first order in dt. The correction moves heat between nodes: what nodes gain particles gain, heat
+ * is conserved.
+ *
+ * What the grid does not see of the temperature of particles decays: r gets
+ * -rate (T** - sum_i w_ip (T** - h^2/4 lap T**)_i), which conserves heat and leaves alone what the
+ * grid does see. The rate is GS4I_MIXING k / (rho c h^2). Of the non-local part of conduction it
+ * is at most 1/t_q; and no rate is above what the integrator takes (gs4i_integrator.mixing). */
 
-/* What the grid cannot see of the temperature of particles fades at the rate GS4I_MIXING k /
- * (rho c h^2), as conduction over less than a cell has it (with a relaxation time t, the
- * non-local part at most at 1/t), and not in less than flip_decay_time. It is taken from T**
- * itself, T**_p less the gathered T** sharpened, in a form that conserves heat; not sharpened it
- * would cool what the grid does see. */
+/* Chosen: 4 k/(rho c h^2) is how fast the grid's own shortest mode along an axis decays, and what
+ * is shorter decays no slower. */
 #define GS4I_MIXING GS4I_C(4.0)
 
-/* W/(m K), of what has no conductivity, so that resistances can be added */
-#define GS4I_INSULATES GS4I_C(1e-15)
+/* W/(m K), in place of 0, so that resistances can be added: materials have 0 or at least 1e-12 */
+#define GS4I_LEAST_CONDUCTIVITY GS4I_C(1e-15)
 
+/* J/(kg K); W/(m K); t_q, s; F_T; T_m, K; 1 where viscosity heats, else 0 */
 typedef struct gs4i_heat_constants {
-    gs4i_lanes capacity, conductivity, flux_time, fourier, melting, heating /* 1: by viscosity */;
+    gs4i_lanes capacity, conductivity, flux_time, fourier, melting, heating;
     const gs4i_material_constants *of[GS4I_BATCH];
     int melts; /* some of those seen so far do */
 } gs4i_heat_constants;
 
-/* Of one batch: temperature (K), fraction, rate of H/c (K/s), what is owed (K): what warms by
- * less than its last digit in a step warms still; non-local flux (W/m^2) and its rate. */
+/* Of one batch: T (K), liquid fraction, rate of H/c (K/s); the rest of a change that T in its last
+ * digit does not hold (K), or what warms slowly would not warm; non-local flux (W/m^2), its rate */
 typedef struct gs4i_heat {
-    gs4i_lanes T, fraction, rate, owed, q[4], q_rate[4];
+    gs4i_lanes T, fraction, rate, remainder, q[4], q_rate[4];
 } gs4i_heat;
+
+/* What a batch gives to the nodes: weights times (m c, m c T**, V / k_eff, V). And as forces:
+ * grad w . (V q** t_q / (t_q + s)), with a flux only, + w power (W); and w times the mixing, W/K. */
+typedef struct gs4i_heat_given {
+    gs4_real nodes[4 * GS4I_BATCH];
+    gs4i_forces sources;
+} gs4i_heat_given;
+
+/* Heat of one batch, in scenes that have it. */
+typedef struct gs4i_heat_work {
+    const gs4i_integrator *integrator; /* of heat */
+    gs4_real ahead;                    /* laws see the temperature of so much later */
+    int with_flux;                     /* some material has a non-local flux */
+    gs4i_heat_constants constants;
+    gs4i_heat h;
+    gs4i_heat_given given;
+} gs4i_heat_work;
 
 static void gs4i_load_heat_constants(const gs4i_batch_constants *constants, gs4i_heat_constants *l)
 {
@@ -8073,7 +8096,7 @@ GS4I_INLINE void gs4i_load_heat(const gs4i_particles *p, size_t i, int n, gs4i_h
     memcpy(h->T, own[0], sizeof h->T);
     memcpy(h->fraction, own[1], sizeof h->fraction);
     memcpy(h->rate, own[2], sizeof h->rate);
-    memcpy(h->owed, own[3], sizeof h->owed);
+    memcpy(h->remainder, own[3], sizeof h->remainder);
     if (!p->with_flux) return;
     gs4i_to_lanes(p->flux + 4 * i, n, h->q);
     gs4i_to_lanes(p->flux_rate + 4 * i, n, h->q_rate);
@@ -8082,7 +8105,7 @@ GS4I_INLINE void gs4i_load_heat(const gs4i_particles *p, size_t i, int n, gs4i_h
 GS4I_INLINE void gs4i_store_heat(const gs4i_particles *p, size_t i, int n, const gs4i_heat *h)
 {
     gs4_real own[4 * GS4I_BATCH];
-    gs4i_from_lanes(h->T, h->fraction, h->rate, h->owed, own);
+    gs4i_from_lanes(h->T, h->fraction, h->rate, h->remainder, own);
     memcpy(p->heat + 4 * i, own, 4 * (size_t)n * sizeof *own);
     if (!p->with_flux) return;
     gs4i_from_lanes(h->q[0], h->q[1], h->q[2], h->q[3], own);
@@ -8091,60 +8114,59 @@ GS4I_INLINE void gs4i_store_heat(const gs4i_particles *p, size_t i, int n, const
     memcpy(p->flux_rate + 4 * i, own, 4 * (size_t)n * sizeof *own);
 }
 
-/* Add c * rise to the enthalpy. */
-GS4I_INLINE void gs4i_add_enthalpy_one(const gs4i_material_constants *mat, gs4_real rise,
+/* Add `change` (K) to H/c. */
+GS4I_INLINE void gs4i_add_enthalpy_one(const gs4i_material_constants *mat, gs4_real change,
                                        gs4_real *T, gs4_real *fraction)
 {
-    const gs4_real at = mat->melting, heat_integrator = *T + rise;
+    const gs4_real at = mat->melting, heated = *T + change;
     gs4_real above;
-    if ((*fraction <= 0 && heat_integrator <= at) || (*fraction >= 1 && heat_integrator >= at)) {
-        *T = heat_integrator;
+    if ((*fraction <= 0 && heated <= at) || (*fraction >= 1 && heated >= at)) {
+        *T = heated;
         return;
     }
-    above = (*T - at) + *fraction * mat->latent + rise;
+    above = (*T - at) + *fraction * mat->latent + change;
     *fraction = above <= 0 ? GS4I_C(0) : above >= mat->latent ? GS4I_C(1) : above / mat->latent;
     *T = above <= 0 ? at + above : above >= mat->latent ? at + (above - mat->latent) : at;
 }
 
 /* The same for a batch. */
-GS4I_INLINE void gs4i_add_enthalpy(const gs4i_heat_constants *l, gs4i_lanes rise, gs4i_lanes T,
+GS4I_INLINE void gs4i_add_enthalpy(const gs4i_heat_constants *l, gs4i_lanes change, gs4i_lanes T,
                                    gs4i_lanes fraction)
 {
     int b, plain = 1;
     GS4I_BATCH_LOOP(b) {
-        const gs4i_wide heat_integrator = T[b] + rise[b];
-        const gs4i_wide_mask stays =
-            ((fraction[b] <= GS4I_C(0)) & (heat_integrator <= l->melting[b]))
-            | ((fraction[b] >= GS4I_C(1)) & (heat_integrator >= l->melting[b]));
+        const gs4i_wide heated = T[b] + change[b];
+        const gs4i_wide_mask stays = ((fraction[b] <= GS4I_C(0)) & (heated <= l->melting[b]))
+                                     | ((fraction[b] >= GS4I_C(1)) & (heated >= l->melting[b]));
         plain &= gs4i_all(&stays);
     }
     if (plain) {
-        GS4I_BATCH_LOOP(b) T[b] += rise[b];
+        GS4I_BATCH_LOOP(b) T[b] += change[b];
         return;
     }
     for (b = 0; b < GS4I_BATCH; b++) {
         gs4_real own = GS4I_NTH(T, b), part = GS4I_NTH(fraction, b);
-        gs4i_add_enthalpy_one(l->of[b], GS4I_NTH(rise, b), &own, &part);
+        gs4i_add_enthalpy_one(l->of[b], GS4I_NTH(change, b), &own, &part);
         GS4I_NTH(T, b) = own;
         GS4I_NTH(fraction, b) = part;
     }
 }
 
 /* The temperature of H + ahead dH/dt. */
-static void gs4i_temperature_ahead(const gs4i_heat_constants *l, const gs4i_heat *h, gs4_real ahead,
-                                   gs4i_lanes T)
+static void gs4i_predict_temperature(const gs4i_heat_constants *l, const gs4i_heat *h,
+                                     gs4_real ahead, gs4i_lanes T)
 {
-    gs4i_lanes rise, fraction;
+    gs4i_lanes change, fraction;
     int b;
-    GS4I_BATCH_LOOP(b) rise[b] = ahead * h->rate[b];
+    GS4I_BATCH_LOOP(b) change[b] = ahead * h->rate[b];
     memcpy(T, h->T, sizeof h->T);
     memcpy(fraction, h->fraction, sizeof fraction);
-    gs4i_add_enthalpy(l, rise, T, fraction);
+    gs4i_add_enthalpy(l, change, T, fraction);
 }
 
-/* k_eff = k (F t + s) / (t + s), of what the rule takes implicitly. */
-GS4I_INLINE void gs4i_has_conductivity(const gs4i_heat_constants *l,
-                                       const gs4i_integrator *integrator, gs4i_lanes k)
+/* k_eff = k (F_T t_q + s) / (t_q + s), W/(m K). */
+GS4I_INLINE void gs4i_effective_conductivity(const gs4i_heat_constants *l,
+                                             const gs4i_integrator *integrator, gs4i_lanes k)
 {
     int b;
     GS4I_BATCH_LOOP(b)
@@ -8153,9 +8175,9 @@ GS4I_INLINE void gs4i_has_conductivity(const gs4i_heat_constants *l,
                   / (l->flux_time[b] + integrator->s));
 }
 
-/* q** + s L q~, with q~ predicted: what the non-local flux brings to the stage. */
-static void gs4i_flux_before(const gs4i_heat *h, const gs4i_integrator *integrator, gs4i_gradient L,
-                             gs4i_lanes q[3])
+/* q** + s L q~, L the velocity gradient, q~ predicted: the stage without its conduction. */
+static void gs4i_convected_flux(const gs4i_heat *h, const gs4i_integrator *integrator,
+                                gs4i_gradient L, gs4i_lanes q[3])
 {
     const gs4_real ahead = integrator->prediction.ahead, before = integrator->before,
                    s = integrator->s;
@@ -8169,92 +8191,102 @@ static void gs4i_flux_before(const gs4i_heat *h, const gs4i_integrator *integrat
                       + s * (L[c][0][b] * at[0][b] + L[c][1][b] * at[1][b] + L[c][2][b] * at[2][b]);
 }
 
-/* Heat of a batch on its way to the nodes: (m c, m c T**, V / k_eff, V), and as forces: grad w .
- * V q** t / (t + s), with a flux only, + w P, and w times the heat that mixes, W/K, see
- * [[conduction]]. */
-typedef struct gs4i_heat_sent {
-    gs4_real nodes[4 * GS4I_BATCH];
-    gs4i_forces sources;
-} gs4i_heat_sent;
-
-/* `power` in W; volumes in m^3. */
-static void gs4i_send_heat(const gs4i_heat_constants *l, const gs4i_heat *h,
-                           const gs4i_integrator *integrator, gs4i_gradient L,
-                           const gs4i_wide *mass, gs4i_lanes volume, gs4i_lanes power,
-                           int with_flux, gs4i_heat_sent *to)
+/* How strongly a particle mixes, W/K: capacity (J/K) times the rate of the section above. */
+GS4I_INLINE void gs4i_mixing_of(const gs4i_heat_work *w, gs4i_lanes volume, gs4i_lanes capacity,
+                                gs4i_lanes mixing)
 {
-    gs4i_lanes T, capacity, nodes, resists, mixes, q[3], none;
-    const gs4i_wide least = (mass[0] - mass[0]) + GS4I_INSULATES;
-    int b, c;
-    gs4i_temperature_ahead(l, h, integrator->before, T);
-    gs4i_has_conductivity(l, integrator, resists);
+    const gs4i_heat_constants *l = &w->constants;
+    int b;
     GS4I_BATCH_LOOP(b) {
-        capacity[b] = mass[b] * l->capacity[b];
-        nodes[b] = capacity[b] * T[b];
-        mixes[b] =
-            GS4I_MIXING * integrator->inv_area * l->conductivity[b] * volume[b] / capacity[b];
-        mixes[b] = capacity[b] * mixes[b]
-                   * (l->fourier[b]
-                      + (GS4I_C(1) - l->fourier[b]) / (GS4I_C(1) + mixes[b] * l->flux_time[b]));
-        GS4I_WIDE_MAX(resists[b], resists[b], least);
-        resists[b] = volume[b] / resists[b];
+        const gs4i_wide rate =
+            GS4I_MIXING * w->integrator->inv_area * l->conductivity[b] * volume[b] / capacity[b];
+        mixing[b] =
+            capacity[b] * rate
+            * (l->fourier[b] + (GS4I_C(1) - l->fourier[b]) / (GS4I_C(1) + rate * l->flux_time[b]));
     }
-    gs4i_from_lanes(capacity, nodes, resists, volume, to->nodes);
-    memset(none, 0, sizeof none);
-    gs4i_from_lanes(power, mixes, none, none, to->sources.weight);
-    if (!with_flux) return;
-    gs4i_flux_before(h, integrator, L, q);
-    for (c = 0; c < 3; c++)
-        GS4I_BATCH_LOOP(b)
-            q[c][b] *= volume[b] * (l->flux_time[b] / (l->flux_time[b] + integrator->s));
-    gs4i_from_lanes(q[0], none, none, none, to->sources.x);
-    gs4i_from_lanes(q[1], none, none, none, to->sources.y);
-    gs4i_from_lanes(q[2], none, none, none, to->sources.z);
 }
 
-/* S7: `from` is the sharpened T~ - T**, the rate of mixing, and times the temperature to mix to;
- * `slope` the gradient of T~, and the resistance of the nodes, read with a flux only. Where a
- * worse conductor is near, the non-local flux is that of nodes in series, as between them: more
- * of it than nodes conduct would drive a front that nothing holds. */
-static void gs4i_receive_heat(const gs4i_heat_constants *l, const gs4i_integrator *integrator,
-                              gs4i_lanes from[4], gs4i_lanes slope[4], gs4i_gradient L,
-                              int with_flux, gs4i_heat *h)
+/* S5: what a batch gives to the nodes; mass in kg, volume in m^3, power in W. */
+static void gs4i_give_heat(gs4i_heat_work *w, gs4i_gradient L, const gs4i_wide *mass,
+                           gs4i_lanes volume, gs4i_lanes power)
 {
-    gs4i_lanes gain, T, fraction, q[3], drives;
+    const gs4i_heat_constants *l = &w->constants;
+    const gs4i_wide least = (mass[0] - mass[0]) + GS4I_LEAST_CONDUCTIVITY;
+    gs4i_lanes T, capacity, heat, resistance, mixing, q[3], none;
+    gs4i_forces *sources = &w->given.sources;
     int b, c;
-    gs4i_temperature_ahead(l, h, integrator->before, T);
+    gs4i_predict_temperature(l, &w->h, w->integrator->before, T);
+    gs4i_effective_conductivity(l, w->integrator, resistance);
+    GS4I_BATCH_LOOP(b) {
+        capacity[b] = mass[b] * l->capacity[b];
+        heat[b] = capacity[b] * T[b];
+        GS4I_WIDE_MAX(resistance[b], resistance[b], least);
+        resistance[b] = volume[b] / resistance[b];
+    }
+    gs4i_mixing_of(w, volume, capacity, mixing);
+    gs4i_from_lanes(capacity, heat, resistance, volume, w->given.nodes);
+    memset(none, 0, sizeof none);
+    gs4i_from_lanes(power, mixing, none, none, sources->weight);
+    if (!w->with_flux) return;
+    gs4i_convected_flux(&w->h, w->integrator, L, q);
+    for (c = 0; c < 3; c++)
+        GS4I_BATCH_LOOP(b)
+            q[c][b] *= volume[b] * (l->flux_time[b] / (l->flux_time[b] + w->integrator->s));
+    gs4i_from_lanes(q[0], none, none, none, sources->x);
+    gs4i_from_lanes(q[1], none, none, none, sources->y);
+    gs4i_from_lanes(q[2], none, none, none, sources->z);
+}
+
+/* S7 of H: from[] is R s, the rate of mixing, and that times the temperature to mix to. */
+static void gs4i_correct_enthalpy(gs4i_heat_work *w, gs4i_lanes from[4])
+{
+    const gs4i_integrator *integrator = w->integrator;
+    gs4i_heat *h = &w->h;
+    gs4i_lanes gain, T, fraction;
+    int b;
+    gs4i_predict_temperature(&w->constants, h, integrator->before, T);
     GS4I_BATCH_LOOP(b) {
         const gs4i_wide change =
             ((from[0][b] * (1 / integrator->s) - (from[1][b] * T[b] - from[2][b])) - h->rate[b])
             * integrator->inv_alpha_m;
         gain[b] = (integrator->dt * h->rate[b] + integrator->gamma * integrator->dt * change)
-                  + h->owed[b];
+                  + h->remainder[b];
         h->rate[b] += change;
     }
     memcpy(T, h->T, sizeof T);
     memcpy(fraction, h->fraction, sizeof fraction);
-    gs4i_add_enthalpy(l, gain, h->T, h->fraction);
+    gs4i_add_enthalpy(&w->constants, gain, h->T, h->fraction);
     GS4I_BATCH_LOOP(b) {
-        const gs4i_wide zero = gain[b] - gain[b], owed = gain[b] - (h->T[b] - T[b]);
+        const gs4i_wide zero = gain[b] - gain[b], remainder = gain[b] - (h->T[b] - T[b]);
         const gs4i_wide_mask same =
             (h->fraction[b] <= fraction[b]) & (h->fraction[b] >= fraction[b]);
-        GS4I_CHOOSE(h->owed[b], same, owed, zero);
+        GS4I_CHOOSE(h->remainder[b], same, remainder, zero);
     }
-    if (!with_flux) return;
-    gs4i_flux_before(h, integrator, L, q);
-    gs4i_has_conductivity(l, integrator, drives);
+}
+
+/* S7 of the non-local flux: slope[] is grad T~ (K/m), and 1/k_eff of the nodes (m K/W). Where a
+ * worse conductor is near, the flux is that of nodes in series, as between them. More of it than
+ * nodes conduct would drive a front that nothing holds. */
+static void gs4i_correct_flux(gs4i_heat_work *w, gs4i_lanes slope[4], gs4i_gradient L)
+{
+    const gs4i_heat_constants *l = &w->constants;
+    const gs4i_integrator *integrator = w->integrator;
+    gs4i_heat *h = &w->h;
+    gs4i_lanes q[3], k /* (1 - F_T) k */;
+    int b, c;
+    gs4i_convected_flux(h, integrator, L, q);
+    gs4i_effective_conductivity(l, integrator, k);
     GS4I_BATCH_LOOP(b) {
         const gs4i_wide one = (h->T[b] - h->T[b]) + GS4I_C(1);
-        gs4i_wide resists = drives[b] * slope[3][b];
-        GS4I_WIDE_MAX(resists, resists, one);
-        drives[b] = (GS4I_C(1) - l->fourier[b]) * l->conductivity[b] / resists;
+        gs4i_wide in_series = k[b] * slope[3][b];
+        GS4I_WIDE_MAX(in_series, in_series, one);
+        k[b] = (GS4I_C(1) - l->fourier[b]) * l->conductivity[b] / in_series;
     }
     for (c = 0; c < 3; c++)
         GS4I_BATCH_LOOP(b) {
             const gs4i_wide before = h->q[c][b] + integrator->before * h->q_rate[c][b];
-            const gs4i_wide stage =
-                (l->flux_time[b] * q[c][b] - integrator->s * drives[b] * slope[c][b])
-                / (l->flux_time[b] + integrator->s);
+            const gs4i_wide stage = (l->flux_time[b] * q[c][b] - integrator->s * k[b] * slope[c][b])
+                                    / (l->flux_time[b] + integrator->s);
             const gs4i_wide change = ((stage - before) * (1 / integrator->s) - h->q_rate[c][b])
                                      * integrator->inv_alpha_m;
             h->q[c][b] +=
@@ -8453,15 +8485,6 @@ GS4I_INLINE void gs4i_check_liquids(gs4i_report *r, const gs4i_wide *J, gs4i_lan
     }
 }
 
-/* Heat of one batch, in scenes that have it. */
-typedef struct gs4i_heat_work {
-    const gs4i_integrator *integrator; /* of heat */
-    gs4_real ahead;                    /* laws see the temperature of so much later */
-    gs4i_heat_constants constants;
-    gs4i_heat h;
-    gs4i_heat_sent sent;
-} gs4i_heat_work;
-
 /* What laws need to know of a batch, and where they say what they saw. */
 typedef struct gs4i_response {
     const gs4i_particles *p;
@@ -8492,7 +8515,7 @@ static void gs4i_load_batch_heat(gs4i_response *r)
     gs4i_load_heat(r->p, r->i, r->n, &w->h);
     gs4i_load_heat_constants(&r->constants, &w->constants);
     if (r->constants.callbacks)
-        gs4i_temperature_ahead(&w->constants, &w->h, w->ahead, r->constants.temperature);
+        gs4i_predict_temperature(&w->constants, &w->h, w->ahead, r->constants.temperature);
 }
 
 GS4I_INLINE gs4_real *gs4i_elastic_of(const gs4i_response *r)
@@ -8572,7 +8595,7 @@ GS4I_INLINE void gs4i_stress(gs4i_response *r, gs4i_gradient L, const gs4i_wide 
 }
 
 /* tau:D (W) of particles that viscosity heats: the stress without the pressure, whose work
- * compression gives back; and what the batch sends to the nodes of heat. */
+ * compression gives back; and what the batch gives to the nodes. */
 static void gs4i_heat_of_stress(gs4i_response *r, const gs4i_wide *mass, const gs4i_wide *J,
                                 gs4i_gradient L, gs4i_symmetric sigma)
 {
@@ -8589,8 +8612,7 @@ static void gs4i_heat_of_stress(gs4i_response *r, const gs4i_wide *mass, const g
                + (sigma[2][b] + p) * L[2][2][b] + sigma[3][b] * (L[0][1][b] + L[1][0][b])
                + sigma[4][b] * (L[0][2][b] + L[2][0][b]) + sigma[5][b] * (L[1][2][b] + L[2][1][b]));
     }
-    gs4i_send_heat(&w->constants, &w->h, w->integrator, L, mass, volume, power, r->p->with_flux,
-                   &w->sent);
+    gs4i_give_heat(w, L, mass, volume, power);
 }
 
 /* The integrator of quantities that have no rates: backward Euler. */
@@ -9935,16 +9957,16 @@ static void gs4i_clear_heat_tiles(gs4i_heat_pass *h)
 GS4I_INLINE void gs4i_scatter_heat(const gs4_sim *sim, gs4i_heat_pass *heat, const gs4i_stencils *s,
                                    int n)
 {
-    const gs4i_heat_sent *sent = &heat->work.sent;
+    const gs4i_heat_given *given = &heat->work.given;
     int b;
     for (b = 0; b < n; b++)
         if (s->base[b] >= 0) {
-            gs4i_scatter_quad(heat->nodes, s, b, sent->nodes + 4 * b);
+            gs4i_scatter_quad(heat->nodes, s, b, given->nodes + 4 * b);
             if (!sim->conduction.heat_sources) continue;
             if (sim->particles.with_flux)
-                gs4i_scatter_force(heat->sources, s, b, &sent->sources);
+                gs4i_scatter_force(heat->sources, s, b, &given->sources);
             else
-                gs4i_scatter_quad(heat->sources, s, b, sent->sources.weight + 4 * b);
+                gs4i_scatter_quad(heat->sources, s, b, given->sources.weight + 4 * b);
         }
 }
 
@@ -9965,8 +9987,8 @@ static void gs4i_load_heat_tiles(const gs4_sim *sim, int o, gs4i_heat_pass *h)
 }
 
 /* S7 of heat for a batch, whose constants are there. */
-static void gs4i_gather_heat(const gs4_sim *sim, const gs4i_response *r, const gs4i_stencils *s,
-                             gs4i_gradient L, gs4i_heat_pass *heat)
+static void gs4i_gather_heat(const gs4i_response *r, const gs4i_stencils *s, gs4i_gradient L,
+                             gs4i_heat_pass *heat)
 {
     const gs4i_particles *p = r->p;
     gs4i_heat_work *w = &heat->work;
@@ -9994,7 +10016,8 @@ static void gs4i_gather_heat(const gs4_sim *sim, const gs4i_response *r, const g
         gs4i_to_lanes(g.value, r->n, column);
         memcpy(slope[3], column[3], sizeof slope[3]);
     }
-    gs4i_receive_heat(&w->constants, &sim->heat_integrator, value, slope, L, p->with_flux, &w->h);
+    gs4i_correct_enthalpy(w, value);
+    if (p->with_flux) gs4i_correct_flux(w, slope, L);
     gs4i_store_heat(p, r->i, r->n, &w->h);
     /* hysteresis: in between the phase stays */
     for (b = 0; b < r->n && w->constants.melts; b++)
@@ -10022,6 +10045,7 @@ static void gs4i_begin_response(gs4i_response *r, const gs4_sim *sim, const gs4i
     if (!heat) return;
     memset(&heat->work.constants, 0, sizeof heat->work.constants);
     heat->work.integrator = &sim->heat_integrator;
+    heat->work.with_flux = p->with_flux;
     heat->work.ahead = sim->heat_integrator.prediction.ahead;
     r->heat = &heat->work;
 }
@@ -11505,7 +11529,7 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_heat
             gs4i_validate_batch(&q, k.L, p.position + 4 * i, n, g->h, p.id + i, report);
             continue;
         }
-        if (heat) gs4i_gather_heat(sim, &r, &s, k.L, heat);
+        if (heat) gs4i_gather_heat(&r, &s, k.L, heat);
         gs4i_pack_batch(&q, 1, &out);
         if (edge) gs4i_correct_contact(sim, i, n, &out, &u, report);
         gs4i_see_motion(&r.seen, q.v, k.L);
@@ -11740,7 +11764,7 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, gs4i
             gs4i_validate_batch(&q, C, p.position + 4 * i, n, g->h, p.id + i, report);
             continue;
         }
-        if (heat) gs4i_gather_heat(sim, &r, &s, C, heat);
+        if (heat) gs4i_gather_heat(&r, &s, C, heat);
         gs4i_pack_batch(&q, 0, &out);
         if (edge) gs4i_correct_contact(sim, i, n, &out, &u, report);
         gs4i_see_motion(&r.seen, q.v, C);
@@ -11986,7 +12010,7 @@ static void gs4i_heat_faces(int z, void *context)
 }
 
 /* Faces below this share of the best one are closed. The solver takes a contrast of 1e30; nodes
- * that are nearly empty and insulators (GS4I_INSULATES) make more. 1e-25 of a flow is nothing. */
+ * that are nearly empty and insulators (GS4I_LEAST_CONDUCTIVITY) make more. 1e-25 of a flow is nothing. */
 #define GS4I_NEGLIGIBLE_FACE GS4I_C(1e-25)
 
 static void gs4i_close_negligible_faces(const gs4i_conduction *k)
@@ -15811,7 +15835,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_IMAGE_NODES
 #undef GS4I_IMAGE_REACH
 #undef GS4I_INLINE
-#undef GS4I_INSULATES
+#undef GS4I_LEAST_CONDUCTIVITY
 #undef GS4I_IS_LIQUID
 #undef GS4I_IS_OPEN
 #undef GS4I_J_HIGH

@@ -40,7 +40,7 @@
  *     [[config]]    version, precision, linkage      [[base]]      arithmetic, memory, text, tasks
  *     [[types]]     results, vectors, shapes, hooks  [[vec]]       three-vectors and shapes
  *     [[materials]] what matter is                   [[poisson]]   multigrid on a masked grid
- *     [[sim]]       description, scene, stepping     [[krylov]]    conjugate gradients, any operator
+ *     [[sim]]       description, scene, stepping     [[krylov]]    conjugate gradients
  *     [[poisson]]   the elliptic solver by itself    [[kernel]]    quadratic B-splines on 27 nodes
  *                                                    [[grid]]      blocks of nodes near material
  *                                                    [[box]]       dense box of cells around them

@@ -46,6 +46,7 @@ int main(int count, char **values)
     RUN(test_heat_stiff);
     RUN(test_heat_pulse);
     RUN(test_heat_surface);
+    RUN(test_heat_seam);
     RUN(test_heat_walls);
     RUN(test_heat_stefan);
     RUN(test_heat_conserved);

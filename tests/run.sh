@@ -1,16 +1,17 @@
 #!/bin/sh
-# The tests: sh tests/run.sh            under a minute: all quick tests in float and in double, and the cheap part of portability.sh
-#            sh tests/run.sh --full     the quick tests with more random draws, and all compilers, machines and sanitizers that are installed
+# The tests: sh tests/run.sh            quick ones in float and in double, and the cheap part of portability.sh: about a minute of
+#                                      processor time, a third of it to compile (user + sys of `bash -c 'time sh tests/run.sh'`)
+#            sh tests/run.sh --full     all but the slow tests, and all compilers, machines and sanitizers that are installed
 #            sh tests/run.sh --nightly  the slow tests, too
-# CC and CFLAGS choose compiler and flags of the quick tests. The last line counts.
+# CC and CFLAGS choose compiler and flags of tests/main.c. The last line counts.
 # shellcheck disable=SC2086             # flags are split on purpose
 set -u
 cd "$(dirname "$0")/.." || exit 1
 CC=${CC:-cc}; export CC
 case "${1:-}" in
-    '') slow='' part=quick ;;
-    --full) slow=--full part=full ;;
-    --nightly) slow=--slow part=full ;;
+    '') slow='' part=quick level=-O1 ;;
+    --full) slow=--full part=full level=-O2 ;;
+    --nightly) slow=--slow part=full level=-O2 ;;
     *) echo "usage: sh tests/run.sh [--full | --nightly]"; exit 2 ;;
 esac
 tmp=$(mktemp -d) || exit 1
@@ -20,7 +21,7 @@ trap 'exit 1' HUP INT TERM
 
 # tests NAME FLAGS: tests/main.c in one precision
 tests() {
-    $CC -O2 $native ${CFLAGS:-} $2 -DGS4_PTHREADS -pthread -I. tests/main.c -o "$tmp/$1" -lm && (cd "$tmp" && "./$1" $slow)
+    $CC $level $native ${CFLAGS:-} $2 -DGS4_PTHREADS -pthread -I. tests/main.c -o "$tmp/$1" -lm && (cd "$tmp" && "./$1" $slow)
 }
 
 tests double -DGS4_DOUBLE > "$tmp/double.log" 2>&1 &

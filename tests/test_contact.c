@@ -876,16 +876,16 @@ static void test_contact_piston(void)
 
 static void run_contact(void)
 {
-    RUN(test_contact_friction);
-    RUN(test_contact_slip);
-    RUN(test_contact_friction_holds);
-    RUN(test_contact_channel);
-    RUN(test_contact_sticky_wall);
-    RUN(test_contact_leaves);
-    RUN(test_contact_carries);
-    RUN(test_contact_rides);
-    RUN(test_contact_sweeps);
-    RUN(test_contact_spins);
-    RUN(test_contact_holds_out);
-    RUN(test_contact_piston);
+    RUN_ONCE(test_contact_friction);
+    RUN_ONCE(test_contact_slip);
+    RUN_ONCE(test_contact_friction_holds);
+    RUN_ONCE(test_contact_channel);
+    RUN_ONCE(test_contact_sticky_wall);
+    RUN_ONCE(test_contact_leaves);
+    RUN_ONCE(test_contact_carries);
+    RUN_ONCE(test_contact_rides);
+    RUN_ONCE(test_contact_sweeps);
+    RUN_ONCE(test_contact_spins);
+    RUN_ONCE(test_contact_holds_out);
+    RUN_ONCE(test_contact_piston);
 }

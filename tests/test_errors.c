@@ -215,6 +215,12 @@ static void err_try(err_target target, const void *base, size_t size, const err_
     gs4_destroy(sim);
 }
 
+/* An anisotropy of 1e6 is seconds of substeps in float. */
+static int err_is_slow(const err_field *f, int v)
+{
+    return (double)(gs4_real)err_value(v) == 1e6 && strcmp(f->name, "anisotropy") == 0;
+}
+
 static void err_try_all(err_target target, const void *base, size_t size, const err_field *fields,
                         int count)
 {
@@ -224,7 +230,9 @@ static void err_try_all(err_target target, const void *base, size_t size, const 
             for (v = 0; v < ERR_INTEGERS; v++)
                 err_try(target, base, size, &fields[f], (double)err_integer(v));
         else
-            for (v = 0; v < ERR_VALUES; v++) err_try(target, base, size, &fields[f], err_value(v));
+            for (v = 0; v < ERR_VALUES; v++)
+                if (test_full || !err_is_slow(&fields[f], v))
+                    err_try(target, base, size, &fields[f], err_value(v));
     }
 }
 
@@ -1393,9 +1401,9 @@ static void run_errors(void)
     RUN(test_errors_desc);
     RUN(test_errors_material);
     RUN(test_errors_fill);
-    RUN(test_errors_collider);
+    RUN_ONCE(test_errors_collider);
     RUN(test_errors_large_emitter);
-    RUN(test_errors_emitter);
+    RUN_ONCE(test_errors_emitter);
     RUN(test_errors_calls);
     RUN(test_errors_points);
     RUN(test_errors_null);
@@ -1414,7 +1422,7 @@ static void run_errors(void)
     RUN(test_errors_material_all_or_nothing);
     RUN(test_errors_point);
     RUN(test_errors_refused_step);
-    RUN(test_errors_viscosity_callback);
+    RUN_ONCE(test_errors_viscosity_callback);
     RUN(test_errors_no_end);
     RUN(test_errors_leaps);
     RUN(test_errors_max_particles);

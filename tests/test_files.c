@@ -408,10 +408,10 @@ static void test_files_memory(void)
         reference = files_scenario(euler, &m, -1, 0, &refused);
         CHECK(refused == 0);
         calls = m.calls;
-        for (k = 0; k < calls; k += test_slow || !warm ? 1 : 5) {
+        for (k = 0; k < calls; k += test_slow ? 1 : !test_full ? 23 : warm ? 5 : 1) {
             CHECK(files_scenario(euler, &m, k, 0, &refused) == reference);
             CHECK(refused == 1);
-            if (k % (warm ? 4 : 3) && !test_slow) continue;
+            if (k % (!test_full ? 2 : warm ? 4 : 3) && !test_slow) continue;
             CHECK(files_scenario(euler, &m, k, 1, &refused) == reference);
             CHECK(refused == 1);
         }
@@ -857,7 +857,7 @@ static void test_files_continue(void)
     static const int steps[] = { 0, 1, 2, 7, 40 };
     int which, i;
     for (which = 0; which < 4; which++)
-        for (i = 0; i < 5; i++) {
+        for (i = test_full ? 0 : 3; i < (test_full ? 5 : 4); i++) {
             const int euler = which % 2;
             gs4_sim_desc d;
             files_warm = which / 2;
@@ -1291,7 +1291,7 @@ static void run_files(void)
 {
     files_begin();
     RUN_ONCE(test_files_memory);
-    RUN(test_files_load_refused);
+    RUN_ONCE(test_files_load_refused);
     RUN(test_files_frames);
     RUN(test_files_places);
     RUN(test_files_previous);

@@ -86,7 +86,7 @@ static void heat_mode_exact(double F, double tau, double conductivity, double ti
     }
 }
 
-/* Fourier, Cattaneo (a wave where 4 kappa tau > 1) and mixed: spatial order >= 1.8. The exact
+/* Fourier, Cattaneo (a wave where 4 kappa tau > 1) and mixed: order in space 1.8 to 2. The exact
  * solution agrees with rows of the shared reference, which was made independently. */
 static void test_heat_modes(void)
 {
@@ -97,8 +97,8 @@ static void test_heat_modes(void)
                                             { 0.4824163053713996, 0.219334403297799 },
                                             { 0.9520249000369154, 0.09358471268634983 } };
     int c, i;
-    for (c = 0; c < 4; c++)
-        for (i = 0; i < (test_slow || c == 1 ? 2 : 1); i++) {
+    for (c = 0; c < (test_full ? 4 : 3); c++)
+        for (i = 0; i < (test_full || c == 1 ? 2 : 1); i++) {
             heat_bar bar = { c == 2 ? 16 : 8,
                              cases[c][0],
                              cases[c][1],
@@ -122,54 +122,52 @@ static void test_heat_modes(void)
                 printf("F %g tau %g, %s: error %.2e, %.2e with twice the cells, flux %.2e\n", bar.F,
                        bar.tau, i ? "Euler" : "GS4", coarse - exact, fine - exact,
                        flux - exact_flux);
-            CHECK(fabs(fine - exact) < 0.002);
-            CHECK(log2(fabs(coarse - exact) / fabs(fine - exact)) > 1.8);
+            CHECK_CLOSE(fine, exact, 0.0016);
+            CHECK_BETWEEN(log2(fabs(coarse - exact) / fabs(fine - exact)), 1.8, 2);
             /* half a per cent at 32 cells a wave; Euler: and of first order in dt */
             CHECK_CLOSE(flux, exact_flux, (i ? 0.007 : 0.005) * exact_flux);
         }
 }
 
-/* Second order in time for any member of the family that the explicit scheme takes, against a
- * step 16 times smaller. With rho_inf = 1 all of them are one where heat is: alpha_f = 1/2 and
- * alpha_m = gamma, so y** = y and y += dt R whatever rho_s is. So (1, 1), which has no explicit
- * step, gives what (1, 0) and (1, 0.9) do. */
+/* Second order in time for any member of the family that the explicit scheme takes: what a step
+ * half as long changes, over what one a quarter as long changes then. At 0.002 and below the rest is
+ * of first order, 1e-6 here and 16 times less with twice the cells: grid and particles do not hold
+ * quite the same rate. With rho_inf = 1 all of them
+ * are one where heat is: alpha_f = 1/2 and alpha_m = gamma, so y** = y and y += dt R whatever rho_s
+ * is. So (1, 1), which has no explicit step, gives what (1, 0) and (1, 0.9) do. */
 static void test_heat_order_in_time(void)
 {
-    static const double members[5][2] = {
-        { 0, 0 }, { 0.5, 0 }, { 1, 0 }, { 0.5, 0.5 }, { 1, 0.9 }
-    };
+    static const double members[6][2] = { { 0, 0 },   { 0.5, 0 },   { 1, 0 },
+                                          { 1, 0.9 }, { 0.5, 0.5 }, { 0.8, 0.2 } };
     static const double kinds[3][2] = { { 1, 0 }, { 0, 1 }, { 0.5, 0.3 } };
     double crank_nicolson[3] = { 0, 0, 0 };
-    int c, k;
+    int c, k, i;
     if (sizeof(gs4_real) != 8) return;
-    for (c = 0; c < 5; c += test_slow ? 1 : 4)
+    for (c = 0; c < 6; c++)
         for (k = 0; k < 3; k++) {
             heat_bar bar = { 16,
                              kinds[k][0],
                              kinds[k][1],
                              1,
-                             0.02,
+                             0.04,
                              0.4,
                              GS4_INTEGRATOR_GS4,
                              members[c][0],
                              members[c][1],
                              0,
                              0 };
-            double a[3], flux[3];
-            heat_mode(&bar, &a[0], &flux[0]);
-            bar.dt = 0.01;
-            heat_mode(&bar, &a[1], &flux[1]);
-            bar.dt = 0.01 / 16;
-            heat_mode(&bar, &a[2], &flux[2]);
+            double a[3], flux[3], order, flux_order;
+            for (i = 0; i < 3; i++, bar.dt /= 2) heat_mode(&bar, &a[i], &flux[i]);
+            order = log2(fabs(a[0] - a[1]) / fabs(a[1] - a[2]));
+            flux_order = log2(fabs(flux[0] - flux[1]) / fabs(flux[1] - flux[2]));
             if (test_filter[0])
                 printf("(%g, %g) F %g tau %g: order %.2f, of the flux %.2f\n", bar.rho,
-                       bar.spurious, bar.F, bar.tau, log2((a[0] - a[2]) / (a[1] - a[2])),
-                       bar.tau > 0 ? log2((flux[0] - flux[2]) / (flux[1] - flux[2])) : 0);
-            CHECK(log2(fabs(a[0] - a[2]) / fabs(a[1] - a[2])) > 1.9);
+                       bar.spurious, bar.F, bar.tau, order, bar.tau > 0 ? flux_order : 0);
+            CHECK_BETWEEN(order, 1.86, 2.16);
+            if (bar.tau > 0) CHECK_BETWEEN(flux_order, 1.86, 2.16);
             if (c == 2) crank_nicolson[k] = a[0];
             /* to what the solver leaves */
-            if (c == 4 && test_slow) CHECK_CLOSE(a[0], crank_nicolson[k], 1e-9);
-            if (bar.tau > 0) CHECK(log2(fabs(flux[0] - flux[2]) / fabs(flux[1] - flux[2])) > 1.9);
+            if (c == 3) CHECK_CLOSE(a[0], crank_nicolson[k], 1e-9);
         }
 }
 
@@ -275,65 +273,14 @@ static void test_heat_surface(void)
                                          0.08450443389231788 };
     double coarse[3], fine[3];
     int r;
-    heat_ball(6, coarse);
-    heat_ball(12, fine);
+    heat_ball(test_full ? 6 : 4, coarse);
+    heat_ball(test_full ? 12 : 8, fine);
     for (r = 0; r < 3; r++) {
         if (test_filter[0])
             printf("mean %.4f and %.4f, exact %.4f\n", coarse[r], fine[r], reference[r]);
-        CHECK(fabs(fine[r] / reference[r] - 1) < 0.045);
+        CHECK_CLOSE(fine[r] / reference[r], 1, test_full ? 0.035 : 0.08);
         CHECK(fabs(fine[r] / reference[r] - 1) < 0.6 * fabs(coarse[r] / reference[r] - 1));
     }
-}
-
-/* What is left of the heat of a slab of eight cells in air at 0, or with half of it a cold block,
- * which begins at cell `first` of a periodic axis. */
-static double heat_slab(int first, int with_block)
-{
-    gs4_sim_desc d = scene_cube(16);
-    gs4_material m = scene_liquid(1, 0, 1e-3);
-    gs4_fill f = scene_fill(at(0, 0, 0));
-    gs4_collider c;
-    gs4_sim *sim;
-    double start, left;
-    int i;
-    memset(&c, 0, sizeof c);
-    d.cells[1] = d.cells[2] = 4;
-    d.walls[0] = d.walls[1] = GS4_WALL_PERIODIC;
-    d.air_is_isothermal = !with_block;
-    m.heat_capacity = m.conductivity = 1;
-    f.temperature = 1;
-    sim = physics_create(&d, &m);
-    CHECK_RESULT(
-        sim,
-        gs4_add_particles(sim, gs4_box(at(first / 16.0, 0, 0), at(first / 16.0 + 0.5, 1, 1)), &f),
-        GS4_OK);
-    if (with_block) { /* on the low side of the slab */
-        const double end = first ? first / 16.0 : 1;
-        c.shape = gs4_box(at(end - 0.25, -1, -1), at(end, 2, 2));
-        c.contact = GS4_WALL_SLIP;
-        c.is_isothermal = 1;
-        CHECK_RESULT(sim, gs4_add_collider(sim, &c), 0);
-    }
-    start = gs4_get_stats(sim).thermal_energy;
-    for (i = 0; i < 20; i++) CHECK_RESULT(sim, gs4_step(sim, (gs4_real)1e-3), GS4_OK);
-    left = gs4_get_stats(sim).thermal_energy / start;
-    gs4_destroy(sim);
-    return left;
-}
-
-/* Surfaces at the seam of a periodic axis, low and high, and next to it, are as all others. */
-static void test_heat_seam(void)
-{
-    static const int first[4] = { 0, 1, 7, 8 };
-    const double air = heat_slab(4, 0), block = heat_slab(4, 1);
-    int i;
-    CHECK(air < 0.45 && block > air + 0.2 && block < 0.8);
-    for (i = 0; i < 4; i++) {
-        const double there = heat_slab(first[i], 0);
-        if (test_filter[0]) printf("at %d: %.6f, else %.6f\n", first[i], there, air);
-        CHECK_CLOSE(there, air, 1e-5);
-    }
-    CHECK_CLOSE(heat_slab(0, 1), block, 1e-5);
 }
 
 /* A bar between walls at 1 and 3: the straight line, in the midst and at the ends; and beside a
@@ -425,7 +372,7 @@ static void test_heat_stefan(void)
         { 1, 1, 0.377759788203411083, 0.3 }, { 0.01, 0, 0.0705932765604293144, 0.5 }
     };
     int c;
-    for (c = 0; c < (test_slow ? 6 : 4); c++) {
+    for (c = 0; c < (test_slow ? 6 : test_full ? 4 : 2); c++) {
         const double number = c == 5 ? 10 : c == 3 ? 8 : 2;
         const double fine = heat_front(test_slow ? 64 : 32, cases[c][0], cases[c][1], cases[c][2],
                                        cases[c][3], number);
@@ -434,7 +381,10 @@ static void test_heat_stefan(void)
         if (test_filter[0])
             printf("Ste %g, %g: front %.4f and %.4f of the exact one\n", cases[c][0], cases[c][1],
                    coarse, fine);
-        CHECK(fabs(fine - 1) < (test_slow ? 0.02 : 0.03));
+        if (test_slow)
+            CHECK_CLOSE(fine, 1, c == 4 ? 0.016 : 0.006);
+        else
+            CHECK_CLOSE(fine, 1, 0.0125);
         CHECK(fabs(fine - 1) < 0.75 * fabs(coarse - 1) || fabs(fine - 1) < 2e-3);
     }
 }
@@ -449,7 +399,7 @@ static void test_heat_conserved(void)
         gs4_fill f = scene_fill(at(0, 0, 0));
         gs4_sim *sim;
         double before, after;
-        const int steps = test_slow ? 1000 : 200;
+        const int steps = test_full ? 1000 : 100;
         d.gravity = at(0, -9.81, 0);
         d.integrator = physics_integrators[c];
         d.solver_tolerance = (gs4_real)(sizeof(gs4_real) == 8 ? 1e-8 : 1e-5);
@@ -475,6 +425,9 @@ static void test_heat_conserved(void)
                    gs4_get_stats(sim).time, gs4_get_stats(sim).min_temperature,
                    gs4_get_stats(sim).max_temperature);
         CHECK_CLOSE(after / before, 1, sizeof(gs4_real) == 8 ? 1e-6 : 2e-5);
+        /* 0 and 60 were given: 1 % of the jump beyond */
+        CHECK_BETWEEN(gs4_get_stats(sim).min_temperature, -0.6, 1);
+        CHECK_BETWEEN(gs4_get_stats(sim).max_temperature, 20, 60.6);
         gs4_destroy(sim);
     }
 }
@@ -596,7 +549,7 @@ static void test_phase_freezing(void)
         printf("kinetic energy %.6g before, at most %.6g, %.6g after freezing\n", before, most,
                after);
     CHECK(most < 1.002 * before);
-    CHECK(after > 0.8 * before);
+    CHECK_BETWEEN(after / before, 0.8, 1.002);
     gs4_destroy(sim);
 }
 
@@ -605,7 +558,7 @@ static void test_phase_freezing(void)
 static void test_phase_melting(void)
 {
     int c;
-    for (c = 0; c < 2; c++) {
+    for (c = 0; c < (test_full ? 2 : 1); c++) {
         gs4_sim_desc d = scene_cube(12);
         gs4_material m = scene_liquid(1000, 5, 8);
         gs4_fill f = scene_fill(at(0, 0, 0));
@@ -734,7 +687,7 @@ static void test_heat_uneven_steps(void)
 {
     static const double lengths[6] = { 1, 1e-3, 0.3, 1, 1e-6, 1 };
     int c;
-    for (c = 0; c < 16; c++) {
+    for (c = 0; c < 16; c += test_full ? 1 : 3) {
         gs4_sim_desc d = scene_cube(8);
         gs4_material m = scene_liquid(60, 0.1, 20), poor;
         gs4_fill f = scene_fill(at(c & 1 ? 2 : 0, c & 1 ? 1.4 : 0, 0));
@@ -1296,7 +1249,7 @@ static double heat_number(const gs4_sim *sim)
  * changed nothing, nothing is ever NaN or infinite, and in what is insulated heat stays. */
 static void test_heat_draws(void)
 {
-    const int draws = test_slow ? 20000 : 300;
+    const int draws = test_slow ? 20000 : test_full ? 300 : 100;
     int draw, refused[3] = { 0, 0, 0 }, steps = 0;
     double lost = 0;
     for (draw = 0; draw < draws; draw++) {
@@ -1356,7 +1309,8 @@ static void test_heat_draws(void)
  * cos x in an insulated bar, by 2e-5 K a step and less. */
 static void test_heat_slowly(void)
 {
-    const heat_bar bar = { 8, 1, 0, 1, 2e-5, 0.05, GS4_INTEGRATOR_GS4, 0, 0, 0, 1500 };
+    const heat_bar bar = { 8, 1, 0, 1,   2e-5, test_full ? 0.05 : 0.01, GS4_INTEGRATOR_GS4,
+                           0, 0, 0, 1500 };
     double a, flux;
     heat_mode(&bar, &a, &flux);
     if (test_filter[0]) printf("%.5f, exact %.5f\n", a, exp(-bar.time));

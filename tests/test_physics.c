@@ -84,7 +84,7 @@ static void test_free_flight(void)
  * rounding. */
 static double spin_kept(gs4_integrator integrator, double decay)
 {
-    gs4_sim_desc d = scene_cube(24);
+    gs4_sim_desc d = scene_cube(test_full ? 24 : 16);
     gs4_material m = scene_liquid(1000, 5, 5);
     gs4_fill f = scene_fill(at(0, 0, 0));
     gs4_stats before, after;
@@ -109,12 +109,14 @@ static double spin_kept(gs4_integrator integrator, double decay)
 
 static void test_spin(void)
 {
-    CHECK(spin_kept(GS4_INTEGRATOR_GS4, 0) > 0.9);
-    CHECK(spin_kept(GS4_INTEGRATOR_GS4, (double)INFINITY) > 0.99);
-    CHECK(spin_kept(GS4_INTEGRATOR_SYMPLECTIC_EULER, 0) > 0.99);
+    CHECK_BETWEEN(spin_kept(GS4_INTEGRATOR_GS4, 0), test_full ? 0.9 : 0.85, 1);
+    CHECK_BETWEEN(spin_kept(GS4_INTEGRATOR_GS4, (double)INFINITY), 0.99, 1);
+    /* the spin that affine parts hold comes and goes uncounted */
+    CHECK_CLOSE(spin_kept(GS4_INTEGRATOR_SYMPLECTIC_EULER, 0), 1, 0.02);
 }
 
-#define MOMENTUM_ROUNDING (sizeof(gs4_real) == 8 ? 2e-15 : 2.5 * (double)FLT_EPSILON)
+/* as in README.md */
+#define MOMENTUM_ROUNDING (sizeof(gs4_real) == 8 ? 3e-15 : 2e-7)
 
 /* A drop that breathes, shears and turns, off to the right at speed `drift`, far from walls:
  * what 100 steps of half the limit change of its momentum, over sum m |v|. *spin, *t: what is
@@ -174,22 +176,23 @@ static void test_momentum(void)
                    drifts[i], lost, spin, t);
         /* what the affine parts hold is not counted */
         CHECK(lost < MOMENTUM_ROUNDING);
-        CHECK(spin > 0.9);
+        CHECK_BETWEEN(spin, 0.9, 1);
         lost = momentum_lost(GS4_INTEGRATOR_GS4, (double)INFINITY, drifts[i], GS4_WALL_SLIP, &spin,
                              &t);
         if (test_filter[0])
             printf("drift %g, no decay: momentum within %.1e, spin kept %.4f in %.2f s\n",
                    drifts[i], lost, spin, t);
         CHECK(lost < MOMENTUM_ROUNDING);
-        CHECK(spin > 0.99);
+        CHECK_BETWEEN(spin, 0.99, 1);
         for (k = 0; k < 3; k++) {
             lost =
                 momentum_lost(GS4_INTEGRATOR_GS4, decays[k], drifts[i], GS4_WALL_SLIP, &spin, &t);
             if (test_filter[0])
                 printf("drift %g, decay %g s: momentum within %.1e, spin kept %.4f in %.2f s\n",
                        drifts[i], decays[k], lost, spin, t);
-            CHECK(lost < (sizeof(gs4_real) == 8 ? 2 : 1) * MOMENTUM_ROUNDING);
-            CHECK(k == 2 || spin > exp(-t / decays[k]));
+            CHECK(lost < MOMENTUM_ROUNDING);
+            /* more than if all of it faded; what fades within a step leaves next to nothing */
+            CHECK_BETWEEN(spin, k == 2 ? -0.02 : exp(-t / decays[k]), k == 2 ? 0.02 : 1);
             CHECK(k > 0 || spin > 0.8);
         }
         scene_sharp = 1;
@@ -198,8 +201,8 @@ static void test_momentum(void)
         if (test_filter[0])
             printf("drift %g, sharpened: momentum within %.1e, spin kept %.4f in %.2f s\n",
                    drifts[i], lost, spin, t);
-        CHECK(lost < (sizeof(gs4_real) == 8 ? 2 : 1) * MOMENTUM_ROUNDING);
-        CHECK(spin > 0.9);
+        CHECK(lost < MOMENTUM_ROUNDING);
+        CHECK_BETWEEN(spin, 0.9, 1);
     }
 }
 
@@ -219,7 +222,7 @@ static void test_momentum_seam(void)
 }
 
 /* Plane channel along x between walls y = 0 and y = 1, periodic in x and z; profile error
- * (2-norm) at time t. */
+ * (2-norm, of all particles, those next to the walls too) at time t. */
 typedef double (*physics_profile)(double y, double t);
 
 static double channel_error(int n, gs4_integrator integrator, gs4_vec3 gravity, double viscosity,
@@ -245,7 +248,6 @@ static double channel_error(int n, gs4_integrator integrator, gs4_vec3 gravity, 
     scene_by_id(sim, GS4_FIELD_VELOCITY, v);
     for (i = 0; i < count; i++) {
         const double y = x[3 * i + 1], e = v[3 * i] - exact(y, t);
-        if (y < 0.1 || y > 0.9) continue; /* away from the walls */
         sum += e * e;
         weight += 1;
     }
@@ -265,31 +267,34 @@ static double poiseuille(double y, double t)
     return u;
 }
 
+/* Of second order up to the walls, from 16 cells across. */
 static void test_poiseuille(void)
 {
     int i;
-    for (i = 0; i < 2; i++) {
+    for (i = 0; i < (test_full ? 2 : 1); i++) {
         const double coarse =
-            channel_error(8, physics_integrators[i], at(4, 0, 0), 0.5, 0.15, poiseuille);
-        const double fine =
             channel_error(16, physics_integrators[i], at(4, 0, 0), 0.5, 0.15, poiseuille);
+        const double fine =
+            channel_error(32, physics_integrators[i], at(4, 0, 0), 0.5, 0.15, poiseuille);
         if (test_filter[0])
             printf("Poiseuille, integrator %d: errors %.2e %.2e, order %.2f\n",
                    (int)physics_integrators[i], coarse, fine, log2(coarse / fine));
-        CHECK(log2(coarse / fine) > 1.8);
-        CHECK(fine < 1e-2);
+        CHECK_CLOSE(log2(coarse / fine), i ? 1.9 : 2.0, 0.05);
+        CHECK(fine < 2e-3);
     }
 }
 
-/* A column at rest, 7 cells high: pressure profile within 1 % (2 % where gradients are
- * sharpened), and it stays at rest. */
-static void column_at_rest(gs4_integrator integrator, gs4_wall floor)
+/* A column at rest, 7 cells high: it stays at rest, and its pressure is that of its depth. *inner:
+ * worst difference over rho g h of what is half a cell or more above the floor and 1.5 cells or
+ * more below the surface; *floor_cell, *top_cell: of the rest. */
+static double column_at_rest(gs4_integrator integrator, gs4_wall floor, double *inner,
+                             double *floor_cell, double *top_cell)
 {
     gs4_sim_desc d = scene_cube(12);
     gs4_material m = scene_liquid(1000, 1000, 40);
     gs4_fill f = scene_fill(at(0, 0, 0));
     const double height = 7.0 / 12, k = 1000 * 40.0 * 40.0;
-    double speed, error = 0;
+    double speed;
     gs4_view x, J;
     gs4_sim *sim;
     int i;
@@ -300,39 +305,47 @@ static void column_at_rest(gs4_integrator integrator, gs4_wall floor)
     sim = physics_create(&d, &m);
     CHECK(gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(4.0 / 12, height, 4.0 / 12)), &f) > 0);
     CHECK(physics_run(sim, 1.5) == 0);
-    speed = gs4_get_stats(sim).max_speed / sqrt(10 * height);
+    speed = (double)gs4_get_stats(sim).max_speed / sqrt(10 * height);
     x = gs4_particles(sim, GS4_FIELD_POSITION);
     J = gs4_particles(sim, GS4_FIELD_VOLUME_RATIO);
+    *inner = *floor_cell = *top_cell = 0;
     for (i = 0; i < x.count; i++) {
         const double y = (double)x.data[(size_t)i * (size_t)x.stride + 1],
                      j = (double)J.data[(size_t)i * (size_t)J.stride];
         const double p = k / 7 * (pow(j, -7) - 1),
                      e = fabs(p - 1000 * 10 * (height - y)) / (1000 * 10 * height);
-        if (y > 0.5 / 12 && y < height - 1.5 / 12 && e > error) error = e;
+        double *worst = y <= 0.5 / 12 ? floor_cell : y >= height - 1.5 / 12 ? top_cell : inner;
+        *worst = fmax(*worst, e);
     }
     if (test_filter[0])
-        printf("column, integrator %d, floor %d: speed %.1e sqrt(g h), pressure within %.2f %%\n",
-               (int)integrator, (int)floor, speed, 100 * error);
-    CHECK(speed < 1e-3);
-    CHECK(error < (scene_sharp ? 0.02 : 0.01));
+        printf("column, integrator %d, floor %d, sharpened %d: speed %.1e sqrt(g h), pressure "
+               "within %.2f %%, above the floor %.1f %%, at the surface %.1f %%\n",
+               (int)integrator, (int)floor, scene_sharp, speed, 100 * *inner, 100 * *floor_cell,
+               100 * *top_cell);
     gs4_destroy(sim);
+    return speed;
 }
 
+/* The figures of README.md and the manual. In --full also Euler and what is sharpened. */
 static void test_column_at_rest(void)
 {
-    int i;
-    for (i = 0; i < 2; i++) {
-        column_at_rest(physics_integrators[i], GS4_WALL_SLIP);
-        column_at_rest(physics_integrators[i], GS4_WALL_STICK);
-        column_at_rest(physics_integrators[i], GS4_WALL_SEPARATE);
-    }
-    scene_sharp = 1;
-    for (i = 0; i < (test_slow ? 3 : 0); i++) column_at_rest(GS4_INTEGRATOR_GS4, (gs4_wall)i);
-    scene_sharp = 0;
+    int i, k;
+    for (k = 0; k < (test_full ? 3 : 1); k++)
+        for (i = test_full ? 0 : 2; i < 3; i++) {
+            double inner, floor_cell, top_cell, speed;
+            scene_sharp = k == 2;
+            speed = column_at_rest(physics_integrators[k == 1], (gs4_wall)i, &inner, &floor_cell,
+                                   &top_cell);
+            scene_sharp = 0;
+            CHECK(speed < 1e-4);
+            CHECK(inner < (k == 2 ? 0.02 : 0.005));
+            CHECK(floor_cell < (k == 2 ? 0.035 : 0.015));
+            CHECK(top_cell < (k == 2 ? 0.045 : 0.02));
+        }
 }
 
-/* Standing sound wave along x in a periodic box: frequency within 2 % of c0 k. */
-static void sound_speed(gs4_integrator integrator)
+/* Standing sound wave along x in a periodic box, 32 cells long: its speed over c0. */
+static double sound_speed(gs4_integrator integrator)
 {
     gs4_sim_desc d = scene_cube(32);
     gs4_material m = scene_liquid(1, 0, 1);
@@ -371,14 +384,17 @@ static void sound_speed(gs4_integrator integrator)
     }
     if (test_filter[0])
         printf("sound, integrator %d: speed %.4f of c0\n", (int)integrator, 0.25 / crossing);
-    CHECK_CLOSE(0.25 / crossing, 1, 0.02);
     gs4_destroy(sim);
+    return 0.25 / crossing;
 }
 
 static void test_sound_speed(void)
 {
-    sound_speed(GS4_INTEGRATOR_GS4);
-    sound_speed(GS4_INTEGRATOR_SYMPLECTIC_EULER);
+    CHECK_CLOSE(sound_speed(GS4_INTEGRATOR_GS4), 0.989, 0.002);
+    CHECK_CLOSE(sound_speed(GS4_INTEGRATOR_SYMPLECTIC_EULER), 0.985, 0.002);
+    scene_sharp = 1;
+    CHECK_CLOSE(sound_speed(GS4_INTEGRATOR_GS4), 0.999, 0.001);
+    scene_sharp = 0;
 }
 
 /* A drop under no force: stays at rest and round. */
@@ -387,7 +403,7 @@ static void test_drop_at_rest(void)
     static double x0[3 * 30000], x1[3 * 30000];
     int i, k, n;
     for (k = 0; k < 2; k++) {
-        gs4_sim_desc d = scene_cube(20);
+        gs4_sim_desc d = scene_cube(test_full ? 20 : 12);
         gs4_material m = scene_liquid(1000, 1, 10);
         gs4_fill f = scene_fill(at(0, 0, 0));
         gs4_sim *sim;
@@ -452,7 +468,7 @@ static void test_shear_wave(void)
                    (int)physics_integrators[i], coarse, fine,
                    log2(fabs(coarse - 1) / fabs(fine - 1)));
         CHECK_CLOSE(fine, 1, i == 0 ? 0.01 : 0.02); /* the affine tier smooths more */
-        CHECK(log2(fabs(coarse - 1) / fabs(fine - 1)) > 1.8);
+        CHECK_CLOSE(log2(fabs(coarse - 1) / fabs(fine - 1)), 2, 0.25);
     }
 }
 
@@ -488,7 +504,7 @@ static void test_stokes_first(void)
                 const double y = (double)x.data[(size_t)j * (size_t)x.stride + 1],
                              e = (double)v.data[(size_t)j * (size_t)v.stride]
                                  - stokes_first(y, 0.3);
-                if (y < 0.1 || y > 0.7) continue; /* the lid at y = 1 slips: far enough */
+                if (y > 0.7) continue; /* the lid at y = 1 slips: far enough */
                 sum += e * e;
                 weight += 1;
             }
@@ -499,7 +515,7 @@ static void test_stokes_first(void)
             printf("Stokes' first problem, integrator %d: errors %.2e %.2e\n",
                    (int)physics_integrators[i], error[0], error[1]);
         CHECK(error[1] < 0.01);
-        CHECK(error[1] < 0.5 * error[0]);
+        CHECK_BETWEEN(log2(error[0] / error[1]), 1.6, 2.5);
     }
 }
 
@@ -515,10 +531,12 @@ static double couette(double y, double t)
     return u;
 }
 
-/* Profile error (2-norm, away from the walls) at time t, with n - gap cells between the wall and
- * the surface of the body: a plane of nodes is 1/2 - gap of a cell in front of that. *off: how
- * many cells behind it the profile, taken for steady, reaches u = 1. */
-static double couette_error(int n, gs4_integrator integrator, double gap, double t, double *off)
+/* Profile error (2-norm, but for the tenth next to the body, whose worst is *near) at time t, with
+ * n - gap cells between the wall and the surface of the body: a plane of nodes is 1/2 - gap of a
+ * cell in front of that. *off: how many cells behind it the profile, taken for steady, reaches
+ * u = 1. */
+static double couette_error(int n, gs4_integrator integrator, double gap, double t, double *off,
+                            double *near)
 {
     const double h = 1 / (n - gap);
     gs4_sim_desc d = scene_cube(n);
@@ -543,13 +561,17 @@ static double couette_error(int n, gs4_integrator integrator, double gap, double
     CHECK(gs4_add_collider(sim, &body) == 0);
     CHECK(gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(4 * h, 1, 4 * h)), &f) > 0);
     CHECK(physics_run(sim, t) == 0);
+    *near = 0;
     x = gs4_particles(sim, GS4_FIELD_POSITION);
     v = gs4_particles(sim, GS4_FIELD_VELOCITY);
     for (i = 0; i < x.count; i++) {
         const double y = (double)x.data[(size_t)i * (size_t)x.stride + 1],
                      u = (double)v.data[(size_t)i * (size_t)v.stride];
         const double e = u - couette(y, t);
-        if (y < 0.1 || y > 0.9) continue;
+        if (y > 0.9) {
+            *near = fmax(*near, fabs(e));
+            continue;
+        }
         sum += e * e;
         weight += 1;
         yu += y * u;
@@ -562,25 +584,29 @@ static double couette_error(int n, gs4_integrator integrator, double gap, double
 
 /* Second order in space, with the surface at a plane of nodes and midway between two; a tenth of
  * a cell before one, where the filling leaves a gap that is no multiple of h, only the error is
- * held. */
+ * held. In quick runs a plane of nodes for one integrator, midway for the other: a tenth of 16 cells
+ * is not far enough from the body. Next to it, which starts at once, GS4 keeps motion that the grid does not see. */
 static void test_couette(void)
 {
     static const double gaps[3] = { 0.01, 0.51, 0.4 }, times[2] = { 0.1, 0.4 };
-    double off;
+    double off, near;
     int i, j, k;
     for (i = 0; i < 2; i++)
-        for (j = 0; j < (test_slow ? 3 : 2); j++)
-            for (k = 0; k < 2; k++) {
+        for (j = test_full ? 0 : !i; j < (test_full ? 3 : 1 + !i); j++)
+            for (k = test_full ? 0 : 1; k < 2; k++) {
                 const double coarse =
-                    couette_error(8, physics_integrators[i], gaps[j], times[k], &off);
-                const double fine = couette_error(test_slow ? 32 : 16, physics_integrators[i],
-                                                  gaps[j], times[k], &off);
-                const double order = log2(coarse / fine) / (test_slow ? 2 : 1);
+                    couette_error(8, physics_integrators[i], gaps[j], times[k], &off, &near);
+                const double fine = couette_error(test_full ? 32 : 16, physics_integrators[i],
+                                                  gaps[j], times[k], &off, &near);
+                const double order = log2(coarse / fine) / (test_full ? 2 : 1);
                 if (test_filter[0])
-                    printf("Couette, integrator %d, gap %g, t %g: errors %.2e %.2e, order %.2f\n",
-                           (int)physics_integrators[i], gaps[j], times[k], coarse, fine, order);
-                CHECK(fine < (test_slow ? 0.005 : 0.008));
-                if (j < 2) CHECK(order > (test_slow ? 1.8 : 1.45));
+                    printf("Couette, integrator %d, gap %g, t %g: errors %.2e %.2e, order %.2f, "
+                           "next to the body %.1e\n",
+                           (int)physics_integrators[i], gaps[j], times[k], coarse, fine, order,
+                           near);
+                CHECK(fine < (test_full ? 0.005 : 0.008));
+                if (j < 2) CHECK(near < 0.02);
+                if (j < 2) CHECK_BETWEEN(order, 1.84, 2.46);
             }
 }
 
@@ -590,11 +616,11 @@ static void test_couette(void)
 static void test_couette_surface(void)
 {
     static const double gaps[7] = { 0.01, 0.24, 0.25, 0.49, 0.51, 0.7, 0.8 };
-    double off;
+    double off, near;
     int i, k;
     for (i = 0; i < 2; i++)
-        for (k = 0; k < 7; k++) {
-            couette_error(8, physics_integrators[i], gaps[k], 1, &off);
+        for (k = test_full ? 0 : 4 * i; k < 7; k += test_full ? 1 : 5) {
+            couette_error(8, physics_integrators[i], gaps[k], 1, &off, &near);
             if (test_filter[0])
                 printf("Couette, integrator %d: nodes %.2f cells before the body: wall %+.2f cells "
                        "behind its surface\n",
@@ -807,5 +833,5 @@ static void test_drop_impact(void)
         { 1.58, 1.12883 }, { 2.38, 1.39293 }, { 3.18, 1.42262 }, { 3.98, 1.44785 }
     };
     const gs4_material m = scene_liquid(1000, 4, 20);
-    if (test_slow) physics_drop_widths(&m, reference, 4, 0.03);
+    physics_drop_widths(&m, reference, 4, 0.02);
 }

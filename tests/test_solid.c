@@ -78,7 +78,9 @@ static void test_solid_stress(void)
             error = solid_stress_error(solid_models[k], r);
             if (test_filter[0])
                 printf("%s, model %d: error %.1e, condition %.1e\n", r->name, k, error, condition);
-            CHECK(error < fmax(SOLID_DOUBLE ? 1e-12 : 1e-6, 2 * condition * SOLID_EPSILON));
+            CHECK(error < (!SOLID_DOUBLE     ? fmax(1e-6, 2 * condition * SOLID_EPSILON)
+                           : condition < 1e6 ? 1e-15
+                                             : 1e-10));
         }
 }
 
@@ -219,7 +221,7 @@ static void test_solid_order_of_a_point(void)
         if (test_filter[0])
             printf("flow %d: errors %.1e %.1e, order %.2f; in one step %.1e\n", k, coarse, fine,
                    log2(coarse / fine), once);
-        if (SOLID_DOUBLE) CHECK(coarse < 1e-13 || log2(coarse / fine) >= 1.9);
+        if (SOLID_DOUBLE) CHECK(coarse < 1e-13 || fabs(log2(coarse / fine) - 2) <= 0.02);
         CHECK(once < (SOLID_DOUBLE ? 1e-12 : 1e-5)); /* the exponential */
     }
 }
@@ -313,15 +315,15 @@ static double solid_wave(gs4_integrator integrator, gs4_solid model, int along, 
 static void test_solid_waves(void)
 {
     int i, along, model;
-    for (i = 0; i < 2; i++)
+    for (i = 0; i < (test_full ? 2 : 1); i++)
         for (along = 0; along < 2; along++)
-            for (model = 0; model < (test_slow || (i == 0 && along == 0) ? 2 : 1); model++) {
+            for (model = 0; model < (test_full ? 2 : 1); model++) {
                 const double ratio =
                     solid_wave(physics_integrators[i], solid_models[model], along, 32);
                 if (test_filter[0])
                     printf("%s wave, integrator %d, model %d: %.4f of the exact frequency\n",
                            along ? "length" : "shear", i, model, ratio);
-                CHECK_CLOSE(ratio, 1, 0.015);
+                CHECK_CLOSE(ratio, i == 1 ? 0.987 : along ? 0.989 : 0.992, 0.001);
             }
 }
 
@@ -356,41 +358,30 @@ static int solid_simulate(gs4_solid model, double rho, double decay, double time
     return result;
 }
 
-static double solid_order(const double *coarse, const double *fine, const double *exact, int n)
-{
-    return log2(order_difference(coarse, exact, n) / order_difference(fine, exact, n));
-}
-
 static void test_solid_order(void)
 {
     /* model, rho_inf, decay */
     static const double cases[6][3] = { { 0, 0, 1e30 }, { 1, 0.5, 0.2 }, { 0, 0.5, 1e30 },
                                         { 1, 0, 1e30 }, { 0, 0, 0.2 },   { 1, 1, 1e30 } };
-    static solid_run coarse, fine, exact;
-    int c;
+    static solid_run run[3];
+    int c, i;
     if (!SOLID_DOUBLE) return; /* rounding would hide it */
-    for (c = 0; c < (test_slow ? 6 : 2); c++) {
+    for (c = 0; c < (test_full ? 6 : 2); c++) {
         const gs4_solid model = solid_models[(int)cases[c][0]];
         double x, v, J, F;
-        CHECK(solid_simulate(model, cases[c][1], cases[c][2], 0.4, 128, &coarse) == 0);
-        CHECK(solid_simulate(model, cases[c][1], cases[c][2], 0.4, 256, &fine) == 0);
-        CHECK(solid_simulate(model, cases[c][1], cases[c][2], 0.4, 2048, &exact) == 0);
-        x = solid_order(coarse.x, fine.x, exact.x, 3 * exact.count);
-        v = solid_order(coarse.v, fine.v, exact.v, 3 * exact.count);
-        J = solid_order(coarse.J, fine.J, exact.J, exact.count);
-        F = solid_order(coarse.F, fine.F, exact.F, 9 * exact.count);
+        for (i = 0; i < 3; i++)
+            CHECK(solid_simulate(model, cases[c][1], cases[c][2], 0.4, 128 << i, &run[i]) == 0);
+        x = order_of(run[0].x, run[1].x, run[2].x, 3 * run[0].count);
+        v = order_of(run[0].v, run[1].v, run[2].v, 3 * run[0].count);
+        J = order_of(run[0].J, run[1].J, run[2].J, run[0].count);
+        F = order_of(run[0].F, run[1].F, run[2].F, 9 * run[0].count);
         if (test_filter[0])
-            printf("model %d, rho %g, decay %g: order x %.2f v %.2f J %.2f F %.2f; errors %.1e "
-                   "%.1e %.1e %.1e\n",
-                   (int)model, cases[c][1], cases[c][2], x, v, J, F,
-                   order_difference(fine.x, exact.x, 3 * exact.count),
-                   order_difference(fine.v, exact.v, 3 * exact.count),
-                   order_difference(fine.J, exact.J, exact.count),
-                   order_difference(fine.F, exact.F, 9 * exact.count));
-        CHECK(x >= 1.9);
-        CHECK(v >= 1.9);
-        CHECK(J >= 1.9);
-        CHECK(F >= 1.9);
+            printf("model %d, rho %g, decay %g: order x %.2f v %.2f J %.2f F %.2f\n", (int)model,
+                   cases[c][1], cases[c][2], x, v, J, F);
+        CHECK_BETWEEN(x, 1.9, 2.15);
+        CHECK_BETWEEN(v, 1.9, 2.15);
+        CHECK_BETWEEN(J, 1.9, 2.15);
+        CHECK_BETWEEN(F, 1.9, 2.15);
     }
 }
 
@@ -477,9 +468,10 @@ static void test_solid_spin(void)
         if (test_filter[0])
             printf("spin, integrator %d: kinetic energy %.4f, spin %.4f, elastic %.5f\n", i, kept,
                    spin, strained);
-        CHECK_CLOSE(kept, 1, 1e-3);
+        CHECK_CLOSE(kept, 1, i == 2 ? 1.2e-3 : 2e-4);
+        CHECK_CLOSE(spin, 1, 2e-4);
         /* centrifugal: 2e-5; what rounding F makes of it in float */
-        CHECK(strained < (SOLID_DOUBLE ? 1e-4 : 2e-3));
+        CHECK_CLOSE(strained, 0, SOLID_DOUBLE ? 1e-4 : 2e-3);
     }
 }
 
@@ -523,14 +515,14 @@ static void solid_bounce(gs4_integrator integrator, gs4_solid model, double deca
  * by without strain; symplectic Euler, whose particles are all that the grid sees, keeps 63 %. */
 static void test_solid_bounce(void)
 {
-    /* integrator, model, decay, viscosity, least energy */
-    static const double cases[5][5] = { { 0, 0, 1e30, 0, 0.9 },
-                                        { 0, 0, 0, 0, 0.87 },
-                                        { 1, 0, 0, 0, 0.6 },
-                                        { 0, 1, 1e30, 0, 0.9 },
-                                        { 0, 0, 1e30, 50, 0.6 } };
+    /* integrator, model, decay, viscosity, energy */
+    static const double cases[5][5] = { { 0, 0, 1e30, 0, 0.91 },
+                                        { 1, 0, 0, 0, 0.64 },
+                                        { 0, 0, 0, 0, 0.89 },
+                                        { 0, 1, 1e30, 0, 0.91 },
+                                        { 0, 0, 1e30, 50, 0.66 } };
     int c;
-    for (c = 0; c < (test_slow ? 5 : 3); c++) {
+    for (c = 0; c < (test_full ? 5 : 2); c++) {
         double kept, height;
         solid_bounce(physics_integrators[(int)cases[c][0]], solid_models[(int)cases[c][1]],
                      cases[c][2], cases[c][3], &kept, &height);
@@ -538,14 +530,13 @@ static void test_solid_bounce(void)
             printf("bounce, integrator %g, model %g, decay %g, viscosity %g: energy %.4f, height "
                    "%.4f\n",
                    cases[c][0], cases[c][1], cases[c][2], cases[c][3], kept, height);
-        CHECK(kept > cases[c][4]);
-        CHECK(kept < 1.002);
-        CHECK(height > cases[c][4] - 0.15);
+        CHECK_CLOSE(kept, cases[c][4], 0.01);
+        CHECK_BETWEEN(height, cases[c][4] - 0.15, cases[c][4]);
     }
 }
 
 /* A ball that rings for five periods: energy over what it was, momentum. */
-static double solid_ring(gs4_solid model, double decay, double seconds)
+static double solid_ring(gs4_integrator integrator, gs4_solid model, double decay)
 {
     gs4_sim_desc d = scene_cube(20);
     gs4_material m = solid_material(model, 1000, 1000, 4);
@@ -556,6 +547,7 @@ static double solid_ring(gs4_solid model, double decay, double seconds)
     gs4_sim *sim;
     double start;
     int i;
+    d.integrator = integrator;
     d.flip_decay_time = (gs4_real)decay;
     sim = physics_create(&d, &m);
     CHECK(gs4_add_particles(sim, gs4_sphere(at(0.5, 0.5, 0.5), (gs4_real)0.2), &f) > 0);
@@ -571,7 +563,7 @@ static double solid_ring(gs4_solid model, double decay, double seconds)
     }
     before = gs4_get_stats(sim);
     start = before.kinetic_energy;
-    CHECK(physics_run(sim, seconds) == 0);
+    CHECK(physics_run(sim, 3) == 0);
     after = gs4_get_stats(sim);
     for (i = 0; i < 3; i++)
         CHECK_CLOSE(after.momentum[i], before.momentum[i],
@@ -584,14 +576,19 @@ static double solid_ring(gs4_solid model, double decay, double seconds)
 static void test_solid_ring(void)
 {
     int k;
-    for (k = 0; k < (test_slow ? 2 : 1); k++) {
-        const double kept = solid_ring(solid_models[k], 1e30, 3),
-                     faded = test_slow ? solid_ring(solid_models[k], 0, 3) : kept;
+    for (k = 0; k < (test_full ? 2 : 1); k++) {
+        const double kept = solid_ring(GS4_INTEGRATOR_GS4, solid_models[k], 1e30),
+                     faded = test_full ? solid_ring(GS4_INTEGRATOR_GS4, solid_models[k], 0) : 0,
+                     euler = test_full
+                                 ? solid_ring(GS4_INTEGRATOR_SYMPLECTIC_EULER, solid_models[k], 0)
+                                 : 0;
         if (test_filter[0])
-            printf("ring, model %d: energy %.4f, with the default decay %.4f\n", k, kept, faded);
-        CHECK(kept > 0.9);
-        CHECK(kept < 1.001);
-        CHECK(faded > 0.55);
+            printf("ring, model %d: energy %.4f, with the default decay %.4f, Euler %.4f\n", k,
+                   kept, faded, euler);
+        CHECK_CLOSE(kept, 0.92, 0.01);
+        if (!test_full) continue;
+        CHECK_CLOSE(faded, 0.6, 0.02);
+        CHECK_CLOSE(euler, 0.28, 0.01);
     }
 }
 
@@ -639,7 +636,7 @@ static void test_solid_yield(void)
             printf("squash, integrator %d: height %.3f elastic, %.3f plastic\n", i, elastic,
                    plastic);
         CHECK_CLOSE(elastic, 1, 0.04);
-        CHECK(plastic < 0.85);
+        CHECK_BETWEEN(plastic, 0.4, 0.85);
     }
 }
 
@@ -722,7 +719,7 @@ static void test_solid_huge_steps(void)
 {
     uint32_t seed = 5;
     int c, i, k;
-    for (c = 0; c < 300; c++) {
+    for (c = 0; c < (test_full ? 300 : 100); c++) {
         gs4_material m = solid_material(solid_models[c % 2], 1000, 1, 10);
         gs4_real s[6];
         gs4_point p;
@@ -783,7 +780,7 @@ static gs4_sim *solid_scene(gs4_integrator integrator, int threads, int filled)
 
 static void test_solid_state(void)
 {
-    int k, i, steps = 60;
+    int k, i, steps = test_full ? 60 : 24;
     for (k = 0; k < 2; k++) {
         gs4_sim *one = solid_scene(physics_integrators[k], 1, 1), *other, *next;
         uint64_t halfway;
@@ -905,7 +902,7 @@ static void test_solid_memory(void)
     int euler, stage, r;
     long k, calls;
     for (euler = 0; euler < 2; euler++)
-        for (calls = 0, k = -1; k < 0 || k < calls; k++) {
+        for (calls = 0, k = -1; k < 0 || k < calls; k += k < 0 || test_full ? 1 : 5) {
             gs4_sim_desc d = scene_cube(8);
             gs4_sim *sim = NULL;
             files_memory m;
@@ -967,7 +964,7 @@ static void test_solid_stability(void)
         CHECK(gs4_add_particles(sim, gs4_sphere(at(0.5, 0.5, 0.5), (gs4_real)(3.5 / 14)), &f) > 0);
         stability_stir(sim, 0.01, 1);
         start = gs4_get_stats(sim).kinetic_energy;
-        for (i = 0; i < (test_slow ? 3000 : 150) && most < 100; i++) {
+        for (i = 0; i < (test_slow ? 3000 : test_full ? 150 : 80) && most < 100; i++) {
             CHECK_RESULT(sim, gs4_step(sim, (gs4_real)(0.95 * (double)gs4_stable_dt(sim))), GS4_OK);
             most = fmax(most, gs4_get_stats(sim).kinetic_energy / start);
         }
@@ -987,16 +984,16 @@ static void run_solid(void)
     RUN(test_solid_clamp);
     RUN(test_solid_order_of_a_point);
     RUN(test_solid_turns);
-    RUN(test_solid_waves);
+    RUN_ONCE(test_solid_waves);
     RUN(test_solid_order);
-    RUN(test_solid_spin);
-    RUN(test_solid_bounce);
-    RUN(test_solid_ring);
-    RUN(test_solid_yield);
-    RUN(test_solid_extremes);
+    RUN_ONCE(test_solid_spin);
+    RUN_ONCE(test_solid_bounce);
+    RUN_ONCE(test_solid_ring);
+    RUN_FULL(test_solid_yield);
+    RUN_FULL(test_solid_extremes);
     RUN(test_solid_huge_steps);
-    RUN(test_solid_state);
+    RUN_ONCE(test_solid_state);
     RUN(test_solid_is_paid_for_where_it_is);
-    RUN(test_solid_memory);
-    RUN(test_solid_stability);
+    RUN_ONCE(test_solid_memory);
+    RUN_ONCE(test_solid_stability);
 }

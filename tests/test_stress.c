@@ -159,7 +159,12 @@ static void test_stress_reference(void)
         double cost, error[8], finer[8];
         n = stress_rows(first);
         cost = rows[n - 1].t * stress_rate_of(rows);
-        if (rows->kind == REF_STEADY || (!test_slow && cost > (STRESS_DOUBLE ? 30 : 100))) continue;
+        if (rows->kind == REF_STEADY
+            || (!test_slow
+                && cost > (!test_full      ? 5
+                           : STRESS_DOUBLE ? 30
+                                           : 100)))
+            continue;
         for (member = 0; member < 4; member++) {
             const double *unit = units[first % 3];
             int steps;
@@ -169,14 +174,14 @@ static void test_stress_reference(void)
                 stress_follow(rows, n, 400, unit[0], unit[1], stress_members[member], finer);
             for (k = 0; k < n; k++) {
                 /* roundings, and a twentieth of the most they can drift */
-                const double tolerance = (sudden ? 1e-2 : 1e-3)
+                const double tolerance = (sudden ? 7.5e-3 : 7e-4)
                                          + (STRESS_DOUBLE ? 0 : 1e-7 * sqrt(steps) + 3e-9 * steps);
                 CHECK(error[k] < tolerance);
                 worst[sudden] = fmax(worst[sudden], error[k]);
                 if (test_filter[0] && error[k] > 0.5 * tolerance)
                     printf("row %d, member %d: error %.2e\n", first + k, member, error[k]);
                 if (!STRESS_DOUBLE || sudden || finer[k] < 1e-9) continue;
-                CHECK(log2(error[k] / finer[k]) >= STRESS_ORDER);
+                CHECK_BETWEEN(log2(error[k] / finer[k]), STRESS_ORDER, 2.1);
                 orders++;
                 if (test_filter[0] && !(log2(error[k] / finer[k]) >= STRESS_ORDER))
                     printf("row %d, member %d: errors %.2e %.2e, order %.2f\n", first + k, member,
@@ -281,7 +286,7 @@ static void test_stress_split(void)
         n = stress_rows(first);
         if (rows->kind == REF_STEADY) continue;
         cost = rows[n - 1].t * stress_rate_of(rows);
-        if (test_slow || cost < 100) {
+        if (test_slow || cost < (test_full ? 100 : 30)) {
             stress_split_follow(rows, n, 0, error);
             for (k = 0; k < n; k++) {
                 CHECK(error[k]
@@ -291,7 +296,8 @@ static void test_stress_split(void)
                     printf("row %d: error %.2e\n", first + k, error[k]);
             }
         }
-        if (rows->kind == REF_STEP || rows->kind == REF_CESSATION || (!test_slow && cost > 15))
+        if (rows->kind == REF_STEP || rows->kind == REF_CESSATION
+            || (!test_slow && cost > (test_full ? 15 : 5)))
             continue;
         stress_split_follow(rows, n, 200, fine);
         stress_split_follow(rows, n, 400, finer);
@@ -303,12 +309,12 @@ static void test_stress_split(void)
             if (first + k == 83) {
                 double finest[8];
                 stress_split_follow(rows, n, 800, finest);
-                CHECK(log2(fine[k] / finer[k]) >= 1.89);
-                CHECK(log2(finer[k] / finest[k]) >= 1.94);
+                CHECK_BETWEEN(log2(fine[k] / finer[k]), 1.89, 2);
+                CHECK_BETWEEN(log2(finer[k] / finest[k]), 1.94, 2);
                 orders++;
                 continue;
             }
-            CHECK(log2(fine[k] / finer[k]) >= 1.9);
+            CHECK_BETWEEN(log2(fine[k] / finer[k]), 1.9, 2.1);
             orders++;
             if (test_filter[0] && (fine[k] > 1e-3 || !(log2(fine[k] / finer[k]) >= 1.9)))
                 printf("row %d: errors %.2e %.2e, order %.2f\n", first + k, fine[k], finer[k],
@@ -422,7 +428,7 @@ static void test_stress_turned(void)
 {
     double worst[2] = { 0, 0 };
     int k;
-    for (k = 0; k < 110; k++) {
+    for (k = 0; k < (test_full ? 110 : 33); k++) {
         worst[0] = fmax(worst[0], stress_turned(k % 11 - 1, 0.004, 100));
         worst[1] = fmax(worst[1], stress_turned(k % 11 - 1, 0.5, 2));
     }
@@ -461,7 +467,7 @@ static void test_stress_rigid_rotation(void)
                         fabs((double)p.stress[stress_index[i / 3][i % 3]] - T[i / 3][i % 3]) / 2);
             }
             CHECK(error[0] < 1e-3);
-            if (STRESS_DOUBLE) CHECK(log2(error[0] / error[1]) > 1.9);
+            if (STRESS_DOUBLE) CHECK_CLOSE(log2(error[0] / error[1]), 2, 0.1);
             if (test_filter[0])
                 printf("set %d, member %d: errors %.1e %.1e\n", set, member, error[0], error[1]);
         }
@@ -673,8 +679,8 @@ static void stress_walks(long steps, double strain_max, int wild)
 
 static void test_stress_random(void)
 {
-    /* a million in all at night, ten thousand with --full */
-    const long steps = test_slow ? 307692 : test_full ? 3077 : 280;
+    /* a million in all at night, else a thousand */
+    const long steps = test_slow ? 307692 : 280;
     stress_seed = 20;
     stress_walks(2 * steps, 1, 0); /* what a simulation allows */
     stress_walks(steps / 4, 1, 1);
@@ -822,12 +828,12 @@ static void run_stress(void)
     RUN(test_stress_reference);
     RUN(test_stress_units);
     RUN(test_stress_split);
-    RUN(test_stress_steady);
+    RUN_ONCE(test_stress_steady);
     RUN(test_stress_turned);
     RUN(test_stress_rigid_rotation);
-    RUN(test_stress_pitfalls);
-    RUN(test_stress_short_memory);
-    RUN_ONCE(test_stress_random);
+    RUN_ONCE(test_stress_pitfalls);
+    RUN_ONCE(test_stress_short_memory);
+    RUN_FULL(test_stress_random);
     RUN(test_stress_thin);
     RUN(test_stress_bounded);
     RUN(test_stress_bad_arguments);

@@ -71,9 +71,9 @@ static void test_elastic_wave(void)
         { 0, 4, 1 }, { 0.4, 3.6, 1 }, { 0.04, 3.96, 1 }, { 0, 100, 100 }
     };
     const double k2 = 4 * acos(-1.0) * acos(-1.0);
-    const int n = test_slow ? 32 : 16;
+    const int n = test_full ? 32 : 16;
     int i, c;
-    scene_sharp = 1; /* 0.05 % low at 32 */
+    scene_sharp = 1; /* 0.05 % low at 32, 0.4 % at 16 */
     for (c = 0; c < (test_slow ? 4 : 1); c++) {
         double decay, frequency;
         elastic_wave(n, GS4_INTEGRATOR_GS4, cases[c][0] / k2, cases[c][1] / k2, cases[c][2], &decay,
@@ -81,11 +81,17 @@ static void test_elastic_wave(void)
         if (test_filter[0])
             printf("elastic wave %d, sharpened: decay %.4f, frequency %.4f of the exact ones\n", c,
                    decay, frequency);
-        CHECK_CLOSE(frequency, 1, n == 32 ? 0.001 : 0.005);
-        CHECK_CLOSE(decay, 1, n == 32 ? 0.001 : 0.005);
+        CHECK_CLOSE(frequency, 1, n == 32 ? 0.0006 : 0.005);
+        CHECK_CLOSE(decay, 1, n == 32 ? 0.0006 : 0.005);
+        if (c == 0 && n == 32) {
+            double coarse;
+            elastic_wave(16, GS4_INTEGRATOR_GS4, 0, 4 / k2, 1, &decay, &coarse);
+            CHECK_CLOSE(log2((1 - coarse) / (1 - frequency)), 2.5, 0.1);
+        }
     }
     scene_sharp = 0;
-    for (i = 0; i < 2; i++) /* in the last one nearly nothing decays: the wave speed sqrt(G0/rho) */
+    for (i = 0; i < (test_full ? 2 : 1);
+         i++) /* in the last one nearly nothing decays: the wave speed sqrt(G0/rho) */
         for (c = 0; c < (!test_slow ? 1 : i == 0 ? 4 : 2); c++) {
             double decay, frequency;
             elastic_wave(32, physics_integrators[i], cases[c][0] / k2, cases[c][1] / k2,
@@ -94,15 +100,15 @@ static void test_elastic_wave(void)
                 printf("elastic wave %d, integrator %d: decay %.4f, frequency %.4f of the exact "
                        "ones\n",
                        c, (int)physics_integrators[i], decay, frequency);
-            CHECK_CLOSE(frequency, 1, i == 0 ? 0.012 : 0.025);
-            CHECK_CLOSE(decay, 1, i == 0 ? 0.01 : 0.03);
+            CHECK_BETWEEN(frequency, i == 0 ? 0.989 : 0.979, i == 0 ? 0.9905 : 0.984);
+            CHECK_CLOSE(decay, 1, i == 0 ? 0.006 : 0.017);
             if (c == 0) {
                 double coarse, d;
                 elastic_wave(16, physics_integrators[i], 0, 4 / k2, 1, &d, &coarse);
                 if (test_filter[0])
                     printf("    order in space of the frequency %.2f\n",
                            log2((1 - coarse) / (1 - frequency)));
-                CHECK(log2((1 - coarse) / (1 - frequency)) > 1.8);
+                CHECK_CLOSE(log2((1 - coarse) / (1 - frequency)), 2, 0.03);
             }
         }
 }
@@ -165,21 +171,21 @@ static void test_channel_overshoot(void)
         { 1, 0.01, 1.927980, 1.085221 }, { 10, 0.01, 5.553945, 3.237834 }
     };
     int c;
-    for (c = 0; c < (test_slow ? 8 : 2); c++) {
+    for (c = 0; c < (test_slow ? 8 : test_full ? 2 : 1); c++) {
         double most, when;
         channel_overshoot(32, GS4_INTEGRATOR_GS4, cases[c][0], cases[c][1], &most, &when);
         if (test_filter[0])
             printf("channel, El %g, local fraction %g: %.4f at %.4f, exact %.4f at %.4f\n",
                    cases[c][0], cases[c][1], most, when, cases[c][2], cases[c][3]);
-        CHECK_CLOSE(most / cases[c][2], 1, 0.02);
-        CHECK_CLOSE(when / cases[c][3], 1, cases[c][1] > 0.05 ? 0.02 : 0.08);
+        CHECK_CLOSE(most / cases[c][2], 1, cases[c][1] > 0.05 ? 0.002 : 0.007);
+        CHECK_CLOSE(when / cases[c][3], 1, cases[c][1] > 0.05 ? 0.008 : 0.065);
         if (!test_slow) continue;
         scene_sharp = 1;
         channel_overshoot(32, GS4_INTEGRATOR_GS4, cases[c][0], cases[c][1], &most, &when);
         scene_sharp = 0;
         if (test_filter[0]) printf("    sharpened: %.4f at %.4f\n", most, when);
-        CHECK_CLOSE(most / cases[c][2], 1, 0.02);
-        CHECK_CLOSE(when / cases[c][3], 1, 0.02);
+        CHECK_CLOSE(most / cases[c][2], 1, 0.011);
+        CHECK_CLOSE(when / cases[c][3], 1, 0.018);
     }
 }
 
@@ -224,7 +230,7 @@ static void test_drop_draws_back(void)
     static const double reference[2][2] = { { 2.16, 1.71899 }, { 3.36, 1.46163 } };
     gs4_material m = viscoelastic_liquid(4, 0.1, 0.02, 20);
     m.density = 1000;
-    if (test_slow) physics_drop_widths(&m, reference, 2, 0.04);
+    physics_drop_widths(&m, reference, 2, 0.035);
 }
 
 /* Start-up of plane Couette flow of Oldroyd-B between a wall and a body that moves, 1 apart,
@@ -264,7 +270,7 @@ static void test_elastic_couette(void)
         sim = physics_create(&d, &m);
         CHECK(gs4_add_collider(sim, &body) == 0);
         CHECK(gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(4 * h, 1, 4 * h)), &f) > 0);
-        for (k = 0; k < (test_slow ? 4 : 3); k++) {
+        for (k = 0; k < (test_slow ? 4 : test_full ? 3 : 2); k++) {
             double u = 0, slope = 0, weight = 0;
             gs4_view x, v;
             CHECK(physics_run(sim, cases[c].times[k] / mu) == 0);
@@ -282,7 +288,7 @@ static void test_elastic_couette(void)
             if (test_filter[0])
                 printf("El %g, local %g, t* %g: %.4f, exact %.4f\n", cases[c].elasticity,
                        cases[c].local, cases[c].times[k], u, cases[c].expected[k]);
-            CHECK_CLOSE(u, cases[c].expected[k], 0.01 * fmax(0.5, cases[c].expected[k]));
+            CHECK_CLOSE(u, cases[c].expected[k], 0.01 * cases[c].expected[k]);
         }
         gs4_destroy(sim);
     }
@@ -353,14 +359,14 @@ static void test_die_swell(void)
     static const double cases[3] = { 0, 0.5, 0.55556 };
     double last = 1;
     int c;
-    for (c = 0; c < (test_slow ? 3 : 0); c++) {
+    for (c = 0; c < 3; c++) {
         const double local = c == 1 ? 0.5 : 0.1;
         double velocity, swell = jet_radius(8, local, cases[c], &velocity),
                          S = (1 - local) * cases[c] * 4 * velocity;
         const double tanner = 0.13 + pow(1 + S * S / 2, 1.0 / 6);
         if (test_filter[0])
             printf("recoverable shear %.2f: jet over nozzle %.3f, Tanner %.3f\n", S, swell, tanner);
-        CHECK_CLOSE(swell / tanner, 1, 0.1);
+        CHECK_BETWEEN(swell / tanner, 0.95, 1.07);
         CHECK(swell > last + 0.05);
         last = swell;
     }

@@ -40,7 +40,7 @@
  *     [[config]]    version, precision, linkage      [[base]]      arithmetic, memory, text, tasks
  *     [[types]]     results, vectors, shapes, hooks  [[vec]]       three-vectors and shapes
  *     [[materials]] what matter is                   [[poisson]]   multigrid on a masked grid
- *     [[sim]]       description, scene, stepping     [[krylov]]    conjugate gradients, any operator
+ *     [[sim]]       description, scene, stepping     [[krylov]]    conjugate gradients
  *     [[poisson]]   the elliptic solver by itself    [[kernel]]    quadratic B-splines on 27 nodes
  *                                                    [[grid]]      blocks of nodes near material
  *                                                    [[box]]       dense box of cells around them
@@ -5657,15 +5657,11 @@ GS4I_INLINE void gs4i_box_faces_of(const gs4i_box *box, const int at[3], size_t 
     face[5] = face[4] + plane;
 }
 
-/* Whether the cell is the last one before the end of the domain on this side; before a wall. */
-GS4I_INLINE int gs4i_box_at_end(const gs4i_box *box, const int at[3], int side)
-{
-    const int a = side / 2, there = at[a] + box->low[a] + (side & 1 ? 1 : -1);
-    return there < box->begin[a] || there >= box->end[a];
-}
+/* Whether the cell touches a wall of the domain on this side. */
 GS4I_INLINE int gs4i_box_at_wall(const gs4i_box *box, const int at[3], int side)
 {
-    return box->wall[side] && gs4i_box_at_end(box, at, side);
+    const int a = side / 2, there = at[a] + box->low[a] + (side & 1 ? 1 : -1);
+    return box->wall[side] && (there < box->begin[a] || there >= box->end[a]);
 }
 
 /* The cell `steps` beyond one on a side: around a periodic axis, or the mirror image behind a
@@ -9611,7 +9607,7 @@ typedef struct gs4i_emitter {
 
 /* Heat on nodes: only while a step is made, see [[conduction]]. */
 typedef struct gs4i_conduction {
-    /* 4 a node, with a meaning before and one after the solve (gs4i_gathered_heat):
+    /* 4 a node, with a meaning before the solve and one after it (gs4i_heat_from_box):
      * m c (J/K), m c T** (J), V / k_eff (m^4 K/W), V (m^3); and where viscosity heats or flux
      * is non-local: power (W), mixing (W/K), 0, 0. NULL where there is none */
     gs4_real *heat_nodes, *heat_sources;
@@ -12060,9 +12056,7 @@ static gs4_real gs4i_shown_surface(const gs4i_conduction *k, const int at[3], si
     for (side = 0; side < 6; side++) {
         const gs4_real *fill = k->fill_fraction;
         shown[side] = 0;
-        if (!k->surface_is_isothermal || gs4i_box_at_wall(&k->box, at, side)
-            || (k->box.periodic[side / 2] && gs4i_box_at_end(&k->box, at, side)))
-            continue;
+        if (!k->surface_is_isothermal || gs4i_box_at_wall(&k->box, at, side)) continue;
         if (gs4i_box_beyond(&k->box, at, side, 3, &j) && !(fill[j] < GS4I_C(0.5))) continue;
         shown[side] = gs4i_max(
             fill[i] - (gs4i_box_beyond(&k->box, at, side, 1, &j) ? fill[j] : GS4I_C(0)), GS4I_C(0));
@@ -12109,6 +12103,8 @@ static gs4_real gs4i_isothermal_links(const gs4_sim *sim, const int at[3], gs4_r
             x[a] = at[a] + k->box.low[a];
         }
         x[side / 2] += side & 1 ? 1 : -1;
+        if (k->box.periodic[side / 2])
+            x[side / 2] = (x[side / 2] + k->box.end[side / 2]) % k->box.end[side / 2];
         if (!gs4i_is_isothermal_at(sim, x, &T)) continue;
         norm = GS4I_SQRT(square);
         link = shown[side] * (own / norm)

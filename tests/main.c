@@ -46,6 +46,7 @@ int main(int count, char **values)
     RUN(test_heat_stiff);
     RUN_ONCE(test_heat_pulse);
     RUN_ONCE(test_heat_surface);
+    RUN(test_heat_seam);
     RUN_ONCE(test_heat_walls);
     RUN_ONCE(test_heat_stefan);
     RUN_ONCE(test_heat_conserved);

@@ -283,6 +283,57 @@ static void test_heat_surface(void)
     }
 }
 
+/* What is left of the heat of a slab of eight cells in air at 0, or with half of it a cold block,
+ * which begins at cell `first` of a periodic axis. */
+static double heat_slab(int first, int with_block)
+{
+    gs4_sim_desc d = scene_cube(16);
+    gs4_material m = scene_liquid(1, 0, 1e-3);
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    gs4_collider c;
+    gs4_sim *sim;
+    double start, left;
+    int i;
+    memset(&c, 0, sizeof c);
+    d.cells[1] = d.cells[2] = 4;
+    d.walls[0] = d.walls[1] = GS4_WALL_PERIODIC;
+    d.air_is_isothermal = !with_block;
+    m.heat_capacity = m.conductivity = 1;
+    f.temperature = 1;
+    sim = physics_create(&d, &m);
+    CHECK_RESULT(
+        sim,
+        gs4_add_particles(sim, gs4_box(at(first / 16.0, 0, 0), at(first / 16.0 + 0.5, 1, 1)), &f),
+        GS4_OK);
+    if (with_block) { /* on the low side of the slab */
+        const double end = first ? first / 16.0 : 1;
+        c.shape = gs4_box(at(end - 0.25, -1, -1), at(end, 2, 2));
+        c.contact = GS4_WALL_SLIP;
+        c.is_isothermal = 1;
+        CHECK_RESULT(sim, gs4_add_collider(sim, &c), 0);
+    }
+    start = gs4_get_stats(sim).thermal_energy;
+    for (i = 0; i < 20; i++) CHECK_RESULT(sim, gs4_step(sim, (gs4_real)1e-3), GS4_OK);
+    left = gs4_get_stats(sim).thermal_energy / start;
+    gs4_destroy(sim);
+    return left;
+}
+
+/* Surfaces at the seam of a periodic axis, low and high, and next to it, are as all others. */
+static void test_heat_seam(void)
+{
+    static const int first[4] = { 0, 1, 7, 8 };
+    const double air = heat_slab(4, 0), block = heat_slab(4, 1);
+    int i;
+    CHECK(air < 0.45 && block > air + 0.2 && block < 0.8);
+    for (i = 0; i < 4; i++) {
+        const double there = heat_slab(first[i], 0);
+        if (test_filter[0]) printf("at %d: %.6f, else %.6f\n", first[i], there, air);
+        CHECK_CLOSE(there, air, 1e-5);
+    }
+    CHECK_CLOSE(heat_slab(0, 1), block, 1e-5);
+}
+
 /* A bar between walls at 1 and 3: the straight line, in the midst and at the ends; and beside a
  * material that conducts 1000 times better, the temperature where they meet, which is nearly
  * that of the wall behind the better one. */

@@ -390,7 +390,10 @@ static void symmetry_heat(symmetry_world *w, int n)
         d.wall_temperature[0] = 50;
         d.wall_temperature[4] = -10;
     }
-    if (around == 2) d.walls[2] = d.walls[3] = GS4_WALL_PERIODIC;
+    if (around == 2) {
+        d.walls[0] = GS4_WALL_OPEN;
+        d.walls[2] = d.walls[3] = GS4_WALL_PERIODIC;
+    }
     d.air_is_isothermal = around == 1;
     symmetry_create(w, &d);
     symmetry_material(w, &m);

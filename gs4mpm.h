@@ -2605,6 +2605,7 @@ typedef struct gs4i_given_row {
     const gs4_real *face[6], *diagonal;
     ptrdiff_t beside[6];
     double unit, diagonal_unit;
+    int uniform;
 } gs4i_given_row;
 
 static void gs4i_find_row(gs4i_given_row *q, const gs4i_solver *s, const gs4_poisson_desc *d, int j,
@@ -2618,10 +2619,11 @@ static void gs4i_find_row(gs4i_given_row *q, const gs4i_solver *s, const gs4_poi
     int a;
     q->kind = gs4i_kinds_of(s, j, k);
     q->diagonal = d->diagonal ? d->diagonal + row * nx : NULL;
-    q->unit = s->unit;
+    q->uniform = s->uniform;
+    q->unit = s->uniform ? 1 : s->unit;
     q->diagonal_unit = s->diagonal_unit;
     for (a = 0; a < 3; a++) {
-        const gs4_real *c = d->coefficient[a];
+        const gs4_real *c = s->uniform ? NULL : d->coefficient[a];
         q->face[2 * a] = c ? c + low[a] : NULL;
         q->face[2 * a + 1] = c ? c + low[a] + high[a] : NULL;
         q->beside[2 * a] = -step[a];
@@ -2633,128 +2635,6 @@ GS4I_INLINE double gs4i_face_of(const gs4i_given_row *q, int i, int f)
 {
     if (!GS4I_CONDUCTS(q->kind[i], q->kind[i + q->beside[f]])) return 0;
     return q->face[f] ? (double)q->face[f][i] * q->unit : q->unit;
-}
-
-/* A strip of both colours with coefficients, in the order of its cells. */
-enum {
-    GS4I_BOTH = 2 * GS4I_STRIP
-};
-typedef struct gs4i_built {
-    double w[6][GS4I_BOTH], exact[GS4I_BOTH]; /* faces, diagonal */
-    float face[3][GS4I_BOTH], low[3][GS4I_BOTH], inverse[GS4I_BOTH], diagonal[GS4I_BOTH],
-        diagonal_low[GS4I_BOTH];
-    /* what level 1 gets: of faces towards + between liquid cells, of those to the air */
-    float link[3][GS4I_BOTH], air[GS4I_BOTH];
-} gs4i_built;
-
-/* Whether any of n cells or their neighbours towards + is liquid. */
-static int gs4i_is_strip_wet(const gs4i_given_row *q, int i, int n)
-{
-    const uint8_t *kind = q->kind + i;
-    int l, all = kind[n];
-    for (l = 0; l < n; l++) all |= kind[l] | kind[l + q->beside[3]] | kind[l + q->beside[5]];
-    return all & GS4I_IS_LIQUID;
-}
-
-static void gs4i_build_faces(gs4i_built *b, const gs4i_given_row *q, int i, int n, int f)
-{
-    const uint8_t *GS4I_RESTRICT kind = q->kind + i, *GS4I_RESTRICT other =
-                                                         q->kind + i + q->beside[f];
-    const gs4_real *GS4I_RESTRICT face = q->face[f] ? q->face[f] + i : NULL;
-    double *GS4I_RESTRICT w = b->w[f];
-    float *GS4I_RESTRICT link = b->link[f >> 1], *GS4I_RESTRICT air = b->air;
-    int l;
-    for (l = 0; l < n; l++) {
-        const double all = face ? (double)face[l] * q->unit : q->unit;
-        w[l] = kind[l] & other[l] & GS4I_IS_OPEN && (kind[l] | other[l]) & GS4I_IS_LIQUID ? all : 0;
-    }
-    for (l = 0; l < n; l++)
-        air[l] += (float)(0.75 * w[l]) * (float)((kind[l] & ~other[l]) / GS4I_IS_LIQUID & 1);
-    if (!(f & 1)) return;
-    for (l = 0; l < n; l++)
-        link[l] = (float)(0.5 * w[l]) * (float)((kind[l] & other[l]) / GS4I_IS_LIQUID);
-}
-
-static void gs4i_build_cells(gs4i_built *GS4I_RESTRICT b, const gs4i_given_row *q, int i, int n)
-{
-    const uint8_t *GS4I_RESTRICT kind = q->kind + i;
-    int l, f;
-    memset(b->air, 0, sizeof b->air);
-    for (f = 0; f < 6; f++) gs4i_build_faces(b, q, i, n, f);
-    for (l = 0; l < n; l++)
-        b->exact[l] = q->diagonal && kind[l] & GS4I_IS_LIQUID
-                          ? (double)q->diagonal[i + l] * q->diagonal_unit
-                          : 0;
-    for (l = 0; l < n; l++) {
-        const double sum =
-            b->exact[l]
-            + (((b->w[0][l] + b->w[1][l]) + (b->w[2][l] + b->w[3][l])) + (b->w[4][l] + b->w[5][l]));
-        const double unknown = (double)(kind[l] / GS4I_IS_LIQUID) * (sum > 0 ? 1.0 : 0.0);
-        b->inverse[l] = (float)(unknown / (sum + (1 - unknown)));
-        b->diagonal[l] = (float)(unknown * b->exact[l] + (double)GS4I_NO_UNKNOWN * (1 - unknown));
-        b->diagonal_low[l] = (float)(b->exact[l] - (double)(float)b->exact[l]);
-    }
-    for (f = 0; f < 3; f++)
-        for (l = 0; l < n; l++) {
-            b->face[f][l] = (float)b->w[2 * f + 1][l];
-            b->low[f][l] = (float)(b->w[2 * f + 1][l] - (double)b->face[f][l]);
-        }
-}
-
-/* n cells of a row, the first an even one, to two colours. */
-static void gs4i_split_colours(float *GS4I_RESTRICT even, float *GS4I_RESTRICT odd,
-                               const float *GS4I_RESTRICT from, int n)
-{
-    int m;
-    for (m = 0; m < n / 2; m++) {
-        even[m] = from[2 * m];
-        odd[m] = from[2 * m + 1];
-    }
-    if (n & 1) even[m] = from[2 * m];
-}
-
-/* One row of level 0 with coefficients, and what its cells add to level 1. */
-static void gs4i_build_row(gs4i_solver *s, const gs4_poisson_desc *d, int j, int k)
-{
-    const gs4i_level *g = &s->level[0], *h = &s->level[1];
-    const size_t row = gs4i_row_of(g, j, k), coarse = gs4i_row_of(h, j / 2, k / 2);
-    const int c = (j + k) & 1;
-    gs4i_given_row q;
-    gs4i_built b;
-    int i, n, f, l;
-    gs4i_find_row(&q, s, d, j, k);
-    memset(&b, 0, sizeof b);
-    for (i = 0; i < g->n[0]; i += GS4I_BOTH) {
-        const size_t at = row + (size_t)(i / 2);
-        const int wet =
-            gs4i_is_strip_wet(&q, i, n = g->n[0] - i < GS4I_BOTH ? g->n[0] - i : GS4I_BOTH);
-        if (wet)
-            gs4i_build_cells(&b, &q, i, n);
-        else {
-            memset(&b, 0, sizeof b);
-            for (l = 0; l < n; l++) b.diagonal[l] = GS4I_NO_UNKNOWN;
-        }
-        gs4i_split_colours(g->inverse[c] + at, g->inverse[!c] + at, b.inverse, n);
-        gs4i_split_colours(g->diagonal[c] + at, g->diagonal[!c] + at, b.diagonal, n);
-        if (g->diagonal_low[0])
-            gs4i_split_colours(g->diagonal_low[c] + at, g->diagonal_low[!c] + at, b.diagonal_low,
-                               n);
-        for (f = 0; f < 3; f++) {
-            gs4i_split_colours(g->w[f][c] + at, g->w[f][!c] + at, b.face[f], n);
-            if (g->w_low[f][0])
-                gs4i_split_colours(g->w_low[f][c] + at, g->w_low[f][!c] + at, b.low[f], n);
-        }
-        for (l = 0; l < n && wet; l++) {
-            const int up = ((i + l) / 2 + j / 2 + k / 2) & 1;
-            const size_t to = coarse + (size_t)((i + l) / 4);
-            if (l & 1) h->w[0][up][to] += b.link[0][l];
-            if (j & 1) h->w[1][up][to] += b.link[1][l];
-            if (k & 1) h->w[2][up][to] += b.link[2][l];
-            /* z: to the air alone, while setting up */
-            h->diagonal[up][to] += b.air[l] + (float)b.exact[l];
-            h->z[up][to] += b.air[l];
-        }
-    }
 }
 
 /* Whether eight cells of a row are liquid; and all their neighbours, too. */
@@ -2777,76 +2657,157 @@ GS4I_INLINE int gs4i_is_deep(const uint8_t *v, ptrdiff_t ny, ptrdiff_t nz)
     return all == 0x0303030303030303u;
 }
 
-/* What the diagonal of a cell with `degree` faces of coefficient 1 makes of it. */
-GS4I_INLINE void gs4i_build_diagonal(const gs4i_solver *s, const gs4i_given_row *q, int j, int k,
-                                     int i, int degree)
+/* A strip of both colours, in the order of its cells. */
+enum {
+    GS4I_BOTH = 2 * GS4I_STRIP
+};
+typedef struct gs4i_built {
+    double w[6][GS4I_BOTH], given[GS4I_BOTH]; /* faces, diagonal */
+    float face[3][GS4I_BOTH], low[3][GS4I_BOTH], inverse[GS4I_BOTH], diagonal[GS4I_BOTH],
+        diagonal_low[GS4I_BOTH];
+    /* what level 1 gets: of faces towards + between liquid cells, of those to the air */
+    float link[3][GS4I_BOTH], air[GS4I_BOTH];
+    int deep; /* all faces are 1 and between liquid cells */
+} gs4i_built;
+
+/* Whether any of n cells or their neighbours towards + is liquid. */
+static int gs4i_is_strip_wet(const gs4i_given_row *q, int i, int n)
 {
-    const gs4i_level *g = &s->level[0], *h = &s->level[1];
-    const size_t at = gs4i_row_of(g, j, k) + (size_t)(i / 2);
-    const int c = (i + j + k) & 1;
-    const double diagonal = (double)q->diagonal[i] * q->diagonal_unit;
-    if (!(diagonal > 0)) return;
-    g->diagonal[c][at] = (float)(diagonal + degree - 6);
-    g->diagonal_low[c][at] = (float)(diagonal + degree - 6 - (double)g->diagonal[c][at]);
-    g->inverse[c][at] = (float)(1 / (degree + diagonal));
-    h->diagonal[(i / 2 + j / 2 + k / 2) & 1][gs4i_row_of(h, j / 2, k / 2) + (size_t)(i / 4)] +=
-        (float)diagonal;
+    const uint8_t *kind = q->kind + i;
+    int l, all = kind[n];
+    for (l = 0; l < n; l++) all |= kind[l] | kind[l + q->beside[3]] | kind[l + q->beside[5]];
+    return all & GS4I_IS_LIQUID;
 }
 
-/* The same where one coefficient serves all faces, for cells `begin` to `end`, which hold all
- * liquid of the row. */
-static void gs4i_build_uniform_row(gs4i_solver *s, const gs4_poisson_desc *d, int j, int k,
-                                   int begin, int end)
+GS4I_INLINE void gs4i_build_faces(gs4i_built *b, const gs4i_given_row *q, int i, int n, int f)
 {
-    const gs4i_level *g = &s->level[0], *h = &s->level[1];
-    const size_t row = gs4i_row_of(g, j, k), coarse = gs4i_row_of(h, j / 2, k / 2);
-    const ptrdiff_t ny = (ptrdiff_t)s->kind_row, nz = (ptrdiff_t)s->kind_plane;
-    static const float inverse[7] = { 0, 1, 1 / 2.0f, 1 / 3.0f, 1 / 4.0f, 1 / 5.0f, 1 / 6.0f };
-    gs4i_given_row q;
-    size_t m;
-    int i, c;
-    gs4i_find_row(&q, s, d, j, k);
-    for (c = 0; c < 2; c++) {
-        memset(g->inverse[c] + row, 0, (size_t)g->width * sizeof(float));
-        for (m = 0; m < g->stride; m++) g->diagonal[c][row + m] = GS4I_NO_UNKNOWN;
-        if (!g->diagonal_low[c]) continue;
-        memset(g->diagonal_low[c] + row, 0, (size_t)g->width * sizeof(float));
+    const uint8_t *GS4I_RESTRICT kind = q->kind + i, *GS4I_RESTRICT other = kind + q->beside[f];
+    const gs4_real *GS4I_RESTRICT face = q->face[f] ? q->face[f] + i : NULL;
+    double *GS4I_RESTRICT w = b->w[f];
+    float *GS4I_RESTRICT link = b->link[f >> 1], *GS4I_RESTRICT air = b->air;
+    int l;
+    if (face)
+        for (l = 0; l < n; l++)
+            w[l] = kind[l] & other[l] & (kind[l] | other[l]) >> 1 ? (double)face[l] * q->unit : 0;
+    else
+        for (l = 0; l < n; l++) w[l] = (kind[l] & other[l] & (kind[l] | other[l]) >> 1) * q->unit;
+    for (l = 0; l < n; l++) air[l] += (float)(0.75 * w[l]) * (float)((kind[l] & ~other[l]) >> 1);
+    if (!(f & 1)) return;
+    for (l = 0; l < n; l++) link[l] = (float)(0.5 * w[l]) * (float)((kind[l] & other[l]) >> 1);
+}
+
+/* Where all faces are 1, `diagonal` has the faces that do not conduct as well: -1 for each. */
+GS4I_INLINE void gs4i_build_cells(gs4i_built *GS4I_RESTRICT b, const gs4i_given_row *q, int i,
+                                  int n)
+{
+    const uint8_t *GS4I_RESTRICT kind = q->kind + i;
+    int l, f;
+    for (l = 0; l < n; l++)
+        b->given[l] = q->diagonal && kind[l] & GS4I_IS_LIQUID
+                          ? (double)q->diagonal[i + l] * q->diagonal_unit
+                          : 0;
+    for (l = 0; l < n; l++) {
+        const double faces = ((b->w[0][l] + b->w[1][l]) + (b->w[2][l] + b->w[3][l]))
+                             + (b->w[4][l] + b->w[5][l]),
+                     center = b->given[l] + faces,
+                     diagonal = b->given[l] + (q->uniform ? faces - 6 : 0);
+        const double unknown = (double)(kind[l] / GS4I_IS_LIQUID) * (center > 0 ? 1.0 : 0.0);
+        b->inverse[l] = (float)(unknown / (center + (1 - unknown)));
+        b->diagonal[l] = (float)(unknown * diagonal + (double)GS4I_NO_UNKNOWN * (1 - unknown));
+        b->diagonal_low[l] = (float)(unknown * (diagonal - (double)(float)diagonal));
     }
-    for (i = begin; i < end; i++) {
-        const uint8_t *v = q.kind + i;
-        const size_t at = row + (size_t)(i / 2), to = coarse + (size_t)(i / 4);
-        const int up = (i / 2 + j / 2 + k / 2) & 1;
-        int open, wet;
-        if (!(i & 7) && i + 8 <= end && gs4i_is_deep(v, ny, nz)) { /* eight at once */
-            for (c = 0; c < 2; c++)
-                for (m = 0; m < 4; m++) {
-                    g->diagonal[c][at + m] = 0;
-                    g->inverse[c][at + m] = inverse[6];
-                }
-            for (m = 0; m < 8 && q.diagonal; m++) gs4i_build_diagonal(s, &q, j, k, i + (int)m, 6);
-            for (m = 0; m < 4; m++) {
-                const int up_m = (up + (int)m) & 1;
-                h->w[0][up_m][to + m / 2] += 0.5f;
-                if (j & 1) h->w[1][up_m][to + m / 2] += 1;
-                if (k & 1) h->w[2][up_m][to + m / 2] += 1;
-            }
-            i += 7;
-            continue;
+    for (f = 0; f < 3 && !q->uniform; f++)
+        for (l = 0; l < n; l++) {
+            b->face[f][l] = (float)b->w[2 * f + 1][l];
+            b->low[f][l] = (float)(b->w[2 * f + 1][l] - (double)b->face[f][l]);
         }
-        if (!(*v & GS4I_IS_LIQUID)) continue;
-        c = (i + j + k) & 1;
-        open = (v[-1] & 1) + (v[1] & 1) + (v[-ny] & 1) + (v[ny] & 1) + (v[-nz] & 1) + (v[nz] & 1);
-        wet = (v[-1] >> 1) + (v[1] >> 1) + (v[-ny] >> 1) + (v[ny] >> 1) + (v[-nz] >> 1)
-              + (v[nz] >> 1);
-        g->diagonal[c][at] = open ? (float)(open - 6) : GS4I_NO_UNKNOWN;
-        g->inverse[c][at] = inverse[open];
-        if (q.diagonal) gs4i_build_diagonal(s, &q, j, k, i, open);
-        if (i & 1) h->w[0][up][to] += 0.5f * (float)(v[1] >> 1);
-        if (j & 1) h->w[1][up][to] += 0.5f * (float)(v[ny] >> 1);
-        if (k & 1) h->w[2][up][to] += 0.5f * (float)(v[nz] >> 1);
-        if (open != wet) {
-            h->diagonal[up][to] += 0.75f * (float)(open - wet);
-            h->z[up][to] += 0.75f * (float)(open - wet);
+}
+
+/* Cells i to i + n of a row. Nothing changes from one strip to the next where all of both, and all
+ * around them, is liquid: `deep`. */
+GS4I_INLINE void gs4i_build_strip(gs4i_built *b, const gs4i_given_row *q, int i, int n)
+{
+    int f, l, deep = q->uniform && n == GS4I_BOTH;
+    for (l = 0; l < GS4I_BOTH && deep; l += 8)
+        deep = gs4i_is_deep(q->kind + i + l, q->beside[3], q->beside[5]);
+    if (!(deep && b->deep)) {
+        memset(b->air, 0, sizeof b->air);
+        for (f = 0; f < 6; f++) gs4i_build_faces(b, q, i, n, f);
+    }
+    if (!(deep && b->deep && !q->diagonal)) gs4i_build_cells(b, q, i, n);
+    b->deep = deep;
+}
+
+/* n cells of a row, the first an even one, to two colours. */
+static void gs4i_split_colours(float *GS4I_RESTRICT even, float *GS4I_RESTRICT odd,
+                               const float *GS4I_RESTRICT from, int n)
+{
+    int m;
+    for (m = 0; m < n / 2; m++) {
+        even[m] = from[2 * m];
+        odd[m] = from[2 * m + 1];
+    }
+    if (n & 1) even[m] = from[2 * m];
+}
+
+/* What the n cells of a strip of level 0 from cell `place` on add to level 1, four cells to two;
+ * h->z has the faces to the air alone, while setting up. */
+static void gs4i_add_to_level_1(const gs4i_level *h, const gs4i_built *b, const int place[3], int n)
+{
+    const int i = place[0], j = place[1], k = place[2], c = (i / 2 + j / 2 + k / 2) & 1;
+    const size_t row = gs4i_row_of(h, j / 2, k / 2) + (size_t)(i / 4);
+    int m, l;
+    for (m = 0; m < (n + 3) / 4; m++)
+        for (l = 4 * m; l < 4 * m + 4; l += 2) {
+            const int up = l & 2 ? !c : c;
+            const size_t to = row + (size_t)m;
+            h->w[0][up][to] += b->link[0][l + 1];
+            if (j & 1) h->w[1][up][to] = (h->w[1][up][to] + b->link[1][l]) + b->link[1][l + 1];
+            if (k & 1) h->w[2][up][to] = (h->w[2][up][to] + b->link[2][l]) + b->link[2][l + 1];
+            h->diagonal[up][to] = (h->diagonal[up][to] + (b->air[l] + (float)b->given[l]))
+                                  + (b->air[l + 1] + (float)b->given[l + 1]);
+            h->z[up][to] = (h->z[up][to] + b->air[l]) + b->air[l + 1];
+        }
+}
+
+/* A row of level 0, and what its cells add to level 1. */
+static void gs4i_build_row(gs4i_solver *s, const gs4_poisson_desc *d, int j, int k)
+{
+    const gs4i_level *g = &s->level[0];
+    const size_t row = gs4i_row_of(g, j, k);
+    const int c = (j + k) & 1;
+    int place[3] = { 0, j, k }, n, f, l;
+    gs4i_given_row q;
+    gs4i_built b;
+    size_t m;
+    b.deep = 0;
+    gs4i_find_row(&q, s, d, j, k);
+    for (f = 0; f < 2; f++)
+        for (m = row; m < row + g->stride; m++) g->diagonal[f][m] = GS4I_NO_UNKNOWN;
+    for (; place[0] < g->n[0]; place[0] += GS4I_BOTH) {
+        const size_t at = row + (size_t)(place[0] / 2);
+        n = g->n[0] - place[0] < GS4I_BOTH ? g->n[0] - place[0] : GS4I_BOTH;
+        if (gs4i_is_strip_wet(&q, place[0], n)) {
+            if (n == GS4I_BOTH) { /* a constant: loops in vectors */
+                gs4i_build_strip(&b, &q, place[0], GS4I_BOTH);
+            } else {
+                memset(&b, 0, sizeof b);
+                gs4i_build_strip(&b, &q, place[0], n);
+            }
+            gs4i_add_to_level_1(&s->level[1], &b, place, n);
+        } else {
+            memset(&b, 0, sizeof b);
+            for (l = 0; l < n; l++) b.diagonal[l] = GS4I_NO_UNKNOWN;
+        }
+        gs4i_split_colours(g->inverse[c] + at, g->inverse[!c] + at, b.inverse, n);
+        gs4i_split_colours(g->diagonal[c] + at, g->diagonal[!c] + at, b.diagonal, n);
+        if (g->diagonal_low[0])
+            gs4i_split_colours(g->diagonal_low[c] + at, g->diagonal_low[!c] + at, b.diagonal_low,
+                               n);
+        for (f = 0; f < 3 && g->w[0][0]; f++) {
+            gs4i_split_colours(g->w[f][c] + at, g->w[f][!c] + at, b.face[f], n);
+            if (g->w_low[f][0])
+                gs4i_split_colours(g->w_low[f][c] + at, g->w_low[f][!c] + at, b.low[f], n);
         }
     }
 }
@@ -2879,11 +2840,7 @@ static void gs4i_build_planes(int bk, void *context)
             int32_t *span = g->span + 2 * ((size_t)k * (size_t)g->n[1] + (size_t)j);
             int32_t *wide = h->span + 2 * ((size_t)bk * (size_t)h->n[1] + (size_t)(j / 2));
             gs4i_build_span(s, j, k, span);
-            if (s->uniform)
-                gs4i_build_uniform_row(s, u->d, j, k, 2 * span[0],
-                                       2 * span[1] < g->n[0] ? 2 * span[1] : g->n[0]);
-            else
-                gs4i_build_row(s, u->d, j, k);
+            gs4i_build_row(s, u->d, j, k);
             if (span[0] >= span[1]) continue;
             first = span[0] / 2 / GS4I_STRIP * GS4I_STRIP;
             last = (span[1] / 2 + GS4I_STRIP - 1) / GS4I_STRIP * GS4I_STRIP;

@@ -2953,53 +2953,6 @@ static void gs4i_group_block(const gs4i_level *g, size_t block, int group[8])
         }
 }
 
-/* Blocks in the bulk, where all links of all eight cells are equal: that link, 0 for other
- * blocks. Most blocks are in the bulk, and what follows is quick there. In x, which is larger: a
- * float for 64 cells. */
-GS4I_INLINE float *gs4i_bulk(const gs4i_solver *s, int bi, int bj, int bk)
-{
-    const int *n = s->level[1].n;
-    return (float *)(void *)s->x[0]
-           + ((size_t)bk * (size_t)((n[1] + 1) / 2) + (size_t)bj) * (size_t)((n[0] + 1) / 2)
-           + (size_t)bi;
-}
-
-static void gs4i_see_link(float *GS4I_RESTRICT least, float *GS4I_RESTRICT most,
-                          const float *GS4I_RESTRICT w)
-{
-    int l;
-    for (l = 0; l < GS4I_STRIP; l++) {
-        least[l] = w[l] < least[l] ? w[l] : least[l];
-        most[l] = w[l] > most[l] ? w[l] : most[l];
-    }
-}
-
-static void gs4i_find_bulk(const gs4i_solver *s, int bj, int bk)
-{
-    const gs4i_level *g = &s->level[1];
-    float least[GS4I_STRIP], most[GS4I_STRIP];
-    int bi, l, q, a;
-    for (bi = 0; bi < (g->n[0] + 1) / 2; bi += GS4I_STRIP) {
-        const size_t block = gs4i_block_of(g, bi, bj, bk);
-        memcpy(least, g->w[0][0] + block, sizeof least);
-        memcpy(most, least, sizeof most);
-        for (q = 0; q < 8; q++)
-            for (a = 0; a < 3; a++) {
-                const int c = gs4i_child_colour(q);
-                const size_t at = gs4i_child(g, block, q);
-                gs4i_see_link(least, most, g->w[a][c] + at);
-                if (!(q >> a & 1))
-                    gs4i_see_link(least, most,
-                                  g->w[a][!c] + at
-                                      - (a == 0   ? 1
-                                         : a == 1 ? g->stride
-                                                  : g->plane));
-            }
-        for (l = 0; l < GS4I_STRIP && bi + l < (g->n[0] + 1) / 2; l++)
-            *gs4i_bulk(s, bi + l, bj, bk) = least[l] == most[l] ? most[l] : 0;
-    }
-}
-
 static void gs4i_number_groups(int bk, void *context)
 {
     const gs4i_setup *u = (const gs4i_setup *)context;
@@ -3013,14 +2966,8 @@ static void gs4i_number_groups(int bk, void *context)
         memset(s->parent[0] + gs4i_row_of(g, bj % g->n[1], bj / g->n[1]), 0xff,
                g->stride * sizeof(int32_t));
     for (bj = 0; bj < (g->n[1] + 1) / 2; bj++)
-        for (gs4i_find_bulk(s, bj, bk), bi = 0; bi < (g->n[0] + 1) / 2; bi++) {
+        for (bi = 0; bi < (g->n[0] + 1) / 2; bi++) {
             const size_t block = gs4i_block_of(g, bi, bj, bk);
-            if (*gs4i_bulk(s, bi, bj, bk) > 0) {
-                const int32_t one = count[(bi + bj + bk) & 1]++;
-                for (q = 0; q < 8; q++)
-                    s->parent[gs4i_child_colour(q)][gs4i_child(g, block, q)] = one;
-                continue;
-            }
             gs4i_group_block(g, block, group);
             for (q = 0; q < 8; q++) {
                 if (group[q] == q) number[q] = count[(bi + bj + bk) & 1]++;
@@ -3105,32 +3052,13 @@ GS4I_INLINE float gs4i_link(const gs4i_level *g, int c, size_t at, int bits, int
                             : g->w[a][!c][a == 0 ? at : at - (a == 1 ? g->stride : g->plane)];
 }
 
-/* Edges of a block in the bulk among others there; 0 if it is not. */
-GS4I_INLINE int gs4i_bulk_edges(const gs4i_solver *s, int bi, int bj, int bk, gs4i_edge *edge)
-{
-    static const int beside[6][3] = { { -1, 0, 0 }, { 1, 0, 0 },  { 0, -1, 0 },
-                                      { 0, 1, 0 },  { 0, 0, -1 }, { 0, 0, 1 } };
-    const gs4i_level *g = &s->level[1];
-    const float w = *gs4i_bulk(s, bi, bj, bk);
-    int f;
-    for (f = 0; f < 6 && w > 0; f++) { /* around the bulk there are blocks */
-        const int i = bi + beside[f][0], j = bj + beside[f][1], k = bk + beside[f][2];
-        if (!(*gs4i_bulk(s, i, j, k) > 0)) return 0;
-        edge[f].from = s->parent[0][gs4i_block_of(g, bi, bj, bk)];
-        edge[f].to = s->parent[0][gs4i_block_of(g, i, j, k)];
-        edge[f].w = 4 * (0.5f * w);
-    }
-    return f;
-}
-
 /* Edges from the groups of a block to groups around, each once; their w where `weigh`. */
 GS4I_INLINE int gs4i_block_edges(const gs4i_solver *s, int bi, int bj, int bk, gs4i_edge *edge,
                                  int weigh)
 {
     const gs4i_level *g = &s->level[1];
     const size_t block = gs4i_block_of(g, bi, bj, bk);
-    int q, f, e, count = gs4i_bulk_edges(s, bi, bj, bk, edge);
-    if (count) return count;
+    int q, f, e, count = 0;
     for (q = 0; q < 8; q++) {
         const int c = gs4i_child_colour(q);
         const size_t at = gs4i_child(g, block, q);
@@ -3350,30 +3278,34 @@ static void gs4i_find_links(const gs4i_graph *g, float (*link)[4])
         }
 }
 
-/* The next graph from the last. Its tables are in x, which is larger: 28 bytes a node, at most a
- * node for eight cells. */
-static int gs4i_coarsen_graph(gs4i_solver *s)
-{
-    gs4i_graph *g = &s->graph[s->graphs - 1], *up = &s->graph[s->graphs];
+/* Tables for the next graph: the nodes of its node i are child[first[i]] to child[first[i + 1]];
+ * `place` of its edges; `link` of each node of the last graph, see gs4i_find_links. They are in x,
+ * which is larger: 28 bytes a node, at most a node for eight cells. */
+typedef struct gs4i_tables {
     int32_t *first, *child, *place;
-    float(*link)[4];
-    const int all = s->graphs > GS4I_GRAPHS / 2; /* blocks grow, so graphs end */
-    /* blocks in the bulk, four of a chain */
-    const int bulk = (int)(3 * (int64_t)g->start[g->n] / g->n) - 4;
+    float (*link)[4];
+} gs4i_tables;
+
+/* Groups of at most 8 nodes, as a block has in the interior; weaker edges join, and groups grow,
+ * until a fifth of the nodes is gone. Graphs beyond the twelfth join all of a block, so that there
+ * is a last one. */
+static void gs4i_choose_groups(gs4i_graph *g, int all, int32_t *number, int *reds, int *blacks)
+{
     float strong = all ? 0 : GS4I_STRONG;
-    int most = all ? g->n : bulk > 4 ? bulk : 4, reds, blacks, i, j, e, filling;
-    first = (int32_t *)(void *)s->x[0];
-    child = first + g->n + 2;
-    place = child + g->n;
+    int most = all ? g->n : 8;
     for (;;) {
-        gs4i_join_nodes(g, strong, most, first, &reds, &blacks);
-        if (5 * (int64_t)(reds + blacks) <= 4 * (int64_t)g->n || strong < 1e-3f) break;
+        gs4i_join_nodes(g, strong, most, number, reds, blacks);
+        if (5 * (int64_t)(*reds + *blacks) <= 4 * (int64_t)g->n || strong < 1e-3f) break;
         strong *= 0.25f;
         most = most < g->n / 4 ? 4 * most : g->n;
     }
-    link = (float(*)[4])(void *)(place + g->n);
-    gs4i_find_links(g, link);
-    if (gs4i_reserve_nodes(s, up, reds + blacks, reds) != GS4_OK) return GS4_ERROR_MEMORY;
+}
+
+/* What nodes of the next graph have of those of the last, and which these are. */
+static void gs4i_fill_nodes(const gs4i_graph *g, gs4i_graph *up, const gs4i_tables *t)
+{
+    int32_t *first = t->first;
+    int i;
     memset(first, 0, ((size_t)up->n + 2) * sizeof *first);
     for (i = 0; i < g->n; i++)
         if (g->parent[i] >= 0) {
@@ -3384,37 +3316,63 @@ static int gs4i_coarsen_graph(gs4i_solver *s)
         }
     for (i = 0; i < up->n; i++) first[i + 2] += first[i + 1];
     for (i = 0; i < g->n; i++)
-        if (g->parent[i] >= 0) child[first[g->parent[i] + 1]++] = i;
-    for (filling = 0; filling < 2; filling++) { /* count edges, then fill them in */
-        int32_t next = 0;
-        for (i = 0; i < up->n; i++) place[i] = -1;
-        for (i = 0; i < up->n; i++) {
-            const int32_t begin = next;
-            for (j = first[i]; j < first[i + 1]; j++)
-                for (e = g->start[child[j]]; e < g->start[child[j] + 1]; e++) {
-                    const int32_t to = g->parent[g->to[e]];
-                    const uint64_t from = g->block[child[j]], into = g->block[g->to[e]];
-                    const int inside = !((from ^ into) & ~GS4I_LOWEST_BITS),
-                              axis = inside ? 3 : gs4i_axis(from, into);
-                    const float one = link[child[j]][axis], other = link[g->to[e]][axis];
-                    if (to == i) continue;
-                    if (place[to] < begin) {
-                        place[to] = next++;
-                        if (filling) {
-                            up->to[place[to]] = to;
-                            up->w[place[to]] = 0;
-                        }
-                    }
-                    if (filling)
-                        up->w[place[to]] += inside
-                                                ? gs4i_chain(g->w[e], one, first[i + 1] - first[i],
-                                                             other, first[to + 1] - first[to])
-                                                : gs4i_series(g->w[e], one, other);
-                }
-            if (!filling) up->start[i + 1] = next - begin;
-        }
-        if (!filling && gs4i_reserve_edges(s, up) != GS4_OK) return GS4_ERROR_MEMORY;
+        if (g->parent[i] >= 0) t->child[first[g->parent[i] + 1]++] = i;
+}
+
+/* What edge e of node i adds to that of the nodes a and b of the next graph. */
+static float gs4i_coarse_weight(const gs4i_graph *g, const gs4i_tables *t, int i, int e)
+{
+    const int32_t j = g->to[e], a = g->parent[i], b = g->parent[j];
+    if ((g->block[i] ^ g->block[j]) & ~GS4I_LOWEST_BITS) {
+        const int axis = gs4i_axis(g->block[i], g->block[j]);
+        return gs4i_series(g->w[e], t->link[i][axis], t->link[j][axis]);
     }
+    return gs4i_chain(g->w[e], t->link[i][3], t->first[a + 1] - t->first[a], t->link[j][3],
+                      t->first[b + 1] - t->first[b]);
+}
+
+/* Counts the edges of the next graph into start[i + 1], or fills them in. */
+static void gs4i_coarse_edges(const gs4i_graph *g, gs4i_graph *up, const gs4i_tables *t, int fill)
+{
+    int32_t next = 0, *place = t->place;
+    int i, j, e;
+    for (i = 0; i < up->n; i++) place[i] = -1;
+    for (i = 0; i < up->n; i++) {
+        const int32_t begin = next;
+        for (j = t->first[i]; j < t->first[i + 1]; j++)
+            for (e = g->start[t->child[j]]; e < g->start[t->child[j] + 1]; e++) {
+                const int32_t to = g->parent[g->to[e]];
+                if (to == i) continue;
+                if (place[to] < begin) {
+                    place[to] = next++;
+                    if (fill) {
+                        up->to[place[to]] = to;
+                        up->w[place[to]] = 0;
+                    }
+                }
+                if (fill) up->w[place[to]] += gs4i_coarse_weight(g, t, t->child[j], e);
+            }
+        if (!fill) up->start[i + 1] = next - begin;
+    }
+}
+
+/* The next graph from the last. */
+static int gs4i_coarsen_graph(gs4i_solver *s)
+{
+    gs4i_graph *g = &s->graph[s->graphs - 1], *up = &s->graph[s->graphs];
+    gs4i_tables t;
+    int reds, blacks;
+    t.first = (int32_t *)(void *)s->x[0];
+    t.child = t.first + g->n + 2;
+    t.place = t.child + g->n;
+    t.link = (float(*)[4])(void *)(t.place + g->n);
+    gs4i_choose_groups(g, s->graphs > GS4I_GRAPHS / 2, t.first, &reds, &blacks);
+    gs4i_find_links(g, t.link);
+    if (gs4i_reserve_nodes(s, up, reds + blacks, reds) != GS4_OK) return GS4_ERROR_MEMORY;
+    gs4i_fill_nodes(g, up, &t);
+    gs4i_coarse_edges(g, up, &t, 0);
+    if (gs4i_reserve_edges(s, up) != GS4_OK) return GS4_ERROR_MEMORY;
+    gs4i_coarse_edges(g, up, &t, 1);
     gs4i_finish_graph(up);
     s->graphs++;
     return GS4_OK;

@@ -1483,40 +1483,55 @@ static void gs4i_shape_bounds(const gs4_shape *s, gs4_vec3 *low, gs4_vec3 *high)
 
 /* ==== [[poisson]] multigrid and conjugate gradients on a masked grid =========================== *
  *
- * Solves  h^2 d_i x_i + sum_faces c_f (x_i - x_j) = h^2 b_i  in the liquid cells; x is given in
- * the air, nothing flows into solids. Level 0 is the grid, level 1 has blocks of 2 x 2 x 2 of
- * its cells; both keep red cells (i + j + k even) and black ones apart, so that every sweep is
- * unit stride. Cell i of a row is number m = i / 2 of its colour:
+ * In each liquid cell i with faces f to cells j, and a_ii the sum of all that x_i is multiplied by:
+ *     h^2 d_i x_i + sum over f of c_f (x_i - x_j) = h^2 b_i
+ * x_j is given in the air; faces of solids and of the box have c_f = 0.
+ *
+ * OUTSIDE. Conjugate gradients in double; one symmetric V-cycle in float is the preconditioner
+ * (gs4i_cycle: z from r). A p is formed in double from differences, and not stored.
+ *
+ * LEVELS. 0 is the grid; a cell of level 1 is a block of 2 x 2 x 2 of level 0. Beyond are graphs:
+ * a node is a *connected group*, the strongly joined cells (or nodes) of a block of 2 x 2 x 2. So
+ * a thin wall stays a wall. The last graph, of 200 nodes at most, is solved by Cholesky.
+ *
+ * TRANSFERS. Restriction sums, prolongation injects.
+ *
+ * COARSE MATRIX. Galerkin's with the faces halved: 1/2 the sum of the fine faces, 3/4 of those to
+ * the air, 1 of the diagonal. Piecewise constants make differences twice too stiff: 1/2 mends it.
+ * 3/4 was measured best. Graphs keep more of a face at a wall or a door (gs4i_series).
+ *
+ * SMOOTHER. Red-black Gauss-Seidel: R B R B on the way down, B R B R up; on graphs beyond the
+ * first three sweeps each. Red and black cells (i + j + k even and odd) are kept in two arrays,
+ * so that every sweep is unit stride. Cell i of a row is number m = i / 2 of its colour:
  *
  *        red    | 0 |   | 1 |   | 2 |       neighbours of cell m of one colour, all of the other:
- *        black      | 0 |   | 1 |   | 2 |   in its row m - 1 + t and m + t, in the rows beside,
- *        i        0   1   2   3   4   5     above and below m; t = colour ^ (j + k) & 1
- *                                           (i = 2 m + t); children of a coarse cell i:
- *                                           numbers m = i of both colours in four rows
+ *        black      | 0 |   | 1 |   | 2 |   in its row m - 1 + t and m + t; in the rows beside,
+ *        i        0   1   2   3   4   5     above and below m; t = (colour + j + k) & 1,
+ *                                           i = 2 m + t; children of a coarse cell i: numbers
+ *                                           m = i of both colours in four rows
  *
- * From level 2 on an unknown is a group of strongly linked cells in a block, and a level is a
- * graph. Restriction sums, prolongation injects; a coarse face has half the sum of its fine
- * ones, a face to the air 3/4, the diagonal 1: for faces the coefficient of the wider stencil,
- * measured best for the air; graphs differ where a wall or a door is near (gs4i_series,
- * gs4i_air). A cycle is red-black Gauss-Seidel, two sweeps down (R B R B) and two up (B R B R),
- * which is symmetric, three on graphs beyond the first; it runs in float and preconditions
- * conjugate gradients in double, whose matrix is applied in difference form. */
+ * It takes 6 to 9 iterations for a residual of 1e-8 on boxes and pools, 4 to 19 in mazes, sprays
+ * and random coefficients (64^3 to 132^3 cells; bounds: test_poisson_iterations). */
 
-/* a kernel works on whole strips of a row of one colour; rows are padded to them */
+/* kernels work on whole strips of a row of one colour, and rows are padded to them; a multiple of
+ * the lanes of all vectors, and the order of sums depends on it */
 #define GS4I_STRIP 16
-#define GS4I_SLABS 64
-#define GS4I_GRAPHS 24
-/* of the geometric mean of the strongest links of both ends: less does not join them */
+#define GS4I_SLABS 64  /* at most; gs4i_solver_setup wants two a thread */
+#define GS4I_GRAPHS 24 /* at most: 2^21 cells an axis are 19 halvings beyond level 1 */
+/* edge / sqrt(strongest edge of one end * of the other): below it does not join; chosen by
+ * test_poisson_maze */
 #define GS4I_STRONG 0.36f
-#define GS4I_DENSE 200          /* unknowns that are solved by Cholesky */
+#define GS4I_DENSE 200          /* nodes, at most, that are solved by Cholesky */
 #define GS4I_NO_UNKNOWN (-8.0f) /* as diagonal: a cell without unknown */
-#define GS4I_IS_LIQUID 2        /* bits of a kind: unknown; lets flow through */
-#define GS4I_IS_OPEN 1
+/* bits of a kind */
+#define GS4I_IS_LIQUID 2 /* there is an unknown */
+#define GS4I_IS_OPEN 1   /* not solid */
 
-/* The matrix in cells l of one colour in rows with t, see above:
+/* The matrix in the cells l of one colour, in rows of one t:
  *     (A v)_l = (diagonal + diagonal_low)_l v_l
  *               + sum over f of face[f]_l (v_l - around_{l + beside[f]}),  f = -x +x -y +y -z +z,
- * where `around` is v of the other colour. */
+ * where `around` is v of the other colour. Where c is the same on all faces it is scaled to 1 and
+ * not stored; `diagonal` then has -1 for each face without flow, whose v_j is 0 in memory. */
 typedef struct gs4i_stencil {
     int uniform; /* all faces are 1 */
     ptrdiff_t beside[6];
@@ -1529,11 +1544,11 @@ typedef struct gs4i_level {
     int n[3], width;             /* cells; cells of one colour in a row */
     size_t stride, plane, count; /* from row to row, from plane to plane, in all */
     int32_t *span;               /* per row: first and last strip with liquid, in cells */
-    /* correction; of the diagonal, 0 where there is no unknown */
+    /* correction; 1 / a_ii, 0 where there is no unknown */
     float *z[2], *inverse[2];
-    /* coefficient of the face towards +x +y +z, and what float leaves of it; NULL: all equal */
+    /* c of the face towards +x +y +z, and what float leaves of it; NULL: all are 1 */
     float *w[3][2], *w_low[3][2];
-    /* h^2 d; level 1: with the faces to the air; level 0 where w: -1 without unknown */
+    /* h^2 d, see gs4i_stencil; level 1: and the faces to the air */
     float *diagonal[2], *diagonal_low[2];
     double *r[2];               /* residual */
     gs4i_stencil stencil[2][2]; /* of each colour, t = 0 and 1 */
@@ -1544,14 +1559,14 @@ typedef struct gs4i_graph {
     int n, reds, mixed;
     int32_t *start, *to;
     float *w; /* edges of node i: start[i] to start[i + 1] */
-    /* center: a_ii = air + diagonal + sum of w; inverse: 1 / a_ii, 0 where that is 0 */
+    /* center: a_ii = air + diagonal + sum of w; inverse: 1 / a_ii, or 0 */
     float *inverse, *center, *air, *diagonal, *b, *x;
     int32_t *parent; /* in the next graph; -1: a node without edges */
     uint64_t *block; /* its place, 21 bits an axis */
     gs4i_scratch nodes, edges;
 } gs4i_graph;
 
-/* a run of liquid cells in a row */
+/* Neighbouring liquid cells of a row; `sum`: see gs4i_list_runs, then of the cells. */
 typedef struct gs4i_run {
     int32_t row, begin, end, pocket;
     double sum;
@@ -1607,8 +1622,8 @@ GS4I_INLINE const gs4i_stencil *gs4i_stencil_of(const gs4i_level *g, const gs4i_
     return &g->stencil[c][(c + row->j + row->k) & 1];
 }
 
-/* Of cell l with value c and its faces f, with w the face and v_j = around_{l + beside[f]}: w v_j,
- * w (c - v_j), the same in double of v in float, and of v in double */
+/* Terms of one face of cell l: w = face[f]_l, v_j = around_{l + beside[f]}, c = v_l. */
+/* w v_j */
 GS4I_INLINE float gs4i_neighbour(const gs4i_stencil *q, const float *around, int f, size_t l,
                                  int uniform)
 {
@@ -1616,6 +1631,7 @@ GS4I_INLINE float gs4i_neighbour(const gs4i_stencil *q, const float *around, int
     return uniform ? v : q->face[f][l] * v;
 }
 
+/* w (c - v_j) */
 GS4I_INLINE float gs4i_flux(const gs4i_stencil *q, float c, const float *around, int f, size_t l,
                             int uniform)
 {
@@ -1633,7 +1649,7 @@ GS4I_INLINE double gs4i_exact_face(const gs4i_stencil *q, int f, size_t l)
 #endif
 }
 
-/* uniform: -v_j, which takes half the time in double; the six c are added to the sum */
+/* w (c - v_j) in double. Uniform: -v_j; gs4i_product adds the six c, in half the time. */
 GS4I_INLINE double gs4i_exact_flux(const gs4i_stencil *q, double c, const float *around, int f,
                                    size_t l, int uniform)
 {
@@ -1648,7 +1664,7 @@ GS4I_INLINE double gs4i_exact_flux_of_double(const gs4i_stencil *q, double c, co
     return uniform ? -v : gs4i_exact_face(q, f, l) * (c - v);
 }
 
-/* Their sums over the faces of a cell, uniform or not. */
+/* Their sums over the faces, in one order. */
 GS4I_INLINE float gs4i_sum_neighbours(const gs4i_stencil *q, const float *around, size_t l,
                                       int uniform)
 {
@@ -1679,7 +1695,7 @@ GS4I_INLINE float gs4i_float_residual(const gs4i_stencil *q, float r, float c, c
            * (r - gs4i_float_product(q, c, around, l, uniform));
 }
 
-/* A v in double, of v in float and in double; `low` is what float leaves of the diagonal. */
+/* A v in double: of v in float, of v in double. `low`: what float leaves of the diagonal. */
 GS4I_INLINE double gs4i_product(const gs4i_stencil *q, const float *v, const float *around,
                                 double low, size_t l, int uniform)
 {
@@ -1907,7 +1923,7 @@ static void gs4i_pass_black(gs4i_solver *s, const gs4i_span *row, double *sum)
     gs4i_smooth(s, row, 1);
 }
 
-/* Of red cells; that of black ones is zero after their sweep. */
+/* r - A z in red cells; in black cells it is 0 after their sweep. */
 static void gs4i_pass_red_residual(gs4i_solver *s, const gs4i_span *row, double *sum)
 {
     const gs4i_level *g = &s->level[row->level];
@@ -1916,8 +1932,8 @@ static void gs4i_pass_red_residual(gs4i_solver *s, const gs4i_span *row, double 
                             gs4i_stencil_of(g, row, 0), row);
 }
 
-/* Red residuals of a row of level 0, added to their row of level 1; the first of its four rows,
- * which may be empty, clears it. */
+/* Adds red residuals of a row of level 0 to a row of level 1, which the first of its four rows
+ * clears: this pass is given empty rows, too. */
 static void gs4i_pass_restrict(gs4i_solver *s, const gs4i_span *row, double *sum)
 {
     const gs4i_level *g = &s->level[0], *h = &s->level[1];
@@ -1938,7 +1954,7 @@ static void gs4i_pass_restrict(gs4i_solver *s, const gs4i_span *row, double *sum
     }
 }
 
-/* To red cells; black ones follow from them. */
+/* Adds corrections of level 1 to red cells; the sweep that follows sets the black ones. */
 static void gs4i_pass_prolong(gs4i_solver *s, const gs4i_span *row, double *sum)
 {
     const gs4i_level *g = &s->level[0], *h = &s->level[1];
@@ -2129,8 +2145,8 @@ static void gs4i_graph_backward(gs4i_graph *g, int sweeps)
         for (i = g->n - 1; i >= 0; i--) gs4i_relax_node(g, i);
 }
 
-/* Residual to the next graph, and what that makes of it back. Where only red and black nodes are
- * neighbours, red ones do. */
+/* Residuals to the next graph. Where neighbours always differ in colour, those of black nodes
+ * are 0 after their sweep. */
 static void gs4i_graph_restrict(const gs4i_graph *g, gs4i_graph *up)
 {
     int i, e;
@@ -2176,7 +2192,7 @@ static void gs4i_graph_cycles(gs4i_solver *s)
     for (q = 0; q < s->graphs - 1; q++) {
         gs4i_graph *g = &s->graph[q];
         memset(g->x, 0, (size_t)g->n * sizeof(float));
-        /* beyond graph 0 a third sweep costs next to nothing */
+        /* beyond graph 0 a third sweep is cheap, and spares iterations in mazes */
         gs4i_graph_forward(g, q ? 3 : 2);
         gs4i_graph_restrict(g, &s->graph[q + 1]);
     }
@@ -2206,7 +2222,7 @@ static void gs4i_restrict_to_graph(int bk, void *context)
         }
 }
 
-/* z = (about the inverse of A) r, symmetric and positive; gives r.z */
+/* z = M r with M symmetric, positive definite and about the inverse of A; gives r.z. */
 static double gs4i_cycle(gs4i_solver *s)
 {
     static const gs4i_pass_fn down[] = { gs4i_pass_first_red, gs4i_pass_black, gs4i_pass_red,
@@ -2259,8 +2275,8 @@ static void gs4i_release(gs4i_memory *memory, gs4i_scratch *c)
     c->bytes = 0;
 }
 
-/* Exactly `bytes`, or what there is if that is more. What was there is lost, and zero if `fresh`
- * or if it moved. */
+/* Room for `bytes`. What was there is lost if the room has to grow. Zero if it has grown, or if
+ * `fresh`. */
 static int gs4i_reserve(gs4i_solver *s, gs4i_scratch *c, size_t bytes, int fresh)
 {
     if (!c->data || c->bytes < bytes) {
@@ -2276,7 +2292,7 @@ static int gs4i_reserve(gs4i_solver *s, gs4i_scratch *c, size_t bytes, int fresh
     return GS4_OK;
 }
 
-/* The next `count` elements of an arena, or of none, to see how large it has to be. */
+/* The next `count` elements of an arena; NULL if `base` is, which adds up what is needed. */
 static void *gs4i_carve(char *base, size_t *used, size_t count, size_t size)
 {
     void *p = base ? base + *used : NULL;
@@ -2427,8 +2443,9 @@ static void gs4i_read_kinds(int k, void *context)
     range->unknowns = unknowns;
 }
 
-/* Least, least above 0 and most of the coefficients of faces that conduct, as bits: a sign, or
- * what is no number, is above all. */
+/* Least, least above 0 and largest coefficient of the faces that conduct, as bits. The bits of
+ * floats that are not negative are in the order of the numbers. Negative ones, infinity and NaN
+ * are above all finite ones. */
 static void gs4i_range_of_bits(const gs4_real *GS4I_RESTRICT face,
                                const uint8_t *GS4I_RESTRICT kind,
                                const uint8_t *GS4I_RESTRICT other, int n,
@@ -2521,8 +2538,8 @@ static int gs4i_fault(gs4i_solver *s, const char *what, double value, const char
     return GS4_ERROR_ARGUMENT;
 }
 
-/* Scales, and whether one coefficient serves all faces: it does for most uses, and takes half
- * the memory. */
+/* Scales, so that coefficients and diagonals are about 1. Uniform: all c are the same, and level 0
+ * stores none; it takes half the memory. */
 static int gs4i_choose_units(gs4i_solver *s, const gs4_poisson_desc *d, const gs4i_range *range)
 {
     const double h2 = (double)d->cell_size * (double)d->cell_size;
@@ -2556,7 +2573,7 @@ static int gs4i_choose_units(gs4i_solver *s, const gs4_poisson_desc *d, const gs
     return GS4_OK;
 }
 
-/* Kinds, ranges, units, memory. */
+/* Reads kinds and ranges, chooses units, and gets memory. */
 static int gs4i_read_problem(gs4i_setup *u)
 {
     gs4i_solver *s = u->s;
@@ -2598,8 +2615,7 @@ static int gs4i_read_problem(gs4i_setup *u)
 
 /* --- setup: both levels on grids -------------------------------------------------------------- */
 
-/* Faces of cell i of a row: -x +x -y +y -z +z, 0 where they do not conduct; gives the kinds on
- * their other sides. */
+/* The given arrays at a row; faces f = -x +x -y +y -z +z, `beside`: to the kinds behind them. */
 typedef struct gs4i_given_row {
     const uint8_t *kind;
     const gs4_real *face[6], *diagonal;
@@ -2666,7 +2682,7 @@ typedef struct gs4i_built {
     float face[3][GS4I_BOTH], low[3][GS4I_BOTH], inverse[GS4I_BOTH], diagonal[GS4I_BOTH],
         diagonal_low[GS4I_BOTH];
     /* what level 1 gets: of faces towards + between liquid cells, of those to the air */
-    float link[3][GS4I_BOTH], air[GS4I_BOTH];
+    float coarse[3][GS4I_BOTH], air[GS4I_BOTH];
     int deep; /* all faces are 1 and between liquid cells */
 } gs4i_built;
 
@@ -2684,7 +2700,7 @@ GS4I_INLINE void gs4i_build_faces(gs4i_built *b, const gs4i_given_row *q, int i,
     const uint8_t *GS4I_RESTRICT kind = q->kind + i, *GS4I_RESTRICT other = kind + q->beside[f];
     const gs4_real *GS4I_RESTRICT face = q->face[f] ? q->face[f] + i : NULL;
     double *GS4I_RESTRICT w = b->w[f];
-    float *GS4I_RESTRICT link = b->link[f >> 1], *GS4I_RESTRICT air = b->air;
+    float *GS4I_RESTRICT coarse = b->coarse[f >> 1], *GS4I_RESTRICT air = b->air;
     int l;
     if (face)
         for (l = 0; l < n; l++)
@@ -2693,7 +2709,7 @@ GS4I_INLINE void gs4i_build_faces(gs4i_built *b, const gs4i_given_row *q, int i,
         for (l = 0; l < n; l++) w[l] = (kind[l] & other[l] & (kind[l] | other[l]) >> 1) * q->unit;
     for (l = 0; l < n; l++) air[l] += (float)(0.75 * w[l]) * (float)((kind[l] & ~other[l]) >> 1);
     if (!(f & 1)) return;
-    for (l = 0; l < n; l++) link[l] = (float)(0.5 * w[l]) * (float)((kind[l] & other[l]) >> 1);
+    for (l = 0; l < n; l++) coarse[l] = (float)(0.5 * w[l]) * (float)((kind[l] & other[l]) >> 1);
 }
 
 /* Where all faces are 1, `diagonal` has the faces that do not conduct as well: -1 for each. */
@@ -2761,9 +2777,9 @@ static void gs4i_add_to_level_1(const gs4i_level *h, const gs4i_built *b, const 
         for (l = 4 * m; l < 4 * m + 4; l += 2) {
             const int up = l & 2 ? !c : c;
             const size_t to = row + (size_t)m;
-            h->w[0][up][to] += b->link[0][l + 1];
-            if (j & 1) h->w[1][up][to] = (h->w[1][up][to] + b->link[1][l]) + b->link[1][l + 1];
-            if (k & 1) h->w[2][up][to] = (h->w[2][up][to] + b->link[2][l]) + b->link[2][l + 1];
+            h->w[0][up][to] += b->coarse[0][l + 1];
+            if (j & 1) h->w[1][up][to] = (h->w[1][up][to] + b->coarse[1][l]) + b->coarse[1][l + 1];
+            if (k & 1) h->w[2][up][to] = (h->w[2][up][to] + b->coarse[2][l]) + b->coarse[2][l + 1];
             h->diagonal[up][to] = (h->diagonal[up][to] + (b->air[l] + (float)b->given[l]))
                                   + (b->air[l + 1] + (float)b->given[l + 1]);
             h->z[up][to] = (h->z[up][to] + b->air[l]) + b->air[l + 1];
@@ -2875,7 +2891,7 @@ static void gs4i_build_inverse(int k, void *context)
         }
 }
 
-/* Slabs of equal work for the tasks of a wavefront: thick enough for its passes, at even planes. */
+/* Slabs of equal work for the tasks of a wavefront, at even planes and at least 16 thick. */
 static void gs4i_cut_slabs(gs4i_solver *s, int level, int slabs)
 {
     const gs4i_level *g = &s->level[level];
@@ -2922,8 +2938,8 @@ static float gs4i_largest_weight(const gs4i_level *g, int c, size_t at, int t)
     return most;
 }
 
-/* Whether a link joins two cells: not if they have much stronger ones. The two sides of a door
- * must not become one unknown, nor a room and what a block holds of the next one. */
+/* Whether a face or an edge w joins its ends: not if both have much stronger ones. So the two sides
+ * of a door stay two unknowns, and so do a room and the part of the next one in its block. */
 GS4I_INLINE int gs4i_is_strong(float w, float most, float other, float strong)
 {
     return w > 0 && w * w >= strong * strong * most * other;
@@ -2978,42 +2994,41 @@ static void gs4i_number_groups(int bk, void *context)
         }
 }
 
-/* Of a face in series with the ways to it on either side, at least `least` of the face's own. */
-GS4I_INLINE float gs4i_conductance(float w, float way, float other, float least)
+/* A face in series with the resistances on either side, at least `least` of the face. */
+GS4I_INLINE float gs4i_conductance(float w, float before, float after, float least)
 {
-    const float series = 1 / (1 / w + way + other);
+    const float series = 1 / (1 / w + before + after);
     return series > least * w ? series : least * w;
 }
 
-/* What a face adds to that between two groups: the face in series with half of the link that
- * either cell has along the same axis within its group, which is the conductance between their
- * centres. Half the face in the midst of things, more of it where a wall has left one layer, and
- * at a door in a wall it stays what it is however coarse the graph: halved as on the grids,
- * doors all but close, and rooms behind them take 48 iterations instead of 19. */
-GS4I_INLINE float gs4i_series(float w, float link, float other)
+/* What a face w adds to the edge between two groups: w in series with half of `inner`, the face
+ * that its cell has along the same axis within its group. That is the conductance from centre to
+ * centre: w / 2 in the interior, more of it behind a wall of one layer, all of it at a door.
+ * With w / 2 everywhere T3 of 132^3 cells takes 42 iterations, not 15. 0.35: chosen. */
+GS4I_INLINE float gs4i_series(float w, float inner, float other)
 {
-    if (link == w && other == w) return 0.5f * w; /* no division in the midst of things */
-    return gs4i_conductance(w, link > 0 ? 0.5f / link : 0, other > 0 ? 0.5f / other : 0, 0.35f);
+    if (inner == w && other == w) return 0.5f * w; /* the interior, without a division */
+    return gs4i_conductance(w, inner > 0 ? 0.5f / inner : 0, other > 0 ? 0.5f / other : 0, 0.35f);
 }
 
-/* The same within a block of blocks, where groups are chains and heaps without an axis: from the
- * end of a chain of n it is (n-1)/2 links to its middle, in heaps less. 0.12 to 0.18 are alike;
- * without it a serpentine of plates takes 29 iterations instead of 20. */
-GS4I_INLINE float gs4i_chain(float w, float links, int n, float other_links, int other_n)
+/* The same for two groups in one block, which have no axis. The end of a chain of n nodes is
+ * (n - 1) / 2 edges from its middle, a heap is nearer; 0.15 is between (0.12 to 0.18 are alike).
+ * With w itself T4 of 132^3 cells takes 26 iterations, not 19. 0.1: chosen. */
+GS4I_INLINE float gs4i_chain(float w, float inner, int n, float other, int other_n)
 {
-    return gs4i_conductance(w, n > 1 ? 0.15f * (float)(n - 1) / links : 0,
-                            other_n > 1 ? 0.15f * (float)(other_n - 1) / other_links : 0, 0.1f);
+    return gs4i_conductance(w, n > 1 ? 0.15f * (float)(n - 1) / inner : 0,
+                            other_n > 1 ? 0.15f * (float)(other_n - 1) / other : 0, 0.1f);
 }
 
-/* What the air next to a cell is to the coarse cell: 3/4 at a surface, measured best; all of it
- * where it is small beside the cell's links, as a bubble of one cell is on coarse levels. */
-GS4I_INLINE float gs4i_air(float air, float link)
+/* What a face to the air is on the next level: 3/4 at a surface, measured best. More where it is
+ * small beside the cell's other faces, as a bubble of one cell is on coarse levels. */
+GS4I_INLINE float gs4i_air(float air, float face)
 {
-    const float part = air > 0 ? link / (link + 0.5f * air) : 0;
+    const float part = air > 0 ? face / (face + 0.5f * air) : 0;
     return (part > 0.75f ? part : 0.75f) * air;
 }
 
-/* Numbers of planes to numbers of the graph; what nodes have of their cells. */
+/* Turns numbers within planes into numbers of the graph, and sums up what nodes are made of. */
 static void gs4i_fill_groups(int bk, void *context)
 {
     const gs4i_setup *u = (const gs4i_setup *)context;
@@ -3045,14 +3060,14 @@ typedef struct gs4i_edge {
     float w;
 } gs4i_edge;
 
-/* Link of cell `bits` of a block to the other one along axis a in it. */
-GS4I_INLINE float gs4i_link(const gs4i_level *g, int c, size_t at, int bits, int a)
+/* Face of cell `bits` of a block along axis a, within the block. */
+GS4I_INLINE float gs4i_inner_face(const gs4i_level *g, int c, size_t at, int bits, int a)
 {
     return !(bits >> a & 1) ? g->w[a][c][at]
                             : g->w[a][!c][a == 0 ? at : at - (a == 1 ? g->stride : g->plane)];
 }
 
-/* Edges from the groups of a block to groups around, each once; their w where `weigh`. */
+/* Edges from the groups of a block to groups around, each once; with w if `weigh`. */
 GS4I_INLINE int gs4i_block_edges(const gs4i_solver *s, int bi, int bj, int bk, gs4i_edge *edge,
                                  int weigh)
 {
@@ -3087,10 +3102,10 @@ GS4I_INLINE int gs4i_block_edges(const gs4i_solver *s, int bi, int bj, int bk, g
             }
             if (!weigh) continue;
             if ((q >> a & 1) != high)
-                edge[e].w += w; /* a weak link within the block */
+                edge[e].w += w; /* a weak face within the block */
             else
-                edge[e].w += gs4i_series(w, gs4i_link(g, c, at, q, a),
-                                         gs4i_link(g, !c, beside, q ^ 1 << a, a));
+                edge[e].w += gs4i_series(w, gs4i_inner_face(g, c, at, q, a),
+                                         gs4i_inner_face(g, !c, beside, q ^ 1 << a, a));
         }
     }
     return count;
@@ -3207,8 +3222,8 @@ static int gs4i_build_groups(gs4i_setup *u)
 
 #define GS4I_LOWEST_BITS ((uint64_t)1 | (uint64_t)1 << 21 | (uint64_t)1 << 42)
 
-/* Nodes of a graph joined by edges within a block of blocks, at most `most` of them, the
- * stronger edges first; g->parent becomes a node of the next graph. */
+/* Joins nodes of a graph by edges within a block of the next one, strong edges first, to groups of
+ * at most `most`. g->parent becomes the number in the next graph. */
 static void gs4i_join_nodes(gs4i_graph *g, float strong, int most, int32_t *number, int *reds,
                             int *blacks)
 {
@@ -3264,26 +3279,26 @@ GS4I_INLINE int gs4i_axis(uint64_t a, uint64_t b)
     return (a ^ b) >> 42 ? 2 : (a ^ b) >> 21 ? 1 : 0;
 }
 
-/* Links of each node within its group: along each axis, and all. */
-static void gs4i_find_links(const gs4i_graph *g, float (*link)[4])
+/* Edges of each node within its group: their sum along each axis, and of all. */
+static void gs4i_sum_inner_edges(const gs4i_graph *g, float (*inner)[4])
 {
     int i, e;
-    memset(link, 0, (size_t)g->n * sizeof *link);
+    memset(inner, 0, (size_t)g->n * sizeof *inner);
     for (i = 0; i < g->n; i++)
         for (e = g->start[i]; e < g->start[i + 1]; e++) {
             if (g->parent[g->to[e]] != g->parent[i]) continue;
             if (g->block[g->to[e]] != g->block[i])
-                link[i][gs4i_axis(g->block[i], g->block[g->to[e]])] += g->w[e];
-            link[i][3] += g->w[e];
+                inner[i][gs4i_axis(g->block[i], g->block[g->to[e]])] += g->w[e];
+            inner[i][3] += g->w[e];
         }
 }
 
 /* Tables for the next graph: the nodes of its node i are child[first[i]] to child[first[i + 1]];
- * `place` of its edges; `link` of each node of the last graph, see gs4i_find_links. They are in x,
+ * `place` of its edges; `inner` of each node of the last graph, see gs4i_sum_inner_edges. They are in x,
  * which is larger: 28 bytes a node, at most a node for eight cells. */
 typedef struct gs4i_tables {
     int32_t *first, *child, *place;
-    float (*link)[4];
+    float (*inner)[4];
 } gs4i_tables;
 
 /* Groups of at most 8 nodes, as a block has in the interior; weaker edges join, and groups grow,
@@ -3325,9 +3340,9 @@ static float gs4i_coarse_weight(const gs4i_graph *g, const gs4i_tables *t, int i
     const int32_t j = g->to[e], a = g->parent[i], b = g->parent[j];
     if ((g->block[i] ^ g->block[j]) & ~GS4I_LOWEST_BITS) {
         const int axis = gs4i_axis(g->block[i], g->block[j]);
-        return gs4i_series(g->w[e], t->link[i][axis], t->link[j][axis]);
+        return gs4i_series(g->w[e], t->inner[i][axis], t->inner[j][axis]);
     }
-    return gs4i_chain(g->w[e], t->link[i][3], t->first[a + 1] - t->first[a], t->link[j][3],
+    return gs4i_chain(g->w[e], t->inner[i][3], t->first[a + 1] - t->first[a], t->inner[j][3],
                       t->first[b + 1] - t->first[b]);
 }
 
@@ -3365,9 +3380,9 @@ static int gs4i_coarsen_graph(gs4i_solver *s)
     t.first = (int32_t *)(void *)s->x[0];
     t.child = t.first + g->n + 2;
     t.place = t.child + g->n;
-    t.link = (float(*)[4])(void *)(t.place + g->n);
+    t.inner = (float(*)[4])(void *)(t.place + g->n);
     gs4i_choose_groups(g, s->graphs > GS4I_GRAPHS / 2, t.first, &reds, &blacks);
-    gs4i_find_links(g, t.link);
+    gs4i_sum_inner_edges(g, t.inner);
     if (gs4i_reserve_nodes(s, up, reds + blacks, reds) != GS4_OK) return GS4_ERROR_MEMORY;
     gs4i_fill_nodes(g, up, &t);
     gs4i_coarse_edges(g, up, &t, 0);
@@ -3378,8 +3393,8 @@ static int gs4i_coarsen_graph(gs4i_solver *s)
     return GS4_OK;
 }
 
-/* Cholesky of the last graph; a pivot below 1e-6 of its diagonal belongs to a pocket without
- * anything to hold it, and is skipped. */
+/* Cholesky factor of the last graph. A pivot below 1e-6 of a_ii, far above rounding in float,
+ * belongs to a closed pocket and is skipped. */
 static int gs4i_factorize(gs4i_solver *s)
 {
     const gs4i_graph *g = &s->graph[s->graphs - 1];
@@ -3409,7 +3424,7 @@ static int gs4i_factorize(gs4i_solver *s)
 
 /* --- setup: closed pockets -------------------------------------------------------------------- */
 
-/* Whether air or a diagonal holds one of the cells begin to end of a row. */
+/* Whether cells begin to end of a row have a face to the air or a diagonal. */
 static int gs4i_is_regular(const gs4i_given_row *q, int uniform, int begin, int end)
 {
     int i, f, regular = 0;
@@ -3428,7 +3443,7 @@ static int gs4i_is_regular(const gs4i_given_row *q, int uniform, int begin, int 
 }
 
 /* Runs of liquid cells of a plane that faces join, from u->counts[k] on: `pocket` is the place
- * in the list, `sum` above 0 where the run is regular. Without a list they are counted. */
+ * in the list, `sum` above 0 where air or diagonal make x unique. Without a list: counts them. */
 static void gs4i_list_runs(int k, void *context)
 {
     const gs4i_setup *u = (const gs4i_setup *)context;
@@ -3464,8 +3479,8 @@ static int32_t gs4i_root(gs4i_run *run, int32_t a)
     return a;
 }
 
-/* Joins run a with those of the row before it along axis f / 2; `b` is the first that may touch
- * it, and moves on. */
+/* Joins run a with those of row `row`, a neighbour along axis f / 2. *b: the first run that may
+ * touch it, which only moves on. */
 static void gs4i_join_runs(gs4i_setup *u, gs4i_run *run, int32_t a, int32_t *b, int row, int f)
 {
     const int ny = u->s->level[0].n[1];
@@ -3489,8 +3504,8 @@ static void gs4i_join_runs(gs4i_setup *u, gs4i_run *run, int32_t a, int32_t *b, 
     }
 }
 
-/* Which runs are in pockets that nothing holds: there the mean of x is free, and that of the
- * right-hand side must vanish. */
+/* Closed pockets: connected liquid with neither air nor diagonal. There x is unique but for its
+ * mean, and the mean of the right-hand side must vanish. */
 static int gs4i_find_pockets(gs4i_setup *u)
 {
     gs4i_solver *s = u->s;
@@ -3575,15 +3590,21 @@ static void gs4i_solver_free(gs4i_solver *s)
 
 /* --- solving ---------------------------------------------------------------------------------- */
 
+/* What a solve starts from: 0, the guess in x, the last iterate. */
+enum {
+    GS4I_FROM_ZERO,
+    GS4I_FROM_GUESS,
+    GS4I_FROM_ITERATE
+};
+
 typedef struct gs4i_given {
     gs4i_solver *s;
     const gs4_real *rhs;
     gs4_real *x;
-    int guess, air /* whether x is given there */;
+    int from, air; /* GS4I_FROM_ZERO ...; whether any x of the air is not 0 */
 } gs4i_given;
 
-/* Largest |rhs| in liquid, |x| in air and |x| in liquid, as bits: these are in the order of the
- * numbers, infinity and what is no number above all. */
+/* Largest |rhs| in liquid, |x| in air and |x| in liquid, as bits, see gs4i_range_of_bits. */
 static void gs4i_largest_bits(const gs4_real *GS4I_RESTRICT rhs, const gs4_real *GS4I_RESTRICT x,
                               const uint8_t *GS4I_RESTRICT kind, int n,
                               gs4i_bits *GS4I_RESTRICT most)
@@ -3626,8 +3647,7 @@ static void gs4i_largest_given(int k, void *context)
     }
 }
 
-/* Right-hand side into r where there is liquid, x into x: given values and, where `guess`, the
- * guess; the rest 0. */
+/* Right-hand side into r; into x the values of the air and, from a guess, of the liquid. */
 static void gs4i_load_plane(int k, void *context)
 {
     const gs4i_given *v = (const gs4i_given *)context;
@@ -3641,14 +3661,15 @@ static void gs4i_load_plane(int k, void *context)
             const size_t row = ((size_t)k * (size_t)g->n[1] + (size_t)j) * (size_t)g->n[0],
                          at = gs4i_row_of(g, j, k);
             const uint8_t *kind = gs4i_kinds_of(s, j, k),
-                          wanted = v->guess ? GS4I_IS_OPEN | GS4I_IS_LIQUID : GS4I_IS_OPEN;
+                          wanted = v->from == GS4I_FROM_GUESS ? GS4I_IS_OPEN | GS4I_IS_LIQUID
+                                                              : GS4I_IS_OPEN;
             const int32_t *span = g->span + 2 * ((size_t)k * (size_t)g->n[1] + (size_t)j);
             const int end = 2 * span[1] < g->n[0] ? 2 * span[1] : g->n[0];
             double *r = g->r[c] + at, *x = s->x[c] + at;
             for (i = 2 * span[0] + odd; i < end; i += 2)
                 r[i / 2] = kind[i] & GS4I_IS_LIQUID ? (double)v->rhs[row + (size_t)i] * b : 0;
-            if (v->guess < 0) continue;
-            if (!v->guess && !v->air) {
+            if (v->from == GS4I_FROM_ITERATE) continue;
+            if (v->from == GS4I_FROM_ZERO && !v->air) {
                 memset(x, 0, (size_t)g->width * sizeof *x);
                 continue;
             }
@@ -3695,7 +3716,7 @@ static double gs4i_sum_range(const double *v, int n)
     return gs4i_sum_lanes(sum);
 }
 
-/* Sums of runs; or, once the means are found, takes them off. */
+/* Sums of runs; once means are found, subtracts them. */
 static void gs4i_sum_or_shift_runs(int index, void *context)
 {
     const gs4i_means *w = (const gs4i_means *)context;
@@ -3719,7 +3740,7 @@ static void gs4i_sum_or_shift_runs(int index, void *context)
     }
 }
 
-/* Takes the mean of v off in every closed pocket; gives the largest one. */
+/* Subtracts the mean of v in every closed pocket; gives the largest one. */
 static double gs4i_subtract_means(gs4i_solver *s, double **v)
 {
     const int tasks = (s->run_count + GS4I_RUNS - 1) / GS4I_RUNS;
@@ -3741,17 +3762,17 @@ static double gs4i_subtract_means(gs4i_solver *s, double **v)
     return largest;
 }
 
-/* r = b - A x with x as given (guess 0, 1) or as it is (-1); gives |r|. */
-static double gs4i_true_residual(gs4i_solver *s, gs4i_given *v, int guess, double *removed)
+/* r = b - A x; gives |r|. `removed`: the largest mean of b that closed pockets lose. */
+static double gs4i_true_residual(gs4i_solver *s, gs4i_given *v, int from, double *removed)
 {
     static const gs4i_pass_fn residual[] = { gs4i_pass_residual }, norm[] = { gs4i_pass_norm };
     double mean;
-    v->guess = guess;
+    v->from = from;
     gs4i_parallel_for(s->tasks, s->level[0].n[2], gs4i_load_plane, v);
-    if (guess > 0) gs4i_subtract_means(s, s->x);
+    if (from == GS4I_FROM_GUESS) gs4i_subtract_means(s, s->x);
     mean = gs4i_subtract_means(s, s->level[0].r);
     if (removed) *removed = mean / s->rhs_unit;
-    gs4i_wavefront_run(s, 0, guess || v->air ? residual : norm, 1); /* A 0 = 0 */
+    gs4i_wavefront_run(s, 0, from || v->air ? residual : norm, 1); /* A 0 = 0 */
     return sqrt(gs4i_sum_planes(s));
 }
 
@@ -3769,7 +3790,7 @@ static gs4i_outcome gs4i_poisson_cg(gs4i_solver *s, double goal, int limit, int 
     static const gs4i_pass_fn jacobi[] = { gs4i_pass_jacobi, gs4i_pass_dot },
                               direct[] = { gs4i_pass_direction, gs4i_pass_p_dot_ap };
     static const gs4i_pass_fn update[] = { gs4i_pass_update };
-    /* |r| need not fall in each: over 30 it does where anything does */
+    /* |r| need not fall in each iteration; over 30 it does where it converges at all */
     const int patience = diagonal ? 200 : 30;
     double last = 0, least = *norm, look = *norm;
     int i;
@@ -3801,7 +3822,7 @@ static gs4i_outcome gs4i_poisson_cg(gs4i_solver *s, double goal, int limit, int 
     return GS4I_CONVERGED;
 }
 
-/* Scales, and |b| with what flows in from the air. 0: nothing to solve for. */
+/* Scales, and |b| with what flows in from the air; 0 if that is but rounding. */
 static int gs4i_begin_solve(gs4i_solver *s, gs4i_given *v, double *norm, int *guess,
                             double *removed)
 {
@@ -3824,12 +3845,12 @@ static int gs4i_begin_solve(gs4i_solver *s, gs4i_given *v, double *norm, int *gu
     s->rhs_unit = s->diagonal_unit * s->x_unit;
     *guess = most[2] > 0;
     v->air = most[1] > 0;
-    *norm = gs4i_true_residual(s, v, 0, removed);
+    *norm = gs4i_true_residual(s, v, GS4I_FROM_ZERO, removed);
     if (*norm <= 1e-13 * most[0] * s->rhs_unit * sqrt((double)s->unknowns)) *norm = 0;
     return GS4_OK;
 }
 
-/* What a breakdown may have left that is not a number. */
+/* A breakdown may leave NaN there. */
 static void gs4i_clear_directions(gs4i_solver *s)
 {
     int c;
@@ -3861,15 +3882,15 @@ static int gs4i_solver_solve(gs4i_solver *s, const gs4_real *rhs, gs4_real *x, d
     v.s = s;
     v.rhs = rhs;
     v.x = x;
-    v.guess = v.air = 0;
+    v.from = v.air = 0;
     if (gs4i_begin_solve(s, &v, &size, &guess, &stats->removed_mean) != GS4_OK)
         return GS4_ERROR_ARGUMENT;
     stats->pockets = s->pockets;
     norm = size;
-    if (guess && size > 0) norm = gs4i_true_residual(s, &v, 1, NULL);
-    /* a guess worse than none is not taken */
+    if (guess && size > 0) norm = gs4i_true_residual(s, &v, GS4I_FROM_GUESS, NULL);
+    /* a guess that is worse than 0 is dropped */
     if (!(norm <= size)) {
-        norm = gs4i_true_residual(s, &v, 0, NULL);
+        norm = gs4i_true_residual(s, &v, GS4I_FROM_ZERO, NULL);
         guess = 0;
     }
     while (norm > tolerance * size) { /* until the true residual agrees */
@@ -3879,11 +3900,12 @@ static int gs4i_solver_solve(gs4i_solver *s, const gs4_real *rhs, gs4_real *x, d
         }
         before = norm;
         end = gs4i_poisson_cg(s, tolerance * size, limit, diagonal, &norm, &iterations);
-        norm = gs4i_true_residual(s, &v, -1, NULL);
-        /* once more, without the cycle, from where it was last sound */
+        norm = gs4i_true_residual(s, &v, GS4I_FROM_ITERATE, NULL);
+        /* once more, preconditioned by the diagonal alone */
         if (end == GS4I_BROKE_DOWN) {
             gs4i_clear_directions(s);
-            if (!(norm <= DBL_MAX)) norm = gs4i_true_residual(s, &v, guess, NULL);
+            if (!(norm <= DBL_MAX))
+                norm = gs4i_true_residual(s, &v, guess ? GS4I_FROM_GUESS : GS4I_FROM_ZERO, NULL);
             if (!diagonal) {
                 diagonal = 1;
                 before = HUGE_VAL;

@@ -116,7 +116,12 @@ static void symmetry_flow(symmetry_world *w, int n)
     };
     const int flow = n / 2, periodic = flow == SHEAR || flow == SOUND,
               free = flow == FLIGHT || flow == SPIN;
-    const gs4_material m = scene_liquid(1000, flow == SOUND ? 0 : 100, 10);
+    /* in free flight the limit of a step is that of the flow: a cell a step, with the fall; the
+     * Poiseuille flow takes the default sound speed, which depends on gravity and the domain */
+    const gs4_material m = scene_liquid(1000, flow == SOUND || flow == FLIGHT ? 0 : 100,
+                                        flow == FLIGHT       ? 0.1
+                                        : flow == POISEUILLE ? 0
+                                                             : 10);
     gs4_sim_desc d = symmetry_box(free            ? 10
                                   : flow == SOUND ? 6
                                                   : 4,

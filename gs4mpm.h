@@ -291,7 +291,7 @@
  * (double: 512) more for each particle within 8 cells of a sticky collider. Symplectic Euler: 89
  * and 33. A scene with a viscoelastic liquid: 48 more a particle (Euler 24). With a solid: 96 more
  * (Euler 36). With heat: 17 more a particle, 32 more with a flux_relaxation_time, 16 (or 32) a cell
- * near material, and about 100 a cell of the box around all material, where the solver works.
+ * near material, and about 150 a cell of the box around all material, where the solver works.
  * Double, GS4: 121 (32 more) and 97. Stepping allocates nothing once the scene has stopped growing;
  * a kernel takes 39 KB of stack, with heat 61; in double 77 and 120.
  *
@@ -5725,7 +5725,7 @@ static double gs4i_elliptic_relax(const gs4i_elliptic *e, const gs4_real *r)
 
 /* Jacobi's iteration with d in place of the whole diagonal: a sweep multiplies the error by at
  * most 2 sum c / (h^2 d), where the sum goes over the six faces of a cell. In a step that follows
- * sound heat gets much less far than a cell: that is 0.02 or so, and two to four sweeps do. One
+ * sound heat moves by much less than a cell: that is 0.02 or so, and two to four sweeps do. One
  * costs 1/13 to 1/18 of a multigrid solve with its setup (measured, 32^3 and 64^3 cells). Given
  * up, x = 0 again, where GS4I_MORE_SWEEPS at the factor seen last would not do. */
 #define GS4I_MORE_SWEEPS 12
@@ -5816,7 +5816,7 @@ static void gs4i_unwrapped_diagonal(const gs4i_elliptic *e, gs4_real *diagonal)
         }
 }
 
-/* One multigrid solve without the faces around: what is left has few eigenvalues far from 1. It
+/* One multigrid solve without the faces around: few eigenvalues of what is left differ from 1. It
  * goes to the rounding of its float cycles, so that the preconditioner is linear; 1e-6 will do. */
 static int gs4i_elliptic_precondition(void *context, const double *r, double *out)
 {
@@ -7983,7 +7983,7 @@ typedef struct gs4i_heat_constants {
 } gs4i_heat_constants;
 
 /* Of one batch: T (K), liquid fraction, rate of H/c (K/s); the rest of a change that T in its last
- * digit does not hold (K), or what warms slowly would not warm; non-local flux (W/m^2), its rate */
+ * digit does not hold (K), so that slow changes add up; non-local flux (W/m^2), its rate */
 typedef struct gs4i_heat {
     gs4i_lanes T, fraction, rate, remainder, q[4], q_rate[4];
 } gs4i_heat;
@@ -9542,12 +9542,24 @@ typedef struct gs4i_emitter {
     int has_emitted;
 } gs4i_emitter;
 
-/* Heat on nodes: only while a step is made, see [[conduction]]. */
+/* Heat on nodes: only while a step is made, see [[conduction]]. What heat_nodes hold until the
+ * solve: m c (J/K), m c T** (J), V / k_eff (m^4 K/W), V (m^3); and after it: T~ - T** (K), rate of
+ * mixing (1/s), that times the temperature to mix to (K/s). What heat_sources hold until the
+ * solve: power (W), mixing (W/K); for what they hold after it see gs4i_heat_from_box. */
+enum {
+    GS4I_NODE_CAPACITY,
+    GS4I_NODE_HEAT,
+    GS4I_NODE_RESISTANCE,
+    GS4I_NODE_VOLUME,
+    GS4I_NODE_CHANGE = 0,
+    GS4I_NODE_MIXING_RATE,
+    GS4I_NODE_MIXING_TARGET,
+    GS4I_SOURCE_POWER = 0,
+    GS4I_SOURCE_MIXING,
+    GS4I_SOURCE_RESISTANCE = 3
+};
 typedef struct gs4i_conduction {
-    /* 4 a node, with a meaning before the solve and one after it (gs4i_heat_from_box):
-     * m c (J/K), m c T** (J), V / k_eff (m^4 K/W), V (m^3); and where viscosity heats or flux
-     * is non-local: power (W), mixing (W/K), 0, 0. NULL where there is none */
-    gs4_real *heat_nodes, *heat_sources;
+    gs4_real *heat_nodes, *heat_sources; /* 4 a node; NULL where there is none */
     int slots;
     int with_viscous_heating; /* some material is heated by viscosity */
     gs4i_box box;
@@ -11877,9 +11889,11 @@ GS4I_INLINE gs4_real gs4i_node_mixing(const gs4_sim *sim, size_t node)
     const gs4_real inv_h = sim->grid.inv_h,
                    inv_cell = 1 / (sim->grid.h * sim->grid.h * sim->grid.h),
                    *q = k->heat_nodes + node;
-    const gs4_real all = k->heat_sources ? k->heat_sources[node + 1]
-                                         : GS4I_MIXING * q[3] * q[3] / q[2] * inv_h * inv_h;
-    return gs4i_min(all / q[0], sim->heat_integrator.mixing) * q[0] * inv_cell;
+    const gs4_real all = k->heat_sources ? k->heat_sources[node + GS4I_SOURCE_MIXING]
+                                         : GS4I_MIXING * q[GS4I_NODE_VOLUME] * q[GS4I_NODE_VOLUME]
+                                               / q[GS4I_NODE_RESISTANCE] * inv_h * inv_h;
+    return gs4i_min(all / q[GS4I_NODE_CAPACITY], sim->heat_integrator.mixing)
+           * q[GS4I_NODE_CAPACITY] * inv_cell;
 }
 
 /* What particles gave to the nodes of a group of blocks, into the box. */
@@ -11900,17 +11914,19 @@ static void gs4i_heat_to_box(int index, void *context)
             size_t cell;
             gs4i_node_coordinates(first, i, x);
             if (!gs4i_box_cell_at(&k->box, x, at, &cell)) continue;
-            if (!(g->momentum[node + 3] > pass->lightest) || !(q[0] > 0) || !(q[3] > 0)) continue;
+            if (!(g->momentum[node + 3] > pass->lightest) || !(q[GS4I_NODE_CAPACITY] > 0)
+                || !(q[GS4I_NODE_VOLUME] > 0))
+                continue;
             k->system.kind[cell] = GS4_CELL_LIQUID;
-            k->temperature[cell] = q[1] / q[0];
+            k->temperature[cell] = q[GS4I_NODE_HEAT] / q[GS4I_NODE_CAPACITY];
             /* harmonic mean: materials of one node conduct in series */
-            k->conductivity[cell] = q[3] / q[2];
-            k->fill_fraction[cell] = q[3] * inv_cell;
+            k->conductivity[cell] = q[GS4I_NODE_VOLUME] / q[GS4I_NODE_RESISTANCE];
+            k->fill_fraction[cell] = q[GS4I_NODE_VOLUME] * inv_cell;
             k->mixing[cell] = gs4i_node_mixing(sim, node);
-            k->capacity[cell] = k->system.diagonal[cell] = q[0] * inv_cell;
-            k->system.rhs[cell] = k->heat_sources
-                                      ? k->heat_sources[node] * inv_cell * sim->heat_integrator.s
-                                      : GS4I_C(0);
+            k->capacity[cell] = k->system.diagonal[cell] = q[GS4I_NODE_CAPACITY] * inv_cell;
+            k->system.rhs[cell] = k->heat_sources ? k->heat_sources[node + GS4I_SOURCE_POWER]
+                                                        * inv_cell * sim->heat_integrator.s
+                                                  : GS4I_C(0);
         }
     }
 }
@@ -12145,7 +12161,8 @@ static void gs4i_heat_from_box(int index, void *context)
         gs4i_block_origin(g, g->block[s], first);
         for (i = 0; i < GS4I_BLOCK_NODES; i++) {
             const size_t node = 4 * ((size_t)s * GS4I_BLOCK_NODES + (size_t)i);
-            const gs4_real capacity = k->heat_nodes[node] * g->inv_h * g->inv_h * g->inv_h;
+            const gs4_real capacity =
+                k->heat_nodes[node + GS4I_NODE_CAPACITY] * g->inv_h * g->inv_h * g->inv_h;
             gs4_real *q = k->heat_nodes + node,
                      *flux = sim->particles.with_flux ? k->heat_sources + node : NULL, change_2[3],
                      T_2[3], sum;
@@ -12156,17 +12173,17 @@ static void gs4i_heat_from_box(int index, void *context)
             if (!gs4i_box_cell_at(&k->box, x, at, &cell) || k->system.kind[cell] != GS4_CELL_LIQUID)
                 continue;
             sum = gs4i_second_differences(sim, change, k->capacity, NULL, at, change_2);
-            q[0] = change[cell] - GS4I_C(0.25) * sum;
+            q[GS4I_NODE_CHANGE] = change[cell] - GS4I_C(0.25) * sum;
             if (k->mixing[cell] > 0) {
-                q[1] = k->mixing[cell] / capacity;
-                q[2] =
-                    q[1]
+                q[GS4I_NODE_MIXING_RATE] = k->mixing[cell] / capacity;
+                q[GS4I_NODE_MIXING_TARGET] =
+                    q[GS4I_NODE_MIXING_RATE]
                     * (T[cell]
                        - GS4I_C(0.25) * gs4i_second_differences(sim, T, k->mixing, wall, at, T_2));
             }
             if (!flux) continue;
             sum += gs4i_second_differences(sim, T, k->capacity, wall, at, T_2);
-            flux[3] = 1 / k->conductivity[cell];
+            flux[GS4I_SOURCE_RESISTANCE] = 1 / k->conductivity[cell];
             for (a = 0; a < 3; a++)
                 flux[a] = T[cell] + change[cell] - GS4I_C(0.25) * sum
                           + GS4I_C(1.0 / 12) * (T_2[a] + change_2[a]);

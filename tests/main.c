@@ -72,6 +72,7 @@ int main(int count, char **values)
     run_contact();
     RUN(test_reference);
     RUN_ONCE(test_stability);
+    RUN(test_stability_by_hand);
     RUN_ONCE(test_stability_of_two_densities);
     RUN_ONCE(test_extremes);
     RUN_ONCE(test_short_decay);

@@ -2,7 +2,7 @@
 # The tests: sh tests/run.sh            quick ones in float and in double, and the cheap part of portability.sh: about a minute of
 #                                      processor time, a third of it to compile (user + sys of `bash -c 'time sh tests/run.sh'`)
 #            sh tests/run.sh --full     all but the slow tests, and all compilers, machines and sanitizers that are installed
-#            sh tests/run.sh --nightly  the slow tests, too
+#            sh tests/run.sh --nightly  the slow tests, too, and whether the tests catch mutants.sh
 # CC and CFLAGS choose compiler and flags of tests/main.c. The last line counts.
 # shellcheck disable=SC2086             # flags are split on purpose
 set -u
@@ -28,9 +28,14 @@ tests double -DGS4_DOUBLE > "$tmp/double.log" 2>&1 &
 tests float '' > "$tmp/float.log" 2>&1
 sh tests/portability.sh $part > "$tmp/portability.log" 2>&1
 wait
+logs='float double portability'
+if [ "$slow" = --slow ]; then
+    sh tests/mutants.sh > "$tmp/mutants.log" 2>&1
+    logs="$logs mutants"
+fi
 
 passed=0 failed=0 skipped=0
-for log in float double portability; do
+for log in $logs; do
     echo "== $log"; cat "$tmp/$log.log"
     line=$(tail -n 1 "$tmp/$log.log" | grep -E '^[0-9]+ passed, [0-9]+ failed')
     [ -n "$line" ] || { echo "failed: $log did not finish"; line='0 passed, 1 failed'; }

@@ -6,8 +6,8 @@
  *   RUN(test)        quick, in both precisions
  *   RUN_ONCE(test)   quick in float, where double says the same again: in double with --full
  *   RUN_FULL(test)   with --full       RUN_SLOW(test)   with --slow
- * Arguments of the program: --full, --slow, --times (seconds of each test), and a part of a name,
- * which runs the tests that contain it in whatever tier. */
+ * Arguments of the program: --full, --slow, --times (seconds of each test), --stop (at the first
+ * failure), and a part of a name, which runs the tests that contain it in whatever tier. */
 #ifndef TEST_H
 #define TEST_H
 #include <math.h>
@@ -16,7 +16,7 @@
 #include <string.h>
 #include <time.h>
 
-static int test_passed, test_failed, test_slow, test_full, test_times;
+static int test_passed, test_failed, test_slow, test_full, test_times, test_stop;
 static const char *test_filter = "", *test_name = "";
 
 static void test_report(int good, const char *file, int line, const char *what)
@@ -28,6 +28,7 @@ static void test_report(int good, const char *file, int line, const char *what)
     test_failed++;
     printf("%s:%d: %s: failed: %s\n", file, line, test_name, what);
     fflush(stdout);
+    if (test_stop) exit(1);
 }
 
 static void test_close(double value, double expected, double tolerance, const char *file, int line,
@@ -92,6 +93,8 @@ static void test_arguments(int count, char **values)
             test_full = 1;
         else if (strcmp(values[i], "--times") == 0)
             test_times = 1;
+        else if (strcmp(values[i], "--stop") == 0)
+            test_stop = 1;
         else
             test_filter = values[i];
     }

@@ -1396,8 +1396,204 @@ static void test_errors_heavy(void)
     }
 }
 
+/* Numbers in sentences: six digits, rounded, as %g writes them but for the exponent. */
+static void test_errors_numbers(void)
+{
+    static const struct {
+        double value;
+        const char *text;
+    } number[] = { { 1.5, "1.5" },           { -2.0 / 3, "-0.666667" },
+                   { 1e5 + 0.25, "100000" }, { 2345678, "2345680" },
+                   { 1e7, "1e7" },           { -0.0001, "-0.0001" },
+                   { -3e-5, "-3e-5" },       { 9999999.75, "1e7" },
+                   { -12.5, "-12.5" } };
+    size_t i;
+    for (i = 0; i < sizeof number / sizeof *number; i++) {
+        gs4_sim_desc d = err_desc();
+        char expected[80] = "cfl is ";
+        gs4_sim *sim;
+        d.cfl = (gs4_real)number[i].value;
+        strcat(strcat(expected, number[i].text), "; it must be a number from 0 to 1");
+        CHECK(gs4_create(&d, &sim) == GS4_ERROR_ARGUMENT);
+        CHECK(strcmp(gs4_last_error(NULL), expected) == 0);
+    }
+    for (i = 0; i < 2; i++) {
+        gs4_sim *sim = err_sim();
+        CHECK(gs4_move_collider(sim, i ? -12 : 34, at(0, 0, 0), at(0, 0, 0)) == GS4_ERROR_ARGUMENT);
+        CHECK(strstr(gs4_last_error(sim), i ? "collider -12 does" : "collider 34 does") != NULL);
+        gs4_destroy(sim);
+    }
+}
+
+/* The hash of a state sees every number of every particle. */
+static void test_errors_hash(void)
+{
+    gs4_sim *sim = err_scene();
+    int k, c;
+    for (k = 0; k < 2; k++)
+        for (c = 0; c < 3; c++) {
+            const gs4_edit e = gs4_edit_particles(sim, k ? GS4_FIELD_VELOCITY : GS4_FIELD_POSITION);
+            const uint64_t before = gs4_state_hash(sim);
+            gs4_real *number = e.data + (size_t)(e.count / 2) * (size_t)e.stride + (size_t)c, old;
+            old = *number;
+            *number += (gs4_real)0.001;
+            CHECK(gs4_state_hash(sim) != before);
+            *number = old;
+            CHECK(gs4_state_hash(sim) == before);
+        }
+    gs4_destroy(sim);
+}
+
+/* Signed distances of a box and of a cylinder askew, by the distances along and across. */
+static void test_errors_distances(void)
+{
+    const double tiny = sizeof(gs4_real) == 8 ? 1e-14 : 2e-6;
+    const double half[3] = { 0.3, 0.2, 0.1 }, e[3] = { 2.0 / 3, -1.0 / 3, 2.0 / 3 },
+                 u[3] = { 1.0 / 3, -2.0 / 3, -2.0 / 3 };
+    const gs4_shape box = gs4_box(at(-0.3, -0.2, -0.1), at(0.3, 0.2, 0.1)),
+                    cylinder = gs4_cylinder(at(0, 0, 0), at(1.5 * e[0], 1.5 * e[1], 1.5 * e[2]),
+                                            (gs4_real)0.25);
+    gs4_vec3 low, high;
+    int i, c;
+    for (i = 0; i < 125; i++) {
+        const double p[3] = { 0.22 * (i % 5) - 0.4, 0.17 * (i / 5 % 5) - 0.35,
+                              0.11 * (i / 25) - 0.2 };
+        double outside = 0, inside = -1;
+        for (c = 0; c < 3; c++) {
+            const double beyond = fabs(p[c]) - half[c];
+            outside += beyond > 0 ? beyond * beyond : 0;
+            inside = fmax(inside, beyond);
+        }
+        CHECK_CLOSE(gs4i_shape_distance(&box, at(p[0], p[1], p[2])),
+                    inside > 0 ? sqrt(outside) : inside, tiny);
+    }
+    for (i = 0; i < 49; i++) {
+        const double along = 0.4 * (i % 7) - 0.4, across = 0.09 * (i / 7);
+        const double cap = fabs(along - 0.75) - 0.75, side = across - 0.25;
+        const double expected =
+            cap > 0 && side > 0 ? sqrt(cap * cap + side * side) : fmax(cap, side);
+        CHECK_CLOSE(gs4i_shape_distance(&cylinder, at(along * e[0] + across * u[0],
+                                                      along * e[1] + across * u[1],
+                                                      along * e[2] + across * u[2])),
+                    expected, tiny);
+    }
+    {
+        const gs4_shape ball = gs4_sphere(at(1, 2, 3), (gs4_real)0.5);
+        gs4i_shape_bounds(&ball, &low, &high);
+        CHECK(low.x == (gs4_real)0.5 && low.y == (gs4_real)1.5 && low.z == (gs4_real)2.5);
+        CHECK(high.x == (gs4_real)1.5 && high.y == (gs4_real)2.5 && high.z == (gs4_real)3.5);
+    }
+}
+
+/* Which members of the family there are: rho_inf_spurious <= rho_inf, and a product up to 0.98. */
+static void test_errors_members(void)
+{
+    static const double member[6][3] = {
+        { 0.3, 0.3, 1 }, { 0.3, 0.31, 0 },    { 1, 0.97, 1 },
+        { 1, 0.985, 0 }, { 0.985, 0.985, 1 }, { 0.994, 0.994, 0 }
+    };
+    int i;
+    for (i = 0; i < 6; i++) {
+        gs4_sim_desc d = err_desc();
+        gs4_sim *sim;
+        d.rho_inf = (gs4_real)member[i][0];
+        d.rho_inf_spurious = (gs4_real)member[i][1];
+        CHECK((gs4_create(&d, &sim) == GS4_OK) == (member[i][2] > 0));
+        CHECK(member[i][2] > 0 || strstr(gs4_last_error(NULL), "rho_inf_spurious") != NULL);
+        gs4_destroy(sim);
+    }
+}
+
+/* Limits, a little within and a little beyond: periodic pairs, far origins, steps, full places. */
+static void test_errors_limits(void)
+{
+    const double far_out = 0.02 / 8 / (double)(sizeof(gs4_real) == 8 ? DBL_EPSILON : FLT_EPSILON);
+    const gs4_fill f = scene_fill(at(0, 0, 0));
+    const gs4_shape box = gs4_box(at(0.25, 0.25, 0.25), at(0.75, 0.75, 0.75));
+    gs4_sim *sim;
+    int i;
+    for (i = 0; i < 6; i++) {
+        gs4_sim_desc d = err_desc();
+        d.walls[i] = GS4_WALL_PERIODIC;
+        CHECK(gs4_create(&d, &sim) == GS4_ERROR_ARGUMENT);
+    }
+    for (i = 0; i < 2; i++) {
+        gs4_sim_desc d = err_desc();
+        d.origin = at(0, (i ? 1.1 : 0.9) * far_out, 0);
+        CHECK((gs4_create(&d, &sim) == GS4_OK) == !i);
+        gs4_destroy(sim);
+    }
+    sim = err_sim();
+    CHECK(gs4_add_particles(sim, box, &f) > 0);
+    CHECK(gs4_add_particles(sim, box, &f) == GS4_ERROR_ARGUMENT);
+    CHECK(gs4_step(sim, (gs4_real)1.01 * gs4_stable_dt(sim)) == GS4_ERROR_UNSTABLE);
+    CHECK(gs4_step(sim, gs4_stable_dt(sim)) == GS4_OK);
+    gs4_destroy(sim);
+}
+
+/* What gs4_get_stats sums up, from the particles. */
+static void test_errors_stats(void)
+{
+    gs4_fill f = scene_fill(at(1, -2, 0.5));
+    double momentum[3] = { 0, 0, 0 }, angular[3] = { 0, 0, 0 }, energy = 0;
+    gs4_sim *sim = err_sim();
+    gs4_view x, v, m;
+    gs4_stats stats;
+    int i, c;
+    f.angular_velocity = at(3, 1, -2);
+    CHECK(gs4_add_particles(sim, gs4_box(at(0.25, 0.25, 0.25), at(0.75, 0.5, 0.5)), &f) > 0);
+    stats = gs4_get_stats(sim);
+    x = gs4_particles(sim, GS4_FIELD_POSITION);
+    v = gs4_particles(sim, GS4_FIELD_VELOCITY);
+    m = gs4_particles(sim, GS4_FIELD_MASS);
+    for (i = 0; i < x.count; i++) {
+        const gs4_real *r = x.data + (size_t)i * (size_t)x.stride,
+                       *u = v.data + (size_t)i * (size_t)v.stride;
+        const double mass = (double)m.data[(size_t)i * (size_t)m.stride];
+        for (c = 0; c < 3; c++) {
+            const int j = (c + 1) % 3, k = (c + 2) % 3;
+            momentum[c] += mass * (double)u[c];
+            energy += mass * (double)u[c] * (double)u[c] / 2;
+            angular[c] += mass * ((double)r[j] * (double)u[k] - (double)r[k] * (double)u[j]);
+        }
+    }
+    for (c = 0; c < 3; c++) {
+        CHECK_CLOSE(stats.momentum[c], momentum[c], 1e-12 * fabs(momentum[c]));
+        CHECK_CLOSE(stats.angular_momentum[c], angular[c], 1e-10 * fabs(angular[c]));
+    }
+    CHECK_CLOSE(stats.kinetic_energy, energy, 1e-12 * energy);
+    gs4_destroy(sim);
+}
+
+/* Lists grow and keep what is in them. */
+static void test_errors_growth(void)
+{
+    gs4_sim *sim = err_sim();
+    gs4_collider c;
+    int i;
+    memset(&c, 0, sizeof c);
+    for (i = 0; i < 20; i++) {
+        gs4_material m = scene_liquid(1000 + i, 1, 10);
+        CHECK(gs4_add_material(sim, &m) == 1 + i); /* err_sim has one */
+        c.shape = gs4_sphere(at(0.5, 0.5, 0.5), (gs4_real)(0.125 + i));
+        CHECK(gs4_add_collider(sim, &c) == i);
+    }
+    for (i = 0; i < 20; i++) {
+        CHECK(sim->constants[1 + i].is.density == (gs4_real)(1000 + i));
+        CHECK(sim->boundary.colliders[i].is.shape.radius == (gs4_real)(0.125 + i));
+    }
+    gs4_destroy(sim);
+}
+
 static void run_errors(void)
 {
+    RUN(test_errors_limits);
+    RUN(test_errors_stats);
+    RUN(test_errors_growth);
+    RUN(test_errors_members);
+    RUN(test_errors_numbers);
+    RUN(test_errors_hash);
+    RUN(test_errors_distances);
     RUN(test_errors_desc);
     RUN(test_errors_material);
     RUN(test_errors_fill);

@@ -380,8 +380,9 @@ static void test_poisson_symmetry(void)
                 double uu, vv, uv, vu, exact = 0;
                 POISSON_EACH(&p, i, at)
                 {
-                    u[at] = 2 * poisson_random(&p.random) - 1;
-                    v[at] = 2 * poisson_random(&p.random) - 1;
+                    /* noise, which the finest levels see; and smooth, for the coarse ones */
+                    u[at] = 2 * poisson_random(&p.random) - 1 + 2 * t;
+                    v[at] = 2 * poisson_random(&p.random) - 1 + t * cos(0.1 * i[0] + 0.2 * i[2]);
                 }
                 POISSON_EACH(&p, i, at) exact += u[at] * poisson_row(&p, i, v, NULL, NULL);
                 uu = pois_form(&p, &s->solver, u, u, 0);
@@ -554,12 +555,16 @@ static void test_poisson_bad_guess(void)
     for (q = 0; q < 3; q++)
         for (k = 0; k < 2; k++) {
             poisson_case p = poisson_make(names[q], test_full ? 24 : 16);
-            gs4_solve_stats stats;
+            gs4_solve_stats stats, cold;
             double bound;
+            for (i = 0; i < p.count; i++)
+                if (p.kind[i] == GS4_CELL_LIQUID) p.x[i] = 0;
+            CHECK_RESULT(NULL, pois_solve(&p, &cold), GS4_OK);
             for (i = 0; i < p.count; i++)
                 if (p.kind[i] == GS4_CELL_LIQUID)
                     p.x[i] = (gs4_real)(1e6 * (k ? 1 : poisson_random(&p.random)));
             CHECK_RESULT(NULL, pois_solve(&p, &stats), GS4_OK);
+            CHECK(stats.iterations == cold.iterations); /* it was not taken */
             CHECK(poisson_residual(&p, p.x, &bound) <= 1.001e-8 + bound);
             CHECK_CLOSE(pois_distance(&p), 0, 1e-6);
             poisson_free(&p);
@@ -782,8 +787,71 @@ static void test_poisson_memory(void)
     poisson_free(&p);
 }
 
+/* Conjugate gradients for any operator: n steps at most for n unknowns, the answer of a matrix
+ * made from it, an honest residual, and the preconditioner's fault handed on. */
+enum {
+    POIS_KRYLOV = 8
+};
+
+static int pois_krylov_calls, pois_krylov_fault;
+
+static double pois_krylov_entry(int i, int j)
+{
+    return i == j ? 3 + i : (i - j) * (i - j) == 1 ? -1 : 0.1;
+}
+
+static void pois_krylov_apply(void *context, const double *p, double *out)
+{
+    int i, j;
+    (void)context;
+    pois_krylov_calls++;
+    for (i = 0; i < POIS_KRYLOV; i++)
+        for (out[i] = 0, j = 0; j < POIS_KRYLOV; j++) out[i] += pois_krylov_entry(i, j) * p[j];
+}
+
+static int pois_krylov_jacobi(void *context, const double *r, double *out)
+{
+    int i;
+    (void)context;
+    for (i = 0; i < POIS_KRYLOV; i++) out[i] = r[i] / pois_krylov_entry(i, i);
+    return pois_krylov_fault;
+}
+
+static void test_poisson_krylov(void)
+{
+    double v[4][POIS_KRYLOV], b[POIS_KRYLOV], Ax[POIS_KRYLOV], off = 0, size = 0;
+    gs4i_krylov k;
+    int i, limit;
+    memset(&k, 0, sizeof k);
+    k.n = POIS_KRYLOV;
+    k.x = v[0];
+    k.r = v[1];
+    k.p = v[2];
+    k.q = v[3];
+    k.apply = pois_krylov_apply;
+    k.precondition = pois_krylov_jacobi;
+    for (limit = 2; limit <= 100; limit += 98) {
+        for (i = 0; i < POIS_KRYLOV; i++) v[1][i] = b[i] = 1 + (i * i) % 5;
+        pois_krylov_calls = pois_krylov_fault = 0;
+        i = gs4i_conjugate_gradients(&k, 1e-10, limit);
+        CHECK(i == (limit == 2 ? GS4_ERROR_NOT_CONVERGED : GS4_OK));
+        CHECK(pois_krylov_calls == limit || (limit == 100 && pois_krylov_calls <= POIS_KRYLOV));
+        pois_krylov_apply(NULL, v[0], Ax);
+        for (off = size = 0, i = 0; i < POIS_KRYLOV; i++) {
+            off += (b[i] - Ax[i]) * (b[i] - Ax[i]);
+            size += b[i] * b[i];
+        }
+        CHECK_CLOSE(sqrt(off / size), k.residual, 1e-14);
+        CHECK((sqrt(off / size) <= 1e-10) == (limit == 100));
+    }
+    v[1][0] = 1;
+    pois_krylov_fault = GS4_ERROR_MEMORY;
+    CHECK(gs4i_conjugate_gradients(&k, 1e-10, 100) == GS4_ERROR_MEMORY);
+}
+
 static void run_poisson(void)
 {
+    RUN(test_poisson_krylov);
     RUN_ONCE(test_poisson_agrees_with_oracle);
     RUN_ONCE(test_poisson_iterations);
     RUN(test_poisson_maze);

@@ -347,3 +347,85 @@ static void test_extremes(void)
     scene_sharp = 0;
     if (test_filter[0]) printf("%d scenes, %d of %d calls refused\n", count, refused, 21 * count);
 }
+
+static gs4_real stability_shear_rate(gs4_real T, gs4_real rate, void *user)
+{
+    (void)T;
+    (void)user;
+    return rate;
+}
+
+/* The limit of a step where one thing rules it, by hand: fall, speed and fall, sound of what is
+ * compressed. And what that stands on: default speeds of sound, the shear rate of a gradient. */
+static void test_stability_by_hand(void)
+{
+    const double g = 10, h = 1.0 / 8, tiny = sizeof(gs4_real) == 8 ? 1e-12 : 2e-6;
+    int axis, i, moves;
+    for (axis = 0; axis < 3; axis++)
+        for (moves = 0; moves < 2; moves++) {
+            const double v = moves ? 0.7 : 0;
+            gs4_sim_desc d = scene_cube(8);
+            const gs4_material m = scene_liquid(1000, 0, 1e-3), by_default = scene_liquid(1, 0, 0);
+            const gs4_fill f =
+                scene_fill(at(axis == 0 ? v : 0, axis == 1 ? v : 0, axis == 2 ? v : 0));
+            gs4_collider c;
+            gs4_sim *sim;
+            d.cells[axis] = 16;
+            d.gravity = at(axis == 0 ? g : 0, axis == 1 ? -g : 0, axis == 2 ? g : 0);
+            CHECK(gs4_create(&d, &sim) == GS4_OK && gs4_add_material(sim, &m) == 0);
+            CHECK(gs4_add_particles(sim, gs4_box(at(0.4, 0.4, 0.4), at(0.6, 0.6, 0.6)), &f) > 0);
+            CHECK_CLOSE(gs4_stable_dt(sim) * (v + sqrt(v * v + 2 * g * h)) / (2 * h), 1, tiny);
+            /* (v^2 + 2 g times the height)^(1/2), ten times */
+            CHECK(gs4_add_material(sim, &by_default) == 1);
+            CHECK_CLOSE(sim->constants[1].sound_speed / (10 * sqrt(v * v + 2 * g * 16 * h)), 1,
+                        tiny);
+            memset(&c, 0, sizeof c);
+            c.shape = gs4_sphere(at(0.1, 0.1, 0.1), (gs4_real)0.05);
+            c.velocity = at(0, 0, axis - 3.0);
+            CHECK(gs4_add_collider(sim, &c) == 0);
+            CHECK_CLOSE(gs4_stable_dt(sim) * (3 - axis + sqrt((3 - axis) * (3 - axis) + 2 * g * h))
+                            / (2 * h),
+                        1, tiny);
+            gs4_destroy(sim);
+        }
+    /* a liquid that turns, for Euler, which knows its gradient from the start: |L| = sqrt(2) w */
+    for (axis = 0; axis < 3; axis++) {
+        gs4_sim_desc d = scene_cube(8);
+        const gs4_material m = scene_liquid(1000, 0, 1e-3);
+        gs4_fill f = scene_fill(at(0, 0, 0));
+        gs4_sim *sim;
+        d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER;
+        f.angular_velocity = at(axis == 0 ? 50 : 0, axis == 1 ? 50 : 0, axis == 2 ? 50 : 0);
+        CHECK(gs4_create(&d, &sim) == GS4_OK && gs4_add_material(sim, &m) == 0);
+        CHECK(gs4_add_particles(sim, gs4_box(at(0.5, 0.5, 0.5), at(0.625, 0.625, 0.625)), &f) == 8);
+        CHECK_CLOSE(gs4_stable_dt(sim) * 50 * sqrt(2.0), 1, 3 * tiny);
+        gs4_destroy(sim);
+    }
+    for (i = 0; i < 2; i++) {
+        const double J = i ? 0.9 : 1.1;
+        const gs4_sim_desc d = scene_cube(8);
+        const gs4_material m = scene_liquid(1000, 0, 20);
+        const gs4_fill f = scene_fill(at(0, 0, 0));
+        gs4_sim *sim;
+        double before;
+        int n;
+        CHECK(gs4_create(&d, &sim) == GS4_OK && gs4_add_material(sim, &m) == 0);
+        CHECK(gs4_add_particles(sim, gs4_box(at(0.4, 0.4, 0.4), at(0.6, 0.6, 0.6)), &f) > 0);
+        before = (double)gs4_stable_dt(sim);
+        for (n = 0; n < sim->particles.count; n++) sim->particles.velocity[4 * n + 3] = (gs4_real)J;
+        /* c = c0 / J^3 by (3) */
+        CHECK_CLOSE(gs4_stable_dt(sim) / before, J * J * J, 10 * tiny);
+        gs4_destroy(sim);
+    }
+    for (i = 0; i < 9; i++) {
+        gs4i_material_constants constants;
+        gs4i_gradient L;
+        memset(&constants, 0, sizeof constants);
+        memset(L, 0, sizeof L);
+        constants.varies = 1;
+        constants.viscosity_fn = stability_shear_rate;
+        ((gs4_real *)(void *)L[i / 3][i % 3])[0] = 3;
+        /* sqrt(2 D:D): 3 in shear, 2 * 3 in a stretch along one axis over sqrt(2) */
+        CHECK_CLOSE(gs4i_viscosity_of(&constants, 0, L, 0), i % 4 ? 3 : 3 * sqrt(2.0), 3 * tiny);
+    }
+}

@@ -823,8 +823,30 @@ static void test_stress_bad_arguments(void)
     CHECK(gs4_point_stress(&good, &p, broken, out) == GS4_ERROR_ARGUMENT && out[0] == 7);
 }
 
+/* Jacobi's rotations: m = Q diag(values) Q^T and Q^T Q = I, also with two values alike. */
+static void test_stress_eigen(void)
+{
+    static const double m[3][6] = { { 3, 2, 1, 0.5, -0.7, 0.2 },
+                                    { 1, 1, 5, 0.3, 0, 0 },
+                                    { 1e4, 1, 1e-3, 30, 0.01, 0.002 } };
+    int q, i, j, k;
+    for (q = 0; q < 3; q++) {
+        double values[3], Q[3][3], again[6];
+        gs4i_eigen(m[q], values, Q);
+        gs4i_recompose(Q, values, again);
+        for (i = 0; i < 6; i++) CHECK_CLOSE(again[i], m[q][i], 1e-14 * m[q][0]);
+        for (i = 0; i < 3; i++)
+            for (j = 0; j < 3; j++) {
+                double sum = 0;
+                for (k = 0; k < 3; k++) sum += Q[k][i] * Q[k][j];
+                CHECK_CLOSE(sum, i == j, 1e-14);
+            }
+    }
+}
+
 static void run_stress(void)
 {
+    RUN(test_stress_eigen);
     RUN(test_stress_reference);
     RUN(test_stress_units);
     RUN(test_stress_split);

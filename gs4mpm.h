@@ -3294,8 +3294,8 @@ static void gs4i_sum_inner_edges(const gs4i_graph *g, float (*inner)[4])
 }
 
 /* Tables for the next graph: the nodes of its node i are child[first[i]] to child[first[i + 1]];
- * `place` of its edges; `inner` of each node of the last graph, see gs4i_sum_inner_edges. They are in x,
- * which is larger: 28 bytes a node, at most a node for eight cells. */
+ * `place` of its edges; `inner` of each node of the last graph, see gs4i_sum_inner_edges. They
+ * are in x, which is larger: 28 bytes a node, at most a node for eight cells. */
 typedef struct gs4i_tables {
     int32_t *first, *child, *place;
     float (*inner)[4];
@@ -7989,7 +7989,8 @@ typedef struct gs4i_heat {
 } gs4i_heat;
 
 /* What a batch gives to the nodes: weights times (m c, m c T**, V / k_eff, V). And as forces:
- * grad w . (V q** t_q / (t_q + s)), with a flux only, + w power (W); and w times the mixing, W/K. */
+ * grad w . (V q** t_q / (t_q + s)), with a flux only, + w power (W); and w times the mixing,
+ * W/K. */
 typedef struct gs4i_heat_given {
     gs4_real nodes[4 * GS4I_BATCH];
     gs4i_forces sources;
@@ -11959,7 +11960,8 @@ static void gs4i_heat_faces(int z, void *context)
 }
 
 /* Faces below this share of the best one are closed. The solver takes a contrast of 1e30; nodes
- * that are nearly empty and insulators (GS4I_LEAST_CONDUCTIVITY) make more. 1e-25 of a flow is nothing. */
+ * that are nearly empty and insulators (GS4I_LEAST_CONDUCTIVITY) make more. 1e-25 of a flow is
+ * nothing. */
 #define GS4I_NEGLIGIBLE_FACE GS4I_C(1e-25)
 
 static void gs4i_close_negligible_faces(const gs4i_conduction *k)
@@ -12019,9 +12021,10 @@ static gs4_real gs4i_shown_surface(const gs4i_conduction *k, const int at[3], si
 }
 
 /* Cells from a node to an isothermal surface, mean over the nodes that show it. Derived: steady
- * heat to a flat surface in 1D, with these c_f and links and the fill fractions of a half space, meets the given
- * temperature at the surface for 0.828, the mean over all places of the surface in a cell. There
- * it is off by less than 0.007 cells for 0.83, and by 0.39 for the mean distance itself, 0.5. */
+ * heat to a flat surface in 1D, with these c_f and links and the fill fractions of a half space,
+ * meets the given temperature at the surface for 0.828, the mean over all places of the surface
+ * in a cell. There it is off by less than 0.007 cells for 0.83, and by 0.39 for the mean
+ * distance itself, 0.5. */
 #define GS4I_SURFACE_DEPTH GS4I_C(0.83)
 
 /* Links of one cell to isothermal walls, air and bodies: their sum, 1/h^2, and in `heat` that of

@@ -1,4 +1,4 @@
-/* What the stages of reference_step.h are made of, in plain C and double: what a particle and a node
+/* What the stages of reference_step.h are made of, in plain C and double: what particles and nodes
  * are, rule (4), weights, laws, walls, corrections; and symplectic Euler. */
 #ifndef REFERENCE_PARTS_H
 #define REFERENCE_PARTS_H
@@ -446,7 +446,7 @@ static void ref_restart(ref_sim *s)
     }
 }
 
-/* --- symplectic Euler: MLS-MPM with APIC ------------------------------------------------------- */
+/* --- symplectic Euler: MLS-MPM with APIC ------------------------------------------------------ */
 
 /* (m v)_i = sum w [m (v + dt g) + (m C - dt J m/rho0 sigma 4/h^2) (x_i - x)], |C| dt at most 1/4;
  * v = sum w v_i,  C = sum v_i (x) grad w,  x += dt v,  J += dt J tr C;

@@ -130,11 +130,11 @@ static void test_heat_modes(void)
 }
 
 /* Second order in time for any member of the family that the explicit scheme takes: what a step
- * half as long changes, over what one a quarter as long changes then. At 0.002 and below the rest is
- * of first order, 1e-6 here and 16 times less with twice the cells: grid and particles do not hold
- * quite the same rate. With rho_inf = 1 all of them
- * are one where heat is: alpha_f = 1/2 and alpha_m = gamma, so y** = y and y += dt R whatever rho_s
- * is. So (1, 1), which has no explicit step, gives what (1, 0) and (1, 0.9) do. */
+ * half as long changes, over what one a quarter as long changes then. At 0.002 and below the
+ * rest is of first order, 1e-6 here and 16 times less with twice the cells: grid and particles
+ * do not hold quite the same rate. With rho_inf = 1 all of them are one where heat is: alpha_f =
+ * 1/2 and alpha_m = gamma, so y** = y and y += dt R whatever rho_s is. So (1, 1), which has no
+ * explicit step, gives what (1, 0) and (1, 0.9) do. */
 static void test_heat_order_in_time(void)
 {
     static const double members[6][2] = { { 0, 0 },   { 0.5, 0 },   { 1, 0 },

@@ -584,8 +584,9 @@ static double couette_error(int n, gs4_integrator integrator, double gap, double
 
 /* Second order in space, with the surface at a plane of nodes and midway between two; a tenth of
  * a cell before one, where the filling leaves a gap that is no multiple of h, only the error is
- * held. In quick runs a plane of nodes for one integrator, midway for the other: a tenth of 16 cells
- * is not far enough from the body. Next to it, which starts at once, GS4 keeps motion that the grid does not see. */
+ * held. In quick runs a plane of nodes for one integrator, midway for the other: a tenth of 16
+ * cells is not far enough from the body. Next to it, which starts at once, GS4 keeps motion that
+ * the grid does not see. */
 static void test_couette(void)
 {
     static const double gaps[3] = { 0.01, 0.51, 0.4 }, times[2] = { 0.1, 0.4 };

@@ -6,9 +6,10 @@
 #   sh tests/mutants.sh PATTERN     those whose line matches the pattern (grep -E)
 #   sh tests/mutants.sh -n          none: only whether each line applies, and how many there are
 # All of them are compiled into one program; the variable GS4_MUTANT says which one acts, 0: none.
-# That costs two compilations in all, and the control: with none the tests must be green.
-# A mutant is tried on the tests named in its line, then on all quick ones in float, in double, and
-# on the full ones. CC as in run.sh; JOBS (2) mutants at a time.
+# So two compilations, float and double, are enough; and with none the tests must be green.
+# A mutant is tried on the tests named in its line, also with --full, then on all quick ones in
+# float, in double, and on the full ones. CC as in run.sh; JOBS (2) mutants at a time; VERBOSE=1
+# tells of all of them.
 set -u
 cd "$(dirname "$0")/.." || exit 1
 CC=${CC:-cc}
@@ -84,10 +85,16 @@ build() { # NAME FLAGS
     $CC -O1 -w $2 -DGS4_PTHREADS -pthread -include "$tmp/choose.h" -I"$tmp" -I. tests/main.c \
         -o "$tmp/$1" -lm
 }
-build float '' || exit 1
-if ! (cd "$tmp" && GS4_MUTANT=0 ./float --stop > control); then
-    cat "$tmp/control"; echo 'the control is red: without a mutant the tests fail'; exit 1
+if ! build float '' || ! build double -DGS4_DOUBLE; then
+    echo '0 passed, 1 failed'; exit 1
 fi
+for program in float double; do
+    (cd "$tmp" && GS4_MUTANT=0 "./$program" --stop > control 2>&1) && continue
+    cat "$tmp/control"
+    echo "the control is red: without a mutant the tests in $program fail"
+    echo '0 passed, 1 failed'
+    exit 1
+done
 
 # red MUTANT PROGRAM [TEST...]: success if a test fails, crashes or does not end
 red() {
@@ -101,13 +108,15 @@ red() {
 # try "NUMBER @ FUNCTION @ OLD @ NEW @ TESTS": prints how it went
 try() {
     m=${1%% @ *} how=''
-    for test in $(printf '%s\n' "$1" | awk -F ' @ ' '{ print $5 }'); do
+    tests=$(printf '%s\n' "$1" | awk -F ' @ ' '{ print $5 }')
+    for test in $tests; do
         if red "$m" float "$test"; then how=hint; break; fi
+    done
+    for test in $tests; do
+        [ -z "$how" ] && red "$m" float --full "$test" && how='hint, full'
     done
     if [ -z "$how" ] && red "$m" float; then how=quick; fi
     if [ -z "$how" ]; then
-        [ -x "$tmp/double" ] || { mkdir "$tmp/lock" 2> /dev/null && build double -DGS4_DOUBLE; }
-        while [ ! -x "$tmp/double" ]; do sleep 1; done
         if red "$m" double; then how=double; elif red "$m" float --full; then how=full; fi
     fi
     if [ -n "$how" ]; then

@@ -1542,6 +1542,10 @@ static void test_errors_stats(void)
     int i, c;
     f.angular_velocity = at(3, 1, -2);
     CHECK(gs4_add_particles(sim, gs4_box(at(0.25, 0.25, 0.25), at(0.75, 0.5, 0.5)), &f) > 0);
+    /* ids count from 0 */
+    for (i = 0; i < sim->particles.count; i++) energy += (double)gs4_particle_ids(sim)[i];
+    CHECK(energy == 0.5 * sim->particles.count * (sim->particles.count - 1));
+    energy = 0;
     stats = gs4_get_stats(sim);
     x = gs4_particles(sim, GS4_FIELD_POSITION);
     v = gs4_particles(sim, GS4_FIELD_VELOCITY);

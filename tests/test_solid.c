@@ -370,7 +370,9 @@ static void test_solid_order(void)
         const gs4_solid model = solid_models[(int)cases[c][0]];
         double x, v, J, F;
         for (i = 0; i < 3; i++)
-            CHECK(solid_simulate(model, cases[c][1], cases[c][2], 0.4, 128 << i, &run[i]) == 0);
+            CHECK(solid_simulate(model, cases[c][1], cases[c][2], 0.4, (test_full ? 256 : 128) << i,
+                                 &run[i])
+                  == 0);
         x = order_of(run[0].x, run[1].x, run[2].x, 3 * run[0].count);
         v = order_of(run[0].v, run[1].v, run[2].v, 3 * run[0].count);
         J = order_of(run[0].J, run[1].J, run[2].J, run[0].count);
@@ -636,7 +638,7 @@ static void test_solid_yield(void)
             printf("squash, integrator %d: height %.3f elastic, %.3f plastic\n", i, elastic,
                    plastic);
         CHECK_CLOSE(elastic, 1, 0.04);
-        CHECK_BETWEEN(plastic, 0.4, 0.85);
+        CHECK_BETWEEN(plastic, 0.3, 0.85);
     }
 }
 

@@ -26,7 +26,7 @@ int main(int count, char **values)
     RUN(test_momentum_seam);
     RUN_ONCE(test_poiseuille);
     RUN_ONCE(test_shear_wave);
-    RUN_ONCE(test_stokes_first);
+    RUN_FULL(test_stokes_first);
     RUN_ONCE(test_couette);
     RUN_ONCE(test_couette_surface);
     RUN(test_sticky_askew);
@@ -45,7 +45,7 @@ int main(int count, char **values)
     RUN(test_heat_order_in_time);
     RUN(test_heat_stiff);
     RUN_ONCE(test_heat_pulse);
-    RUN_ONCE(test_heat_surface);
+    RUN_FULL(test_heat_surface);
     RUN(test_heat_seam);
     RUN_ONCE(test_heat_walls);
     RUN_ONCE(test_heat_stefan);

@@ -9,7 +9,7 @@ set -u
 cd "$(dirname "$0")/.." || exit 1
 CC=${CC:-cc}
 
-quick='layout few_snippets few_warnings few_hashes'
+quick='few_layout few_snippets few_warnings few_hashes'
 full='warnings tsan fused hashes asan arm hashes_double wasm windows tiny musl i386 form layout names units snippets link frames examples'
 
 # A transfer kernel may be longer than 60 lines; nothing else. This one is a transpose, spelled out.
@@ -223,7 +223,7 @@ form() {
     check "no line is wider than 100 columns" refused grep . "$tmp/m"
 }
 
-layout() {
+few_layout() {
     banners > "$tmp/banners"; cut -d' ' -f2 "$tmp/banners" > "$tmp/sections"
     awk -v half="$(implementation_line)" -v upper="$tmp/upper" -v lower="$tmp/lower" '{ print $2 > ($1 < half ? upper : lower) }' "$tmp/banners"
     { sort "$tmp/upper" | uniq -d; sort "$tmp/lower" | uniq -d; } > "$tmp/m"
@@ -236,15 +236,18 @@ layout() {
     head -n "$(head -n 1 "$tmp/banners" | cut -d' ' -f1)" gs4mpm.h | sed '$d' | grep '^[ *]*\[\[' > "$tmp/m"
     { sed -n 's/^[ *]*\[\[\([a-z0-9_]*\)\]\].*\[\[.*/\1/p' "$tmp/m"; sed 's/.*\[\[\([a-z0-9_]*\)\]\].*/\1/' "$tmp/m"; } > "$tmp/map"
     check "the map in the manual" diff "$tmp/map" "$tmp/sections"
-    while read -r line tag; do
-        [ "$line" -lt "$(implementation_line)" ] || check "all before [[$tag]] compiles without the rest" compiles_until "$line"
-    done < "$tmp/banners"
     awk '/^[A-Za-z].*\(/ { head = $0; first = NR } /^\{$/ { start = first } /^\}/ { n = NR - start + 1; if (start && n > 60) print n, head; start = 0 }' gs4mpm.h > "$tmp/long"
     for f in $long_functions; do grep -v "[ *]$f(" "$tmp/long" > "$tmp/m"; cp "$tmp/m" "$tmp/long"; done
     check "no function is longer than 60 lines" refused grep . "$tmp/long"
     awk '/^[A-Za-z].*\(/ { head = "" } { head = head $0 }
          /^\{$/ { n = gsub(/,/, ",", head); if (n > 7) print n + 1, substr(head, 1, 80); head = "" } /;$/ { head = "" }' gs4mpm.h > "$tmp/m"
     check "no function has more than 8 parameters" refused grep . "$tmp/m"
+}
+layout() {
+    few_layout
+    while read -r line tag; do
+        [ "$line" -lt "$(implementation_line)" ] || check "all before [[$tag]] compiles without the rest" compiles_until "$line"
+    done < "$tmp/banners"
 }
 
 # ==== the same bits ============================================================================================

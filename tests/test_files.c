@@ -408,7 +408,7 @@ static void test_files_memory(void)
         reference = files_scenario(euler, &m, -1, 0, &refused);
         CHECK(refused == 0);
         calls = m.calls;
-        for (k = 0; k < calls; k += test_slow ? 1 : !test_full ? 23 : warm ? 5 : 1) {
+        for (k = 0; k < calls; k += test_slow ? 1 : !test_full ? 37 : warm ? 5 : 1) {
             CHECK(files_scenario(euler, &m, k, 0, &refused) == reference);
             CHECK(refused == 1);
             if (k % (!test_full ? 2 : warm ? 4 : 3) && !test_slow) continue;

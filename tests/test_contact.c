@@ -479,8 +479,10 @@ static void test_contact_leaves(void)
 /* --- moving bodies ---------------------------------------------------------------------------- */
 
 /* A block stands on a body that goes with velocity V. At rest at first, a sticky body drags it to
- * its own velocity, whatever the direction. One that slips has it along its normal, where gravity
- * keeps it pressed, and leaves it what it had along the surface: nothing. */
+ * its own velocity, whatever the direction and against gravity. By that it is longer, on average by
+ * rho g H^2/(3 M), with M the modulus without and Young's with free sides: 0.0044 to 0.0095 cells.
+ * One that slips has it along its normal, where gravity keeps it pressed, and leaves it what it had
+ * along the surface: nothing. */
 static void contact_carry(int integrator, const contact_frame *f, int shape, gs4_wall contact)
 {
     const double V[3] = { 0.3, 0.4, -0.2 }, time = 0.4;
@@ -490,7 +492,7 @@ static void contact_carry(int integrator, const contact_frame *f, int shape, gs4
     gs4_sim *sim;
     double v[3], x[3], start;
     int id;
-    if (!sticky) d.gravity = contact_vector(f, 0, -10, 0);
+    d.gravity = contact_vector(f, sticky ? 10 : 0, sticky ? 6 : -10, 0);
     sim = physics_create(&d, &m);
     id = contact_body(sim, f, shape, 0.5, contact, 0);
     CHECK_RESULT(sim, gs4_move_collider(sim, id, contact_vector(f, V[0], V[1], V[2]), at(0, 0, 0)),
@@ -506,10 +508,10 @@ static void contact_carry(int integrator, const contact_frame *f, int shape, gs4
                "place %+.1e\n",
                integrator, shape, (int)contact, v[0], v[1], v[2], sticky ? V[0] : 0, V[1],
                sticky ? V[2] : 0, x[1] / CONTACT_H);
-    CHECK_CLOSE(v[0], sticky ? V[0] : 0, sticky ? 0.01 : 1e-5);
+    CHECK_CLOSE(v[0], sticky ? V[0] : 0, sticky ? 0.015 : 1e-5);
     CHECK_CLOSE(v[1], V[1], sticky ? 0.005 : 0.06);
     CHECK_CLOSE(v[2], sticky ? V[2] : 0, sticky ? 0.01 : 1e-5);
-    CHECK_CLOSE(x[1], 0, (sticky ? 0.002 : 0.25) * CONTACT_H);
+    CHECK_CLOSE(x[1] / CONTACT_H, sticky ? 0.007 : 0, sticky ? 0.0026 : 0.25);
     gs4_destroy(sim);
 }
 

@@ -10,7 +10,7 @@ cd "$(dirname "$0")/.." || exit 1
 CC=${CC:-cc}
 
 quick='few_layout few_snippets few_warnings few_hashes'
-full='warnings tsan fused hashes asan arm hashes_double wasm windows tiny musl i386 form layout names units snippets link frames examples'
+full='warnings tsan fused scenes hashes asan arm hashes_double wasm windows tiny musl i386 form layout names units snippets link frames examples'
 
 # A transfer kernel may be longer than 60 lines; nothing else. This one is a transpose, spelled out.
 long_functions='gs4i_from_lanes'
@@ -294,6 +294,21 @@ all_hashes() {
     same "GS4_NO_VECTORS" "$CC -O2 -DGS4_NO_VECTORS" ""
     threads_and_checkpoint
 }
+# 100 random scenes of everything, bodies that turn about general axes among them: every build of a
+# compiler gives the same hashes.
+scenes() {
+    for cc in gcc clang; do
+        have $cc || continue
+        $cc -O2 -w -I. tests/random_scenes.c -o "$tmp/scenes" -lm && "$tmp/scenes" steps=20 > "$tmp/scenes.hashes"
+        check "$cc: 100 scenes" grep '^100 scenes' "$tmp/scenes.hashes"
+        for level in -O0 '-O3 -march=native' '-O1 -DGS4_PTHREADS -pthread'; do check "$cc $level" same_scenes "$cc" "$level"; done
+    done
+}
+same_scenes() {
+    threads=; [ "$2" = "${2#*PTHREADS}" ] || threads=threads=3
+    $1 $2 -w -I. tests/random_scenes.c -o "$tmp/scenes" -lm && "$tmp/scenes" steps=20 $threads | diff "$tmp/scenes.hashes" -
+}
+
 hashes() { all_hashes ""; bunnies; history; }
 hashes_double() { all_hashes -DGS4_DOUBLE; }
 

@@ -8873,14 +8873,14 @@ static int gs4i_check_mesh(gs4i_error *e, gs4i_memory *m, const gs4_shape *s)
     GS4I_TRY(gs4i_require(
         e, s->vertices && s->triangles && s->vertex_count >= 4 && s->triangle_count >= 4,
         "shape: a mesh needs vertices and triangles, at least four of each"));
-    for (i = 0; i < 3 * (size_t)s->vertex_count; i++) {
-        is_finite &= gs4i_finite(s->vertices[i]);
+    for (i = 0; i < 3 * (size_t)s->vertex_count && is_finite; i++) {
+        is_finite = gs4i_finite(s->vertices[i]);
         extent = fmax(extent, fabs((double)s->vertices[i]));
     }
     GS4I_TRY(
         gs4i_require(e, is_finite, "shape: the mesh has a vertex that is not a finite number"));
-    for (i = 0; i < 3 * (size_t)s->triangle_count; i++)
-        is_in_range &= s->triangles[i] >= 0 && s->triangles[i] < s->vertex_count;
+    for (i = 0; i < 3 * (size_t)s->triangle_count && is_in_range; i++)
+        is_in_range = s->triangles[i] >= 0 && s->triangles[i] < s->vertex_count;
     GS4I_TRY(gs4i_require(e, is_in_range,
                           "shape: the mesh has a triangle with a vertex index out of range"));
     is_closed = gs4i_mesh_is_closed(m, s);

@@ -5521,7 +5521,7 @@ static int gs4i_box_reserve(gs4i_memory *m, gs4i_box *box, size_t bytes)
         ((size_t)box->size[0] + 1) * ((size_t)box->size[1] + 1) * ((size_t)box->size[2] + 1);
     box->taken = 0;
     if (entries > box->room || bytes > box->bytes) {
-        const size_t room = entries + entries / 8;
+        const size_t room = (entries + entries / 8 + 63) / 64 * 64; /* all fields are aligned */
         char *fields = (char *)gs4i_alloc(m, room, bytes);
         if (!fields) return GS4_ERROR_MEMORY;
         gs4i_free(m, box->fields, box->room, box->bytes);
@@ -9141,7 +9141,7 @@ static int gs4i_list_mirror_nodes(gs4i_memory *m, gs4i_boundary *b, const gs4i_g
             b->mirrors[wall] = list;
             b->mirror_capacity[wall] = wanted;
         }
-        for (count = 0, s = 0; s < g->active; s++)
+        for (count = 0, s = 0; b->mirrors[wall] && s < g->active; s++)
             count += gs4i_mirror_nodes_of(b, g, wall, s, b->mirrors[wall] + count);
         b->mirror_count[wall] = count;
     }

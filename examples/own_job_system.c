@@ -6,6 +6,7 @@
  * At the end the same scene runs without the hook and the two states are compared: they are the
  * same bits. */
 #include "example.h"
+#include <pthread.h>
 
 enum {
     WORKERS_MAX = 64

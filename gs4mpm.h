@@ -10193,7 +10193,7 @@ static void gs4i_place_image_particles(int index, void *context)
     if (!g) return;
     face = gs4i_find_face(sim, index);
     for (; i < end; i += GS4I_BATCH) {
-        const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
+        const int n = gs4i_batch_size(i, end);
         gs4i_batch q;
         gs4i_lanes x[3];
         int b, c;
@@ -10953,7 +10953,7 @@ static void gs4i_scatter_momentum(int index, void *context)
     gs4i_report_clear(&sim->reports[o]);
     memset(tile, 0, sizeof tile);
     for (; i < end; i += GS4I_BATCH, row += 2) {
-        const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
+        const int n = gs4i_batch_size(i, end);
         gs4i_batch q;
         gs4i_stencils s;
         gs4i_lanes mv[3];
@@ -10995,7 +10995,7 @@ static void gs4i_find_spin_task(int index, void *context)
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
     gs4i_tile_load(&sim->grid, o, sim->reports[o].rows, sim->grid.momentum, nodes);
     for (; i < end; i += GS4I_BATCH) {
-        const int n = end - i < GS4I_BATCH ? (int)(end - i) : GS4I_BATCH;
+        const int n = gs4i_batch_size(i, end);
         gs4i_batch q;
         gs4i_stencils s;
         gs4i_gathered v;

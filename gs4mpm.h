@@ -1155,6 +1155,13 @@ GS4I_INLINE int gs4i_finite(gs4_real v)
 #endif
 }
 
+/* 0 or -0, also where the processor takes denormal numbers for 0. */
+static int gs4i_is_zero(gs4_real v)
+{
+    const gs4_real zero = 0, minus_zero = -zero;
+    return memcmp(&v, &zero, sizeof v) == 0 || memcmp(&v, &minus_zero, sizeof v) == 0;
+}
+
 /* Tasks: `count` calls of `task`, in any order, on any threads; nothing may depend on either. */
 #ifdef GS4_PTHREADS
 typedef struct gs4i_pool {
@@ -14211,19 +14218,21 @@ typedef enum gs4i_must {
     GS4I_FRACTION
 } gs4i_must;
 
-/* Of one value; beyond GS4I_HUGE, or above 0 and below its inverse, it is called absurd. */
+/* Of one value; beyond GS4I_HUGE, or above 0 and below its inverse, it is called absurd: there
+ * reciprocals and squares are not finite any more. */
 static int gs4i_check(gs4i_error *e, const char *field, gs4_real value, gs4i_must must)
 {
     static const char *const accepted[] = { "a finite number", "a finite number above 0",
                                             "0 or a finite number above", "a number from 0 to 1" };
-    const int sane = gs4i_finite(value) && value < GS4I_HUGE && value > -GS4I_HUGE;
+    const int sane = gs4i_finite(value) && value < GS4I_HUGE && value > -GS4I_HUGE,
+              tiny = !gs4i_is_zero(value) && value >= 0 && !(value > 1 / GS4I_HUGE);
     int good = sane;
     gs4i_text t;
     switch (must) {
     case GS4I_FINITE: break;
-    case GS4I_POSITIVE: good = sane && value > 0 && value > 1 / GS4I_HUGE; break;
-    case GS4I_NOT_NEGATIVE: good = sane && value >= 0; break;
-    case GS4I_FRACTION: good = sane && value >= 0 && value <= 1; break;
+    case GS4I_POSITIVE: good = sane && value > 0 && !tiny; break;
+    case GS4I_NOT_NEGATIVE: good = sane && value >= 0 && !tiny; break;
+    case GS4I_FRACTION: good = value >= 0 && value <= 1 && !tiny; break;
     }
     if (good) return GS4_OK;
     t = gs4i_begin_error(e);
@@ -14234,7 +14243,7 @@ static int gs4i_check(gs4i_error *e, const char *field, gs4_real value, gs4i_mus
     gs4i_put(&t, accepted[must]);
     if (gs4i_finite(value) && !sane)
         gs4i_put(&t, " that is not absurdly large");
-    else if (must == GS4I_POSITIVE && value > 0)
+    else if (tiny)
         gs4i_put(&t, " that is not absurdly small");
     return gs4i_end_error(e, GS4_ERROR_ARGUMENT);
 }
@@ -14402,9 +14411,11 @@ static int gs4i_check_numerics(gs4i_error *e, const gs4_sim_desc *d)
                           "scheme has no stable step; rho_inf * rho_inf_spurious must not be above "
                           "0.98"));
     if (d->integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER) GS4I_TRY(gs4i_check_euler(e, d));
-    GS4I_TRY(gs4i_require_value(e, d->flip_decay_time >= 0, /* infinity is welcome */
-                                "flip_decay_time is ", (double)d->flip_decay_time,
-                                "; it must be 0 or above, INFINITY for pure FLIP"));
+    /* infinity is welcome */
+    GS4I_TRY(gs4i_require_value(
+        e, d->flip_decay_time > GS4I_TINY || gs4i_is_zero(d->flip_decay_time),
+        "flip_decay_time is ", (double)d->flip_decay_time,
+        "; it must be 0 or above by more than rounding, INFINITY for pure FLIP"));
     GS4I_TRY(gs4i_check(e, "cfl", d->cfl, GS4I_FRACTION));
     GS4I_TRY(gs4i_check(e, "max_dt", d->max_dt, GS4I_NOT_NEGATIVE));
     GS4I_TRY(gs4i_check(e, "solver_tolerance", d->solver_tolerance, GS4I_FRACTION));
@@ -15138,6 +15149,7 @@ GS4_API gs4_real gs4_stable_dt(const gs4_sim *sim) { return sim ? gs4i_limit_now
 static int gs4i_try_step(gs4_sim *sim, gs4_real dt)
 {
     gs4_real limit;
+    GS4I_TRY(gs4i_check(&sim->error, "dt", dt, GS4I_POSITIVE));
     GS4I_TRY(gs4i_check_edit(sim));
     if (sim->limits_stale) {
         gs4i_find_limits(sim, sim->top_speed, &sim->limits);
@@ -15159,7 +15171,6 @@ static int gs4i_try_step(gs4_sim *sim, gs4_real dt)
 GS4_API int gs4_step(gs4_sim *sim, gs4_real dt)
 {
     if (!sim) return GS4_ERROR_ARGUMENT;
-    GS4I_TRY(gs4i_check(&sim->error, "dt", dt, GS4I_POSITIVE));
     return gs4i_try_step(sim, dt);
 }
 

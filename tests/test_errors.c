@@ -3,6 +3,9 @@
  * names the field. Nothing else. Run all with run_errors(). */
 #include <limits.h>
 #include <stddef.h>
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
 #define ERR_NAN ((double)NAN)
 #define ERR_INFINITY ((double)INFINITY)
 
@@ -1264,6 +1267,47 @@ static void test_errors_no_end(void)
         }
 }
 
+/* A fall of exactly this long, or a refusal by name that changes nothing. */
+static int err_fall_for(gs4_real duration, int is_step)
+{
+    gs4_sim *sim = err_scene();
+    const uint64_t hash = gs4_state_hash(sim);
+    const int result = is_step ? gs4_step(sim, duration) : gs4_advance(sim, duration);
+    const gs4_view v = gs4_particles(sim, GS4_FIELD_VELOCITY);
+    int i;
+    for (i = 0; i < v.count && result == GS4_OK; i++)
+        CHECK_CLOSE((double)v.data[(size_t)i * (size_t)v.stride + 2] / (double)duration, -10, 0.01);
+    if (result != GS4_OK) {
+        CHECK(result == GS4_ERROR_ARGUMENT && gs4_state_hash(sim) == hash);
+        CHECK(strstr(gs4_last_error(sim), is_step ? "dt is" : "duration is"));
+    }
+    gs4_destroy(sim);
+    return result;
+}
+
+/* Durations down to the least number there is, alike where the processor takes denormal numbers
+ * for 0 and flushes results to it. */
+static void test_errors_short_durations(void)
+{
+    double t = sizeof(gs4_real) == 8 ? 5e-324 : 1.5e-45;
+    for (; t < 1e-3; t *= sizeof(gs4_real) == 8 ? 1e5 : 9.7) {
+        const gs4_real duration = (gs4_real)t;
+        int is_step;
+        for (is_step = 0; is_step < 2; is_step++) {
+            const int result = err_fall_for(duration, is_step);
+            CHECK((result == GS4_OK) == (t > (sizeof(gs4_real) == 8 ? 1e-100 : 1e-18)));
+#ifdef __SSE2__
+            {
+                const unsigned mode = _mm_getcsr();
+                _mm_setcsr(mode | 0x8040);
+                CHECK(err_fall_for(duration, is_step) == result);
+                _mm_setcsr(mode);
+            }
+#endif
+        }
+    }
+}
+
 /* gravity 1e5 on a soft liquid: a step either moves nothing by more than two cells or is
  * refused, though all move alike. */
 static void test_errors_leaps(void)
@@ -1624,6 +1668,7 @@ static void run_errors(void)
     RUN(test_errors_refused_step);
     RUN_ONCE(test_errors_viscosity_callback);
     RUN(test_errors_no_end);
+    RUN(test_errors_short_durations);
     RUN(test_errors_leaps);
     RUN(test_errors_max_particles);
     RUN(test_errors_limit_after_emitting);

@@ -230,11 +230,12 @@
  * space up to the surface. A filling that leaves out half a row puts the wall up to 0.8 cells
  * behind it (tests: couette). Where they are thinner than 3 cells or as crooked as that, they hold
  * nodes up to 3/4 of a cell before the surface, to first order. Of slip and separate ones nodes
- * inside lose the inward relative normal part (separate with Coulomb friction). What a collider
- * takes from a node at once is a jump: it goes to the velocities of particles, not into their
- * rates. A particle that ends inside a collider or behind a wall is put back on the surface. Where
- * the grid sees little of a particle its sub-grid velocity decays at the rate c0/h: at a wall by
- * the weight of mirror nodes, and in spray that fills nodes by less than 20 %.
+ * inside lose the inward relative normal part (separate with Coulomb friction, which brings what
+ * it can hold to rest in one to two steps). What a collider takes from a node at once is a jump:
+ * it goes to the velocities of particles, not into their rates. A particle that ends inside a
+ * collider or behind a wall is put back on the surface. Where the grid sees little of a particle
+ * its sub-grid velocity decays at the rate c0/h: at a wall by the weight of mirror nodes, and in
+ * spray that fills nodes by less than 20 %.
  *
  * ACCURACY (tests/test_order.c and tests/test_physics.c hold these)
  *     order in time 1.9 to 2.15 in x, v, J, F, 1.86 to 2.16 in T, q (a rest of first order shows in
@@ -5931,6 +5932,7 @@ typedef struct gs4i_integrator {
     gs4_real stable_decay;    /* k as far as (4) is stable with it, 1/s */
     gs4_real decayed_at_once; /* share that goes in the step itself, where k dt > 1; else 0 */
     gs4_real fast_decay;      /* c0 / h, 1/s: added to k where the grid sees little */
+    gs4_real stopping;        /* 1/s: how fast friction stops a node; half of what (4) bears */
     gs4_real mixing;          /* 1/s, at most: of temperatures, see [[heat]] */
     /* 1/h^2; 1 / mass of a node in the midst of the lightest material, and of the densest */
     gs4_real inv_area, inv_node_mass, inv_densest_node_mass;
@@ -9416,11 +9418,11 @@ static void gs4i_weigh_mirror_nodes(const gs4i_boundary *b, const gs4i_grid *g, 
 /* What body `b` does to a node at p that would go with velocity v and acceleration acc over the
  * time dt: both become those of the body in the components that contact holds. Returns whether
  * it holds any. */
-static int gs4i_collider_hold(const gs4i_collider *b, gs4_vec3 p, gs4_real h, gs4_real dt,
-                              gs4_real v[3], gs4_real acc[3])
+static int gs4i_collider_hold(const gs4i_collider *b, gs4_vec3 p, gs4_real h,
+                              const gs4i_integrator *integrator, gs4_real v[3], gs4_real acc[3])
 {
     gs4_vec3 own, n, rel, side;
-    gs4_real into, push, slip, bite, a_side;
+    gs4_real into, push, slip, bite;
     if (gs4i_collider_distance(b, p)
         >= (b->is.contact == GS4_WALL_STICK && !b->is_emitter ? GS4I_STICKY_REACH * h : GS4I_C(0)))
         return 0;
@@ -9436,25 +9438,22 @@ static int gs4i_collider_hold(const gs4i_collider *b, gs4_vec3 p, gs4_real h, gs
     rel = gs4i_sub(gs4i_vec3(v[0], v[1], v[2]), own);
     into = -gs4i_dot(rel, n);                             /* > 0: velocity into the body */
     push = -(acc[0] * n.x + acc[1] * n.y + acc[2] * n.z); /* > 0: acceleration into it */
-    if (into + dt * push <= 0) return 0;
+    if (into + integrator->dt * push <= 0) return 0;
     side = gs4i_add(rel, gs4i_scale(n, into)); /* tangential velocity */
     slip = gs4i_length(side);
     if (b->is.contact == GS4_WALL_SEPARATE && b->is.friction > 0) {
-        gs4_vec3 ta = gs4i_add(gs4i_vec3(acc[0], acc[1], acc[2]), gs4i_scale(n, push));
-        gs4_vec3 along = slip > 0 ? gs4i_scale(side, 1 / slip) : gs4i_vec3(0, 0, 0);
+        gs4_vec3 drag = gs4i_add(gs4i_vec3(acc[0], acc[1], acc[2]), gs4i_scale(n, push));
         /* Coulomb, on the impact */
         bite = gs4i_min(b->is.friction * gs4i_max(into, 0), slip);
-        side = gs4i_sub(side, gs4i_scale(along, bite));
-        if (slip - bite <= 0) {
-            a_side = gs4i_length(ta);
-            along = a_side > 0 ? gs4i_scale(ta, 1 / a_side) : along;
-        } else
-            a_side = GS4I_HUGE;
-        /* and on the steady load */
-        bite = gs4i_min(b->is.friction * gs4i_max(push, 0), a_side);
-        acc[0] -= along.x * bite;
-        acc[1] -= along.y * bite;
-        acc[2] -= along.z * bite;
+        side = gs4i_scale(side, slip > 0 ? (slip - bite) / slip : GS4I_C(0));
+        /* and on the steady load: at most what leaves the rate -stopping u along the surface */
+        drag = gs4i_add(drag, gs4i_scale(side, integrator->stopping));
+        slip = gs4i_length(drag);
+        bite = gs4i_min(b->is.friction * gs4i_max(push, 0), slip);
+        drag = gs4i_scale(drag, slip > 0 ? bite / slip : GS4I_C(0));
+        acc[0] -= drag.x;
+        acc[1] -= drag.y;
+        acc[2] -= drag.z;
     }
     v[0] = own.x + side.x;
     v[1] = own.y + side.y;
@@ -10695,7 +10694,7 @@ static void gs4i_hold_nodes(const gs4_sim *sim, int slot, gs4_real *velocity,
                 continue;
             }
             for (c = 0; c < 3; c++) before[c] = v[c];
-            if (!gs4i_collider_hold(collider, p, g->h, sim->integrator.dt, v,
+            if (!gs4i_collider_hold(collider, p, g->h, &sim->integrator, v,
                                     acceleration ? acceleration + 4 * i : none))
                 continue;
             for (c = 0; c < 3 && jump; c++) jump[4 * i + c] += v[c] - before[c];
@@ -13219,6 +13218,7 @@ static void gs4i_set_decay(gs4i_integrator *k, gs4_real decay_time, gs4_real r, 
         k->decay = 0;
         k->damped = 1;
     }
+    k->stopping = most / GS4I_C(1.6);
     y = most / gs4i_max(most + k->decay, GS4I_TINY); /* 1 / (1 + x) */
     k->stable_decay = k->decay * y / (1 - y + y * y);
 }

@@ -492,7 +492,8 @@ typedef enum gs4_viscosity_law {
     GS4_VISCOSITY_CALLBACK
 } gs4_viscosity_law;
 
-/* Pa s, of a temperature and a shear rate (1/s); from several threads at once when there are. */
+/* Pa s, of a temperature and a shear rate (1/s), and of nothing else: 0 or a finite number above.
+ * From several threads at once when there are. */
 typedef gs4_real (*gs4_viscosity_fn)(gs4_real temperature, gs4_real shear_rate, void *user);
 
 /* All zero but `density`: an inviscid liquid. The equations are in MODEL at the top; what a field
@@ -7083,7 +7084,8 @@ static void gs4i_conformation_rate(const gs4i_split *p, const double c[6], doubl
 /* How many particles took the split, how many of them had eigenvalues bounded; 1 + the last of
  * the batch that could not be done. */
 typedef struct gs4i_elastic_count {
-    int split, bounded, failed;
+    int split, bounded;
+    int failed, no_modulus; /* number in the batch, from 1, of one whose stress, G0 failed */
 } gs4i_elastic_count;
 
 /* A batch whose particles may need the split: constants, G (Pa), L, stress before; the time and,
@@ -7182,17 +7184,24 @@ static int gs4i_resolved(gs4i_lanes G, const gs4i_wide *alpha, gs4i_gradient L, 
     return all;
 }
 
-/* G0 = (1 - F_v) mu / lambda_b; where mu depends on the shear rate, of the mu there. */
-static void gs4i_moduli(const gs4i_elastic_constants *l, gs4i_gradient L, gs4i_lanes G)
+/* G0 = (1 - F_v) mu / lambda_b of n particles; where mu depends on the shear rate, of the mu
+ * there. Where that is none G0 is 0, which is counted. */
+static void gs4i_moduli(const gs4i_elastic_constants *l, gs4i_gradient L, int n, gs4i_lanes G,
+                        gs4i_elastic_count *count)
 {
-    int n;
+    int b;
     memcpy(G, l->modulus, sizeof l->modulus);
-    for (n = 0; n < GS4I_BATCH && l->varies; n++) {
-        const gs4i_material_constants *mat = l->of[n];
-        if (mat->varies && mat->inv_lambda > 0)
-            GS4I_NTH(G, n) = (1 - mat->local)
-                             * gs4i_viscosity_of(mat, GS4I_NTH_CONST(l->temperature, n), L, n)
-                             * mat->inv_lambda;
+    for (b = 0; b < n && l->varies; b++) {
+        const gs4i_material_constants *mat = l->of[b];
+        gs4_real mu, modulus;
+        if (!mat->varies || !(mat->inv_lambda > 0)) continue;
+        mu = gs4i_viscosity_of(mat, GS4I_NTH_CONST(l->temperature, b), L, b);
+        modulus = (1 - mat->local) * mu * mat->inv_lambda;
+        if (!(mu >= 0 && modulus < GS4I_HUGE)) {
+            count->no_modulus = b + 1;
+            modulus = 0;
+        }
+        GS4I_NTH(G, b) = modulus;
     }
 }
 
@@ -7234,7 +7243,8 @@ static void gs4i_correct_elastic(const gs4i_elastic_constants *l, gs4i_elastic *
     gs4i_lanes G, relax, stiff;
     gs4i_split_batch batch;
     int b, c, ok[GS4I_BATCH], pass, passes = integrator->gamma > GS4I_C(0.66) ? 1 : 5;
-    gs4i_moduli(l, L, G);
+    gs4i_moduli(l, L, n, G, count);
+    if (count->no_modulus) return; /* tried before, where the callback is a function */
     for (c = 0; c < 6; c++)
         GS4I_BATCH_LOOP(b)
             star[c][b] = y[c][b] = e->s[c][b] + integrator->alpha_f * dt * e->rate[c][b];
@@ -8486,16 +8496,23 @@ static void gs4i_see_stiffness(gs4i_response *r, gs4i_lanes stiffness)
             gs4i_see_bad(r->report, GS4I_BAD_STRESS, r->p->id[r->i + (size_t)b]);
 }
 
+static void gs4i_see_elastic_count(gs4i_response *r, const gs4i_elastic_count *count)
+{
+    const uint32_t *id = r->p->id + r->i;
+    if (count->no_modulus) gs4i_see_bad(r->report, GS4I_BAD_VISCOSITY, id[count->no_modulus - 1]);
+    if (count->failed) gs4i_see_bad(r->report, GS4I_BAD_STRESS, id[count->failed - 1]);
+}
+
 /* Add the non-local stress of the stage (GS4) or of now to sigma. */
 static void gs4i_add_elastic(gs4i_response *r, gs4i_gradient L, gs4i_symmetric sigma)
 {
     gs4i_elastic e;
-    gs4i_elastic_count count = { 0, 0, 0 };
+    gs4i_elastic_count count = { 0, 0, 0, 0 };
     gs4i_symmetric s;
     gs4i_lanes G, stiffness;
     int b, c;
     gs4i_load_elastic_constants(&r->constants, &r->elastic);
-    gs4i_moduli(&r->elastic, L, G);
+    gs4i_moduli(&r->elastic, L, r->n, G, &count);
     gs4i_load_elastic(gs4i_elastic_of(r), r->p->elastic_reals, r->n, &e);
     if (r->p->with_rates && r->integrator)
         gs4i_stage_elastic(&r->elastic, G, &e, r->integrator, L, r->n, s, &count);
@@ -8504,10 +8521,10 @@ static void gs4i_add_elastic(gs4i_response *r, gs4i_gradient L, gs4i_symmetric s
     for (c = 0; c < 6; c++)
         GS4I_BATCH_LOOP(b) sigma[c][b] += s[c][b];
     gs4i_see_elastic(G, s, stiffness);
+    gs4i_see_elastic_count(r, &count);
     gs4i_see_stiffness(r, stiffness);
-    if (count.failed)
-        gs4i_see_bad(r->report, GS4I_BAD_STRESS, r->p->id[r->i + (size_t)count.failed - 1]);
-    r->report->hard += count.split;
+    /* S7 asks for viscosities at other rates: no node can prove them */
+    r->report->hard += count.split + r->elastic.varies;
 }
 
 /* Add the stress of solids at the stage, where the volume ratio is J, or now. */
@@ -8572,13 +8589,12 @@ static void gs4i_advance_elastic(gs4i_response *r, gs4i_gradient L, int commit)
 {
     const gs4i_integrator euler = gs4i_without_rates(r->integrator);
     gs4i_elastic e;
-    gs4i_elastic_count count = { 0, 0, 0 };
+    gs4i_elastic_count count = { 0, 0, 0, 0 };
     gs4i_load_elastic_constants(&r->constants, &r->elastic);
     gs4i_load_elastic(gs4i_elastic_of(r), r->p->elastic_reals, r->n, &e);
     gs4i_correct_elastic(&r->elastic, &e, r->p->with_rates ? r->integrator : &euler, L, r->n,
                          &count);
-    if (count.failed)
-        gs4i_see_bad(r->report, GS4I_BAD_STRESS, r->p->id[r->i + (size_t)count.failed - 1]);
+    gs4i_see_elastic_count(r, &count);
     if (!commit) return;
     r->report->split += count.split;
     r->report->bounded += count.bounded;
@@ -15434,6 +15450,7 @@ typedef struct gs4i_point_batch {
     gs4i_elastic e;
     gs4i_deformation d;
     gs4i_lanes J; /* of solids, and det F */
+    gs4_real mu;  /* at its temperature and shear rate */
 } gs4i_point_batch;
 
 /* F of a solid point: zero means identity. Its determinant must be above 0 by more than
@@ -15459,6 +15476,13 @@ static int gs4i_load_point_deformation(gs4i_error *e, const gs4_real given[9], g
         GS4I_NTH(q->J, n) = GS4I_C(s[0] * s[1] * s[2]);
     }
     return GS4_OK;
+}
+
+static int gs4i_fail_viscosity(gs4i_error *e, gs4_real mu)
+{
+    return gs4i_fail_value(e, GS4_ERROR_ARGUMENT,
+                           "the viscosity at this temperature and shear rate is ", (double)mu,
+                           "; it must be 0 or a finite number above that is not absurdly large");
 }
 
 static int gs4i_make_point_batch(gs4i_error *e, const gs4_material *material,
@@ -15492,13 +15516,8 @@ static int gs4i_make_point_batch(gs4i_error *e, const gs4_material *material,
             GS4I_NTH(q->e.rate[i], n) = point->stress_rate[i];
         }
     }
-    if (q->mat.varies) {
-        const gs4_real mu = gs4i_viscosity_of(&q->mat, point->temperature, q->L, 0);
-        if (!(mu >= 0 && mu < GS4I_HUGE))
-            return gs4i_fail_value(
-                e, GS4_ERROR_ARGUMENT, "the viscosity at this temperature and shear rate is ",
-                (double)mu, "; it must be 0 or a finite number above that is not absurdly large");
-    }
+    q->mu = gs4i_viscosity_of(&q->mat, point->temperature, q->L, 0);
+    if (!(q->mu >= 0 && q->mu < GS4I_HUGE)) return gs4i_fail_viscosity(e, q->mu);
     gs4i_load_elastic_constants(&q->constants, &q->elastic);
     return gs4i_load_solid_constants(&q->constants, &q->solid)
                ? gs4i_load_point_deformation(e, point->deformation, q)
@@ -15532,7 +15551,7 @@ static int gs4i_step_solid_point(gs4i_error *e, gs4i_point_batch *q, gs4i_integr
 static int gs4i_step_liquid_point(gs4i_error *e, gs4i_point_batch *q, gs4i_integrator *integrator,
                                   const gs4_real rho[2], gs4_point *point)
 {
-    gs4i_elastic_count count = { 0, 0, 0 };
+    gs4i_elastic_count count = { 0, 0, 0, 0 };
     int i, restart = 1;
     for (i = 0; i < 6; i++) restart &= point->stress_rate[i] == 0;
     gs4i_family(integrator, rho[0], rho[1], restart);
@@ -15589,7 +15608,7 @@ static int gs4i_point_stress(gs4i_error *e, const gs4_material *material, const 
     int i, j;
     GS4I_TRY(gs4i_make_point_batch(e, material, point, L, &q));
     GS4I_TRY(gs4i_require(e, cauchy != NULL, "cauchy is NULL"));
-    mu = q.mat.local * gs4i_viscosity_of(&q.mat, q.mat.temperature, q.L, 0);
+    mu = q.mat.local * q.mu;
     memset(solid, 0, sizeof solid);
     if (q.mat.shear_modulus > 0) gs4i_solid_stress(&q.solid, q.d.F, q.J, solid, stiffness);
     for (i = 0; i < 3; i++)

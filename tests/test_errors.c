@@ -1225,6 +1225,89 @@ static void test_errors_viscosity_callback(void)
 }
 
 /* Nothing may seem to hang: a code, within a second. */
+/* A viscosity of 0.1 Pa s that turns bad above a shear rate, or from one call on. */
+typedef struct err_turn {
+    double edge, bad;
+    int calls, last_good;
+} err_turn;
+
+static gs4_real err_turning_viscosity(gs4_real temperature, gs4_real rate, void *user)
+{
+    err_turn *turn = (err_turn *)user;
+    (void)temperature;
+    return (gs4_real)((double)rate > turn->edge || turn->calls++ >= turn->last_good ? turn->bad
+                                                                                    : 0.1);
+}
+
+/* A few drops that a step of half the limit moves towards the floor */
+static gs4_sim *err_turning(int euler, int liquid, double local_fraction, err_turn *turn)
+{
+    gs4_sim_desc d = err_desc();
+    gs4_material m = err_material();
+    const gs4_fill f = scene_fill(at(0, 0, -6));
+    gs4_sim *sim = NULL;
+    if (euler) {
+        d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER;
+        d.rho_inf = 0;
+    }
+    m.viscosity_law = GS4_VISCOSITY_CALLBACK;
+    m.viscosity_fn = err_turning_viscosity;
+    m.viscosity_user = turn;
+    m.liquid = (gs4_liquid)liquid;
+    if (liquid) m.relaxation_time = (gs4_real)0.02;
+    if (liquid) m.local_fraction = (gs4_real)local_fraction;
+    if (liquid == GS4_POM_POM) {
+        m.stretch_time = (gs4_real)0.01;
+        m.arms = 4;
+        m.anisotropy = (gs4_real)0.1;
+    }
+    gs4_create(&d, &sim);
+    CHECK(gs4_add_material(sim, &m) == 0);
+    CHECK(gs4_add_particles(sim, gs4_box(at(0.4, 0.4, 0.07), at(0.6, 0.6, 0.26)), &f) > 0);
+    return sim;
+}
+
+/* Until it is refused: a step that is taken leaves numbers. Returns the steps. */
+static int err_turns(int euler, int liquid, double local_fraction, err_turn *turn)
+{
+    gs4_sim *sim = err_turning(euler, liquid, local_fraction, turn);
+    int step, r = GS4_OK;
+    for (step = 0; step < 60 && r == GS4_OK; step++) {
+        const gs4_real limit = gs4_stable_dt(sim);
+        r = gs4_step(sim, limit > 0 ? limit / 2 : (gs4_real)1e-6);
+        CHECK(physics_is_finite(sim));
+    }
+    /* steps that are short enough for 1e17 Pa s are right */
+    CHECK(r == GS4_ERROR_UNSTABLE || (r == GS4_OK && turn->bad == 1e17));
+    gs4_destroy(sim);
+    return step;
+}
+
+/* A viscosity that turns bad wherever it is asked for in a step. */
+static void test_errors_viscosity_that_turns(void)
+{
+    const double wrong[] = { ERR_NAN, ERR_INFINITY, -1, 1e17 };
+    int euler, liquid, whole, v;
+    for (euler = 0; euler < 2; euler++)
+        for (liquid = 0; liquid < 3; liquid++)
+            for (whole = 0; whole < 2; whole++)
+                for (v = 0; v < 4; v++) {
+                    err_turn turn = { 1, 0, 0, INT_MAX };
+                    int edges, first, last_good = 0;
+                    turn.bad = wrong[v];
+                    for (edges = 0; edges < 4; edges++, turn.edge *= 2)
+                        err_turns(euler, liquid, whole ? 0 : 0.5, &turn);
+                    turn.edge = 1e30;
+                    first = 1;
+                    while (last_good < 400 && first < 4) {
+                        turn.last_good = last_good;
+                        turn.calls = 0;
+                        first = err_turns(euler, liquid, whole ? 0 : 0.5, &turn);
+                        last_good += test_full ? 3 : 23;
+                    }
+                }
+}
+
 static void test_errors_no_end(void)
 {
     static const struct {
@@ -1667,6 +1750,7 @@ static void run_errors(void)
     RUN(test_errors_point);
     RUN(test_errors_refused_step);
     RUN_ONCE(test_errors_viscosity_callback);
+    RUN(test_errors_viscosity_that_turns);
     RUN(test_errors_no_end);
     RUN(test_errors_short_durations);
     RUN(test_errors_leaps);

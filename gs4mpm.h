@@ -411,7 +411,8 @@ GS4_API const char *gs4_result_string(int result);
 GS4_API int gs4_version(void);   /* GS4_VERSION of the implementation */
 GS4_API int gs4_real_size(void); /* bytes of gs4_real in the implementation */
 
-/* Signed distance (m, negative inside) of a point; from several threads at once when there are. */
+/* Signed distance (m, negative inside) of a point, finite; from several threads at once when there
+ * are. A step or a filling that sees one that is not finite is refused. */
 typedef gs4_real (*gs4_sdf_fn)(gs4_vec3 point, void *user);
 
 typedef enum gs4_shape_kind {
@@ -8673,6 +8674,7 @@ typedef struct gs4i_collider {
     /* of an emitter: holds what is inside at the velocity `flow`; not in use now */
     int is_emitter, is_off;
     gs4_vec3 flow;
+    int *bad_distance; /* of the simulation: set where the shape's function gives no number */
 } gs4i_collider;
 
 /* A particle before a sticky collider and its image behind it: gs4i_place_image_particle. */
@@ -8783,11 +8785,25 @@ static gs4_real gs4i_field_distance(const gs4i_field *f, gs4_vec3 p)
     return GS4I_C(value + sqrt(out) * f->spacing);
 }
 
-/* The same in the coordinates of the shape. */
+/* To 1, whatever threads do so at once. */
+static void gs4i_raise(int *flag)
+{
+#if defined(__GNUC__) && !defined(__TINYC__)
+    __atomic_store_n(flag, 1, __ATOMIC_RELAXED);
+#else
+    *(volatile int *)flag = 1;
+#endif
+}
+
+/* The same in the coordinates of the shape. Where a function gives no number the point counts as
+ * outside, and whoever asked learns of it by gs4i_check_distances. */
 static gs4_real gs4i_shape_or_field(const gs4i_collider *b, gs4_vec3 p)
 {
-    return b->field.distance ? gs4i_field_distance(&b->field, p)
-                             : gs4i_shape_distance(&b->is.shape, p);
+    const gs4_real d = b->field.distance ? gs4i_field_distance(&b->field, p)
+                                         : gs4i_shape_distance(&b->is.shape, p);
+    if (d >= -GS4I_HUGE && d <= GS4I_HUGE) return d;
+    if (!gs4i_finite(d) && b->bad_distance) gs4i_raise(b->bad_distance);
+    return d < 0 && gs4i_finite(d) ? -GS4I_HUGE : GS4I_HUGE;
 }
 
 /* World point p in the coordinates of the shape. */
@@ -9635,6 +9651,7 @@ struct gs4_sim {
     gs4_real stage_limit;
     /* particles were edited by hand: check them; velocities too: find the spin of solids */
     int needs_check, needs_spin;
+    int bad_distance; /* see gs4i_shape_or_field */
     gs4i_error error; /* the last one */
 };
 
@@ -12781,12 +12798,21 @@ static int gs4i_overlaps(gs4_sim *sim, const gs4i_lattice *l, const gs4_real *po
     return overlap;
 }
 
+/* Since `bad_distance` was 0: did all distance functions give numbers? */
+static int gs4i_check_distances(gs4_sim *sim)
+{
+    return gs4i_require(&sim->error, !sim->bad_distance,
+                        "shape: a distance function (gs4_sdf) gave NaN or infinity; it must give a "
+                        "finite number (m) wherever it is asked; nothing has changed");
+}
+
 /* A shape at rest at its pivot; distances of a mesh are sampled every `spacing` (m). */
 static int gs4i_make_collider(gs4_sim *sim, gs4i_collider *b, const gs4_collider *is,
                               double spacing)
 {
     memset(b, 0, sizeof *b);
     b->is = *is;
+    b->bad_distance = is->shape.kind == GS4_SHAPE_SDF ? &sim->bad_distance : NULL;
     gs4i_to_double(is->pivot, b->at);
     b->turn[0] = 1;
     gs4i_collider_orient(b);
@@ -12806,7 +12832,9 @@ static int64_t gs4i_collect_points(gs4_sim *sim, const gs4i_lattice *l, gs4_real
     gs4_real x[3];
     int64_t n = 0, i;
     int overlap;
+    sim->bad_distance = 0;
     while (n <= room && gs4i_next_filled(&sim->grid, &at, x)) n++;
+    GS4I_TRY(gs4i_check_distances(sim));
     if (n > room)
         return gs4i_fail(&sim->error, GS4_ERROR_MEMORY,
                          "shape holds more particles than there is room for (max_particles); a "
@@ -13424,7 +13452,9 @@ static int gs4i_begin_step(gs4_sim *sim, gs4_real dt, gs4i_node_pass *nodes)
     sim->stage_limit = 0;
     sim->integrator = gs4i_make_integrator(sim, dt);
     sim->heat_integrator = gs4i_make_heat_integrator(sim);
-    return gs4i_prepare_emitters(sim, (double)dt);
+    sim->bad_distance = 0;
+    GS4I_TRY(gs4i_prepare_emitters(sim, (double)dt));
+    return gs4i_check_distances(sim);
 }
 
 /* S1 to S3: m_i and v_i, with walls and colliders. */
@@ -13451,7 +13481,7 @@ static int gs4i_validate(gs4_sim *sim, gs4i_node_pass *nodes)
     gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_node_spreads, nodes);
     gs4i_gather(sim, gs4i_scheme_of(sim)->trial[sim->particles.with_heat]);
     r = gs4i_all_reports(sim);
-    return r.bad ? gs4i_fail_bad(sim, &r) : GS4_OK;
+    return r.bad ? gs4i_fail_bad(sim, &r) : gs4i_check_distances(sim);
 }
 
 /* S7: particles see what nodes have, and nodes remember. Nothing can fail any more. */
@@ -13984,6 +14014,7 @@ static void gs4i_restore_scene(gs4_sim *sim, const gs4i_pieces *p)
         memcpy(b, p->at[GS4I_PIECE_COLLIDERS] + (size_t)i * sizeof *b, sizeof *b);
         b->is.shape = here.is.shape;
         b->field = here.field;
+        b->bad_distance = here.bad_distance;
     }
     for (i = 0; i < sim->emitter_count; i++) {
         const gs4_shape shape = sim->emitters[i].is.shape;

@@ -726,12 +726,6 @@ static gs4_real err_bad_sdf(gs4_vec3 p, void *user)
     return (gs4_real) * (const double *)user;
 }
 
-/* Distance to z = 0.25, with another value below. */
-static gs4_real err_floor_sdf(gs4_vec3 p, void *user)
-{
-    return p.z < (gs4_real)0.25 ? (gs4_real) * (const double *)user : p.z - (gs4_real)0.25;
-}
-
 static void err_shape_refused(gs4_sim *sim, gs4_shape shape, int as_collider)
 {
     const gs4_fill f = scene_fill(at(0, 0, -0.1));
@@ -793,38 +787,74 @@ static void test_errors_shapes(void)
     gs4_destroy(sim);
 }
 
-/* Distances that are not finite: no particle may be lost, none may be made. */
+/* Distance to z = 0.25, with another value below it, or above it at every nth call. */
+typedef struct err_floor {
+    double below, now_and_then;
+    int calls, every;
+} err_floor;
+
+static gs4_real err_turning_floor(gs4_vec3 p, void *user)
+{
+    err_floor *floor = (err_floor *)user;
+    if (p.z < (gs4_real)0.25) return (gs4_real)floor->below;
+    if (floor->every && ++floor->calls % floor->every == 0) return (gs4_real)floor->now_and_then;
+    return p.z - (gs4_real)0.25;
+}
+
+/* A block falls on such a floor: a step that saw a distance that is not finite is refused; no
+ * particle is lost or made, all stays finite, and the floor holds again where it is mended. */
+static void err_fall_on(err_floor *floor, gs4_wall contact, int mended)
+{
+    gs4_sim *sim = err_sim();
+    gs4_collider c;
+    const gs4_fill f = scene_fill(at(0, 0, -0.5));
+    int n, i, r = GS4_OK;
+    memset(&c, 0, sizeof c);
+    c.contact = contact;
+    c.shape = gs4_sdf(err_turning_floor, floor, at(0, 0, 0), at(1, 1, 0.25));
+    n = gs4_add_particles(sim, gs4_box(at(0.25, 0.25, 0.25), at(0.75, 0.75, 0.75)), &f);
+    CHECK_RESULT(sim, gs4_add_collider(sim, &c), 0);
+    for (i = 0; i < 12 && r == GS4_OK; i++) {
+        r = gs4_step(sim, (gs4_real)0.5 * gs4_stable_dt(sim));
+        CHECK(physics_is_finite(sim));
+    }
+    CHECK(gs4_get_stats(sim).particles == n);
+    if (mended) {
+        CHECK(r == GS4_ERROR_ARGUMENT && strstr(gs4_last_error(sim), "distance function"));
+        floor->below = -0.01;
+        floor->every = 0;
+        CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)0.01), 0);
+    }
+    gs4_destroy(sim);
+}
+
 static void test_errors_sdf(void)
 {
     const double values[] = { ERR_NAN, ERR_INFINITY, -ERR_INFINITY, -1e30, 1e30 };
-    int v, contact;
-    for (v = 0; v < 5; v++)
-        for (contact = 0; contact < 3; contact++) {
-            gs4_sim *sim = err_sim();
-            double value = values[v];
-            gs4_collider c;
-            gs4_fill f = scene_fill(at(0, 0, -0.5));
-            int n;
-            memset(&c, 0, sizeof c);
-            c.contact = (gs4_wall)contact;
-            c.shape = gs4_sdf(err_floor_sdf, &value, at(0, 0, 0), at(1, 1, 0.25));
-            n = gs4_add_particles(sim, gs4_box(at(0.25, 0.25, 0.25), at(0.75, 0.75, 0.75)), &f);
-            CHECK_RESULT(sim, gs4_add_collider(sim, &c), 0);
-            CHECK(gs4_advance(sim, (gs4_real)0.05) <= 0);
-            CHECK(physics_is_finite(sim));
-            CHECK(gs4_get_stats(sim).particles == n);
-            gs4_destroy(sim);
-        }
-    {
+    int v, contact, every;
+    for (v = 0; v < 5; v++) {
         gs4_sim *sim = err_sim();
-        double nan = ERR_NAN;
+        double value = values[v];
+        const gs4_fill f = scene_fill(at(0, 0, -0.1));
         gs4_emitter e;
+        for (contact = 0; contact < 3; contact++)
+            for (every = 0; every < 8; every++) {
+                err_floor floor = { 0, 0, 0, 0 };
+                floor.below = every ? -0.01 : value;
+                floor.now_and_then = value;
+                floor.every = every ? 7 * every * every * every : 0;
+                err_fall_on(&floor, (gs4_wall)contact, v < 3 && every < 3);
+            }
         memset(&e, 0, sizeof e);
-        e.fill = scene_fill(at(0, 0, -0.1));
-        e.shape = gs4_sdf(err_bad_sdf, &nan, at(0.3, 0.3, 0.3), at(0.6, 0.6, 0.6));
-        if (gs4_add_emitter(sim, &e) >= 0) gs4_advance(sim, (gs4_real)0.01);
-        /* as gs4_add_particles has it: NaN is not inside */
-        CHECK(gs4_get_stats(sim).particles == 0);
+        e.fill = f;
+        e.shape = gs4_sdf(err_bad_sdf, &value, at(0.3, 0.3, 0.3), at(0.6, 0.6, 0.6));
+        if (v != 3)
+            ERR_REFUSED(sim, gs4_add_particles(sim, e.shape, &f), GS4_ERROR_ARGUMENT,
+                        v < 3 ? "distance function" : "no particle");
+        CHECK(gs4_add_emitter(sim, &e) >= 0);
+        if (v < 3)
+            ERR_REFUSED(sim, gs4_step(sim, (gs4_real)1e-4), GS4_ERROR_ARGUMENT,
+                        "distance function");
         gs4_destroy(sim);
     }
 }

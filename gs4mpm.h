@@ -260,8 +260,9 @@
  *                           sharp_gradients: om^2 and d 2.3 times as large;
  *                           symplectic Euler: (om dt)^2 + 2 d dt <= 4, om = 3.5 c/h,
  *                           d = 16 F_v mu/(rho h^2)
- *     flow                  one cell a step along each axis, the fall within the step included
- *     strain, relaxation    |grad v| dt <= 1,  dt <= 1000 lambda_b
+ *     flow                  one cell a step along each axis, the fall within the step included,
+ *                           and the rim of a collider that turns, where the domain can meet it
+ *     strain, relaxation    |grad v| dt <= 1, of colliders too (sqrt(2) |w|),  dt <= 1000 lambda_b
  * and gs4_step refuses more. gs4_advance takes the fraction `cfl` of it, and half of that again, up
  * to 7 times, where a step is refused.
  *
@@ -522,8 +523,8 @@ typedef struct gs4_material {
     void *viscosity_user;
 
     /* Volume response of both phases, (3): give one of the two, or neither. Then c0 = 10 sqrt(2 g H
-     * + v^2), H the height of the domain and v the greatest speed given so far: flow compresses by
-     * 1 %, impact by more; of solids at least sqrt(10 G/rho0). */
+     * + v^2), H the height of the domain and v the greatest speed given so far, of the rims of
+     * colliders too: flow compresses by 1 %, impact by more; of solids at least sqrt(10 G/rho0). */
     gs4_real bulk_modulus; /* K = rho0 c0^2, Pa */
     gs4_real sound_speed;  /* c0, m/s */
     int incompressible;    /* for partitioned and semi-implicit schemes: K is infinite */
@@ -8760,6 +8761,68 @@ static gs4_vec3 gs4i_collider_velocity(const gs4i_collider *b, gs4_vec3 p)
     return gs4i_add(b->is.velocity, gs4i_cross(b->is.angular_velocity, r));
 }
 
+/* Greatest |v + w x (p - pivot)| for p in the box low .. high: at one of its corners. */
+static double gs4i_fastest_corner(gs4_vec3 low, gs4_vec3 high, const double pivot[3], gs4_vec3 v,
+                                  gs4_vec3 w)
+{
+    double from[2][3], own[3], turn[3], most = 0;
+    int i, a;
+    gs4i_to_double(low, from[0]);
+    gs4i_to_double(high, from[1]);
+    gs4i_to_double(v, own);
+    gs4i_to_double(w, turn);
+    for (i = 0; i < 8; i++) {
+        double r[3], square = 0;
+        for (a = 0; a < 3; a++) r[a] = from[i >> a & 1][a] - pivot[a];
+        for (a = 0; a < 3; a++) {
+            const int b = (a + 1) % 3, c = (a + 2) % 3;
+            const double u = own[a] + turn[b] * r[c] - turn[c] * r[b];
+            square += u * u;
+        }
+        most = fmax(most, square);
+    }
+    return sqrt(most);
+}
+
+/* R^T v: a world vector in the directions of the shape. */
+static gs4_vec3 gs4i_turn_back(const gs4i_collider *b, gs4_vec3 v)
+{
+    const gs4_real *r = b->axes;
+    return gs4i_vec3(r[0] * v.x + r[3] * v.y + r[6] * v.z, r[1] * v.x + r[4] * v.y + r[7] * v.z,
+                     r[2] * v.x + r[5] * v.y + r[8] * v.z);
+}
+
+/* Greatest speed (m/s) of a body where the domain can meet it: no part of it is out of the box
+ * around its shape, and none that counts out of the domain. A ball that turns about its own
+ * centre has the speed of its surface, which drags. Cylinders by their ends: exact about their
+ * axis, at most r |w| too much. */
+static gs4_real gs4i_collider_speed(const gs4i_collider *b, const gs4i_grid *g)
+{
+    const gs4_shape *s = &b->is.shape;
+    const gs4_vec3 size = gs4i_vec3(GS4I_C(g->cells[0]), GS4I_C(g->cells[1]), GS4I_C(g->cells[2])),
+                   v = gs4i_turn_back(b, b->is.velocity),
+                   w = gs4i_turn_back(b, b->is.angular_velocity);
+    const gs4_real turn = gs4i_length(w);
+    gs4_vec3 low = s->a, high = s->kind == GS4_SHAPE_SPHERE ? s->a : s->b;
+    double pivot[3], most, own;
+    if (!(turn > 0)) return gs4i_length(b->is.velocity);
+    most = gs4i_fastest_corner(g->origin, gs4i_add(g->origin, gs4i_scale(size, g->h)), b->at,
+                               b->is.velocity, b->is.angular_velocity);
+    most = fmin(most, (double)GS4I_HUGE);
+    gs4i_to_double(b->is.pivot, pivot);
+    if (s->kind == GS4_SHAPE_SPHERE || s->kind == GS4_SHAPE_CYLINDER) /* its ends, or centre */
+        own = fmax(gs4i_fastest_corner(low, low, pivot, v, w),
+                   gs4i_fastest_corner(high, high, pivot, v, w))
+              + (double)(turn * s->radius);
+    else if (s->kind == GS4_SHAPE_PLANE)
+        own = most;
+    else {
+        gs4i_shape_bounds(s, &low, &high);
+        own = gs4i_fastest_corner(low, high, pivot, v, w);
+    }
+    return GS4I_C(fmin(most, own));
+}
+
 /* Trilinear; outside of the samples the distance to them is added. */
 static gs4_real gs4i_field_distance(const gs4i_field *f, gs4_vec3 p)
 {
@@ -8809,12 +8872,8 @@ static gs4_real gs4i_shape_or_field(const gs4i_collider *b, gs4_vec3 p)
 /* World point p in the coordinates of the shape. */
 static gs4_vec3 gs4i_to_collider(const gs4i_collider *b, gs4_vec3 p)
 {
-    const gs4_real *r = b->axes;
-    gs4_vec3 d = gs4i_sub(p, gs4i_vec3(GS4I_C(b->at[0]), GS4I_C(b->at[1]), GS4I_C(b->at[2])));
-    return gs4i_add(gs4i_vec3(r[0] * d.x + r[3] * d.y + r[6] * d.z,
-                              r[1] * d.x + r[4] * d.y + r[7] * d.z,
-                              r[2] * d.x + r[5] * d.y + r[8] * d.z),
-                    b->is.pivot);
+    const gs4_vec3 at = gs4i_vec3(GS4I_C(b->at[0]), GS4I_C(b->at[1]), GS4I_C(b->at[2]));
+    return gs4i_add(gs4i_turn_back(b, gs4i_sub(p, at)), b->is.pivot);
 }
 
 /* Signed distance (m) from the body's surface to the world point p. */
@@ -12902,7 +12961,7 @@ static int gs4i_add_collider(gs4_sim *sim, const gs4_collider *c, double spacing
     if (!colliders) return gs4i_fail_memory(&sim->error);
     b->colliders = colliders;
     GS4I_TRY(gs4i_make_collider(sim, &colliders[b->collider_count], c, spacing));
-    gs4i_note_speed(sim, gs4i_length(c->velocity));
+    gs4i_note_speed(sim, gs4i_collider_speed(&colliders[b->collider_count], &sim->grid));
     sim->limits_stale = 1;
     return b->collider_count++;
 }
@@ -13168,14 +13227,17 @@ static gs4_real gs4i_stable_dt(const gs4_sim *sim, const gs4i_report *seen)
     return GS4I_C(dt);
 }
 
-/* Speeds that colliders and emitters will give to their nodes. */
-static void gs4i_see_colliders(const gs4i_boundary *b, gs4i_report *r)
+/* Speeds that colliders and emitters will give to their nodes, and velocity gradients: |grad v|
+ * of a body that turns is sqrt(2) |w|. */
+static void gs4i_see_colliders(const gs4_sim *sim, gs4i_report *r)
 {
     int i;
-    for (i = 0; i < b->collider_count; i++) {
-        const gs4i_collider *c = &b->colliders[i];
-        r->max_speed = gs4i_max(r->max_speed, gs4i_length(c->is.velocity));
+    for (i = 0; i < sim->boundary.collider_count; i++) {
+        const gs4i_collider *c = &sim->boundary.colliders[i];
+        r->max_speed = gs4i_max(r->max_speed, gs4i_collider_speed(c, &sim->grid));
         r->max_speed = gs4i_max(r->max_speed, gs4i_length(c->flow));
+        r->max_gradient =
+            gs4i_max(r->max_gradient, GS4I_SQRT(GS4I_C(2)) * gs4i_length(c->is.angular_velocity));
     }
 }
 
@@ -13224,7 +13286,7 @@ static void gs4i_find_limits(const gs4_sim *sim, gs4_real top_speed, gs4i_report
     gs4i_report_motion(report, &r.seen);
     report->max_speed = GS4I_SQRT(report->max_speed);
     report->max_gradient = GS4I_SQRT(report->max_gradient);
-    gs4i_see_colliders(&sim->boundary, report);
+    gs4i_see_colliders(sim, report);
 }
 
 /* The member of the family (r, s), or its first step. */
@@ -13410,7 +13472,7 @@ static void gs4i_finish(gs4_sim *sim)
     }
     for (b = 0; b < sim->boundary.collider_count; b++)
         gs4i_collider_move(&sim->boundary.colliders[b], dt);
-    gs4i_see_colliders(&sim->boundary, &sim->limits);
+    gs4i_see_colliders(sim, &sim->limits);
     sim->time += dt;
     sim->last_dt = dt;
     sim->steps++;
@@ -15151,7 +15213,7 @@ GS4_API int gs4_move_collider(gs4_sim *sim, int collider, gs4_vec3 velocity,
     GS4I_TRY(gs4i_check3(&sim->error, "angular_velocity", angular_velocity));
     c->is.velocity = velocity;
     c->is.angular_velocity = angular_velocity;
-    gs4i_note_speed(sim, gs4i_length(velocity));
+    gs4i_note_speed(sim, gs4i_collider_speed(c, &sim->grid));
     sim->limits_stale = 1;
     return GS4_OK;
 }
@@ -15944,4 +16006,5 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  *
  * CHANGES 0.1.0  the explicit scheme: GS4 and symplectic Euler, Newtonian and viscoelastic
  * liquids, solids, walls, colliders, emitters, frames, checkpoints. Checkpoints have a byte of
- * flags a node; those written before cannot be read. */
+ * flags a node; those written before cannot be read. The rim of a collider that turns counts in the
+ * stable step and in default speeds of sound. */

@@ -751,7 +751,8 @@ GS4_API gs4_stats gs4_get_stats(gs4_sim *sim);
 
 /* Frames: binary little-endian PLY with x y z, vx vy vz and the other fields that the scene has; or
  * NumPy's .npy, one record a particle: numpy.load(path)['velocity']. They and checkpoints are
- * written beside the target and renamed, so that a reader never sees half a file. */
+ * written beside the target as gs4mpm-*.tmp and renamed, so that a reader never sees half a file
+ * whatever else writes there; symbolic links stay. Only a program that is killed leaves a .tmp. */
 GS4_API int gs4_write_ply(gs4_sim *sim, const char *path);
 GS4_API int gs4_write_raw(gs4_sim *sim, const char *path);
 
@@ -860,6 +861,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *solver); /* NULL is fine */
 #if defined(__unix__) || defined(__APPLE__)
 #include <sys/types.h>
 #include <sys/stat.h>
+#include <unistd.h>
 #endif
 #ifdef GS4_PTHREADS
 #include <pthread.h>
@@ -13586,48 +13588,157 @@ static int gs4i_step(gs4_sim *sim, gs4_real dt)
 
 /* ==== [[files]] frames and checkpoints ======================================================== */
 
-/* A file that appears under its name only when it is whole: written beside it, then renamed.
- * What is not a regular file (a device, a pipe) is written directly. */
+/* A file that appears under its name only when it is whole: written beside it under a name of its
+ * own, then renamed. Where the path is a symbolic link that happens where the link leads. What is
+ * not a regular file (a device, a pipe) is written directly. */
 typedef struct gs4i_file {
     FILE *stream;
-    char *temporary;
-    size_t temporary_size;
-    const char *path;
+    char *names; /* the block of both: */
+    size_t size; /* bytes of each */
+    char *target, *temporary;
     int failed;
     uint64_t hash;
 } gs4i_file;
 
-static int gs4i_is_special(const char *path)
+typedef enum gs4i_place_kind {
+    GS4I_PLACE_FREE, /* or a regular file */
+    GS4I_PLACE_FOLDER,
+    GS4I_PLACE_SPECIAL
+} gs4i_place_kind;
+
+enum {
+    GS4I_LONGEST_LINK = 4096,
+    GS4I_MOST_LINKS = 40,
+    GS4I_MOST_NAMES = 1000 /* of neighbours, left by programs that were killed */
+};
+
+#ifdef _WIN32
+#define GS4I_BACKSLASHES 1
+#else
+#define GS4I_BACKSLASHES 0
+#endif
+
+/* A new file; NULL where there is one of that name already. */
+static FILE *gs4i_open_exclusively(const char *path)
+{
+#if defined(_WIN32) && !defined(_UCRT) && !(defined(_MSC_VER) && _MSC_VER >= 1900)
+    FILE *there = fopen(path, "rb"); /* msvcrt knows no "x" */
+    if (!there) return fopen(path, "wb");
+    fclose(there);
+    return NULL;
+#else
+    return fopen(path, "wbx");
+#endif
+}
+
+static gs4i_place_kind gs4i_kind_of_place(const char *path)
 {
 #if defined(__unix__) || defined(__APPLE__)
     struct stat s;
-    return stat(path, &s) == 0 && !S_ISREG(s.st_mode) && !S_ISDIR(s.st_mode);
+    if (stat(path, &s) != 0 || S_ISREG(s.st_mode)) return GS4I_PLACE_FREE;
+    return S_ISDIR(s.st_mode) ? GS4I_PLACE_FOLDER : GS4I_PLACE_SPECIAL;
 #else
     (void)path;
-    return 0;
+    return GS4I_PLACE_FREE;
 #endif
+}
+
+/* Bytes of a path up to the name in its folder. */
+static size_t gs4i_folder_length(const char *path)
+{
+    size_t i, n = 0;
+    for (i = 0; path[i]; i++)
+        if (path[i] == '/' || (GS4I_BACKSLASHES && (path[i] == '\\' || path[i] == ':'))) n = i + 1;
+    return n;
+}
+
+/* Replace the path by where it leads while it is a symbolic link; `text` has room for one.
+ * GS4_ERROR_IO: they lead too far, or round and round. */
+static int gs4i_follow_links(char *path, size_t size, char *text)
+{
+#if defined(__unix__) || defined(__APPLE__)
+#if !defined(__cplusplus) && defined(__STRICT_ANSI__)
+    extern ssize_t readlink(const char *path, char *text, size_t size);
+#endif
+    int links;
+    for (links = 0; links < GS4I_MOST_LINKS; links++) {
+        const ssize_t n = readlink(path, text, GS4I_LONGEST_LINK);
+        size_t folder = n > 0 && text[0] != '/' ? gs4i_folder_length(path) : 0;
+        if (n <= 0) return GS4_OK;
+        if (folder + (size_t)n >= size) return GS4_ERROR_IO;
+        memcpy(path + folder, text, (size_t)n);
+        path[folder + (size_t)n] = 0;
+    }
+    return GS4_ERROR_IO;
+#else
+    (void)path;
+    (void)size;
+    (void)text;
+    return GS4_OK;
+#endif
+}
+
+/* What could not be done with a file, and which. */
+static int gs4i_fail_file(gs4_sim *sim, gs4i_file *f, const char *what, const char *path)
+{
+    gs4i_text t = gs4i_begin_error(&sim->error);
+    gs4i_put(&t, what);
+    gs4i_put(&t, ": ");
+    gs4i_put(&t, path);
+    gs4i_free(&sim->memory, f->names, 2 * f->size, 1);
+    return gs4i_end_error(&sim->error, GS4_ERROR_IO);
+}
+
+/* Open a new file in the folder of the target, by the first of some names that nothing has. */
+static int gs4i_open_neighbour(const gs4_sim *sim, gs4i_file *f)
+{
+    const size_t folder = gs4i_folder_length(f->target);
+    const uintptr_t self = (uintptr_t)sim;
+    uint64_t number = gs4i_hash_bytes(sim->steps, &self, sizeof self);
+    int tries, i;
+    for (tries = 0; tries < GS4I_MOST_NAMES && !f->stream; tries++) {
+        gs4i_text t = gs4i_text_into(f->temporary, f->size);
+        char digits[9];
+        number = gs4i_mix(number);
+        for (i = 0; i < 8; i++) digits[i] = "0123456789abcdef"[number >> 4 * i & 15];
+        digits[8] = 0;
+        memcpy(f->temporary, f->target, folder);
+        t.at += folder;
+        t.left -= folder;
+        gs4i_put(&t, "gs4mpm-");
+        gs4i_put(&t, digits);
+        gs4i_put(&t, ".tmp");
+        f->stream = gs4i_open_exclusively(f->temporary);
+    }
+    return f->stream ? GS4_OK : GS4_ERROR_IO;
 }
 
 static int gs4i_file_open(gs4_sim *sim, gs4i_file *f, const char *path)
 {
-    size_t n;
+    gs4i_place_kind kind;
     memset(f, 0, sizeof *f);
     if (!path || !*path) return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT, "path is empty");
-    f->path = path;
-    n = strlen(path);
-    if (!gs4i_is_special(path)) {
-        f->temporary_size = n + 5;
-        f->temporary = (char *)gs4i_alloc(&sim->memory, f->temporary_size, 1);
-        if (!f->temporary) return gs4i_fail_memory(&sim->error);
-        memcpy(f->temporary, path, n);
-        memcpy(f->temporary + n, ".tmp", 5);
+    kind = gs4i_kind_of_place(path);
+    if (kind == GS4I_PLACE_FOLDER)
+        return gs4i_fail_file(sim, f, "path is that of a folder, give that of a file", path);
+    if (kind == GS4I_PLACE_SPECIAL) {
+        f->stream = fopen(path, "wb");
+        return f->stream ? GS4_OK : gs4i_fail_file(sim, f, "path could not be written to", path);
     }
-    f->stream = fopen(f->temporary ? f->temporary : path, "wb");
-    if (f->stream) return GS4_OK;
-    gs4i_free(&sim->memory, f->temporary, f->temporary_size, 1);
-    return gs4i_fail(
-        &sim->error, GS4_ERROR_IO,
-        "the file could not be created: does its folder exist, and may it be written to?");
+    f->size = strlen(path) + GS4I_LONGEST_LINK + 64;
+    f->names = (char *)gs4i_alloc(&sim->memory, 2 * f->size, 1);
+    if (!f->names) return gs4i_fail_memory(&sim->error);
+    f->target = f->names;
+    f->temporary = f->names + f->size;
+    memcpy(f->target, path, strlen(path));
+    if (gs4i_follow_links(f->target, f->size - 64, f->temporary) != GS4_OK)
+        return gs4i_fail_file(
+            sim, f, "path is a symbolic link that leads too far, or round and round", path);
+    if (gs4i_open_neighbour(sim, f) == GS4_OK) return GS4_OK;
+    return gs4i_fail_file(sim, f,
+                          "no file could be created beside path: does its folder exist, and may it "
+                          "be written to?",
+                          path);
 }
 
 static void gs4i_file_put(gs4i_file *f, const void *data, size_t bytes)
@@ -13642,18 +13753,25 @@ static int gs4i_file_close(gs4_sim *sim, gs4i_file *f)
     int failed = f->failed;
     if (fflush(f->stream) != 0 || ferror(f->stream)) failed = 1;
     if (fclose(f->stream) != 0) failed = 1;
-    if (f->temporary) {
-#ifdef _WIN32
-        if (!failed) remove(f->path); /* rename does not replace there */
-#endif
-        if (!failed) failed = rename(f->temporary, f->path) != 0;
-        if (failed) remove(f->temporary);
-        gs4i_free(&sim->memory, f->temporary, f->temporary_size, 1);
-    }
+    if (failed && f->temporary) remove(f->temporary);
     if (failed)
-        return gs4i_fail(&sim->error, GS4_ERROR_IO,
-                         "the file could not be written whole: is the disk full? What was there "
-                         "before is untouched");
+        return gs4i_fail_file(sim, f,
+                              "the file could not be written whole: is the disk full? What was "
+                              "there before is untouched",
+                              f->names ? f->target : "a device");
+    if (!f->temporary) return GS4_OK;
+#ifdef _WIN32
+    remove(f->target); /* rename does not replace there */
+#endif
+    failed = rename(f->temporary, f->target) != 0;
+    if (failed) {
+        remove(f->temporary);
+        return gs4i_fail_file(sim, f,
+                              "the file was written, but could not take its name: is it too long, "
+                              "or that of a folder or of a file that must not be replaced?",
+                              f->target);
+    }
+    gs4i_free(&sim->memory, f->names, 2 * f->size, 1);
     return GS4_OK;
 }
 
@@ -14294,7 +14412,8 @@ static int gs4i_load(gs4_sim *sim, const char *path)
                          "the checkpoint could not be opened: does it exist, and may it be read?");
     if (fread(&h, 1, sizeof h, f) != sizeof h)
         result = ferror(f)
-                     ? gs4i_fail(&sim->error, GS4_ERROR_IO, "the checkpoint could not be read")
+                     ? gs4i_fail(&sim->error, GS4_ERROR_IO,
+                                 "the checkpoint could not be read: is its path that of a folder?")
                      : gs4i_fail(&sim->error, GS4_ERROR_FORMAT,
                                  "the checkpoint is cut off, or no checkpoint at all");
     else
@@ -15883,6 +16002,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
     gs4i_free(&memory, p, 1, sizeof *p);
 }
 
+#undef GS4I_BACKSLASHES
 #undef GS4I_BATCH_LOOP
 #undef GS4I_BLOCK_NODES
 #undef GS4I_BLOCK_SIDE

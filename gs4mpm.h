@@ -294,6 +294,10 @@
  * and 33. A scene with a viscoelastic liquid: 48 more a particle (Euler 24). With a solid: 96 more
  * (Euler 36). With heat: 17 more a particle, 32 more with a flux_relaxation_time, 16 (or 32) a cell
  * near material, and about 150 a cell of the box around all material, where the solver works.
+ * A mesh: about 400 (double 800) per cell face of its surface in the domain or within 10 cells of
+ * it; where that is more than 1 GB it is refused. Its distance is sampled twice a cell within three
+ * cells of the surface. A mesh that moves is sampled anew now and then, but for one that takes less
+ * than 32 MB as a whole. While it is added, 12 more a triangle and 16 a vertex.
  * Double, GS4: 121 (32 more) and 97. Stepping allocates nothing once the scene has stopped growing;
  * a kernel takes 39 KB of stack, with heat 61; in double 77 and 120.
  *
@@ -452,7 +456,9 @@ GS4_API gs4_shape gs4_plane(gs4_vec3 point, gs4_vec3 outward_normal);
 GS4_API gs4_shape gs4_sdf(gs4_sdf_fn distance, void *user, gs4_vec3 low, gs4_vec3 high);
 
 /* A closed surface: 3 coordinates a vertex; 3 vertices a triangle, counter-clockwise from outside.
- * Both arrays must outlive the simulation. */
+ * Vertices at one place are one; those of no triangle do not count. Parts that overlap are a union,
+ * a part that faces inwards within another is a hollow. What is not closed or inside out is
+ * refused. Both arrays must outlive the simulation and stay as they are. */
 GS4_API gs4_shape gs4_mesh(const gs4_real *vertices_xyz, int vertex_count, const int *triangles,
                            int triangle_count);
 
@@ -1458,10 +1464,10 @@ static int gs4i_shape_is_flat(const gs4_shape *s, gs4_vec3 p, gs4_real reach, gs
 /* Box around a shape; a plane has none and takes the box given. */
 static void gs4i_shape_bounds(const gs4_shape *s, gs4_vec3 *low, gs4_vec3 *high)
 {
-    int i;
     switch (s->kind) {
     case GS4_SHAPE_BOX:
     case GS4_SHAPE_SDF:
+    case GS4_SHAPE_MESH: /* once checked */
         *low = s->a;
         *high = s->b;
         break;
@@ -1479,16 +1485,6 @@ static void gs4i_shape_bounds(const gs4_shape *s, gs4_vec3 *low, gs4_vec3 *high)
             r);
         break;
     }
-    case GS4_SHAPE_MESH:
-        *low = *high = gs4i_vec3(s->vertices[0], s->vertices[1], s->vertices[2]);
-        for (i = 1; i < s->vertex_count; i++) {
-            const gs4_real *v = s->vertices + 3 * (size_t)i;
-            *low =
-                gs4i_vec3(gs4i_min(low->x, v[0]), gs4i_min(low->y, v[1]), gs4i_min(low->z, v[2]));
-            *high = gs4i_vec3(gs4i_max(high->x, v[0]), gs4i_max(high->y, v[1]),
-                              gs4i_max(high->z, v[2]));
-        }
-        break;
     case GS4_SHAPE_NONE:
     case GS4_SHAPE_PLANE: break;
     }
@@ -8658,13 +8654,23 @@ typedef struct gs4i_mirror_pair {
     uint32_t mirror, inner;
 } gs4i_mirror_pair;
 
-/* Sampled distance of a mesh: trilinear in n[0] x n[1] x n[2] samples, x fastest. */
+/* Sampled distance of a mesh, trilinear between samples: c, 0 <= c < n, is at low + c spacing. They
+ * are exact within `band` of the surface, +-band beyond, and kept in blocks of 8^3. A block all
+ * beyond has none. Only the blocks of a window are there, which the domain cannot leave. */
 typedef struct gs4i_field {
     int n[3];
+    int first[3], blocks[3]; /* the window */
     double low[3], spacing, band;
+    int32_t *block; /* of the window, x fastest: where its samples are, or GS4I_FIELD_* */
     gs4_real *distance;
-    size_t count;
+    int count; /* of blocks that have samples */
 } gs4i_field;
+
+#define GS4I_FIELD_BLOCK 512
+enum {
+    GS4I_FIELD_OUTSIDE = -1,
+    GS4I_FIELD_INSIDE = -2
+};
 
 /* A shape with a pose, of a collider or an emitter. World point p is shape point
  * R^T (p - at) + pivot. */
@@ -8825,6 +8831,28 @@ static gs4_real gs4i_collider_speed(const gs4i_collider *b, const gs4i_grid *g)
     return GS4I_C(fmin(most, own));
 }
 
+/* Where in `block` the entry of sample i, j, k is. */
+GS4I_INLINE size_t gs4i_field_block_of(const gs4i_field *f, int i, int j, int k)
+{
+    return ((size_t)((k >> 3) - f->first[2]) * (size_t)f->blocks[1]
+            + (size_t)((j >> 3) - f->first[1]))
+               * (size_t)f->blocks[0]
+           + (size_t)((i >> 3) - f->first[0]);
+}
+
+/* The sample itself, of block number `block`. */
+GS4I_INLINE gs4_real *gs4i_field_sample(const gs4i_field *f, int32_t block, int i, int j, int k)
+{
+    return f->distance + (size_t)block * GS4I_FIELD_BLOCK + (k & 7) * 64 + (j & 7) * 8 + (i & 7);
+}
+
+GS4I_INLINE gs4_real gs4i_field_value(const gs4i_field *f, int i, int j, int k)
+{
+    const int32_t block = f->block[gs4i_field_block_of(f, i, j, k)];
+    return block >= 0 ? *gs4i_field_sample(f, block, i, j, k)
+                      : GS4I_C(block == GS4I_FIELD_INSIDE ? -f->band : f->band);
+}
+
 /* Trilinear; outside of the samples the distance to them is added. */
 static gs4_real gs4i_field_distance(const gs4i_field *f, gs4_vec3 p)
 {
@@ -8833,20 +8861,20 @@ static gs4_real gs4i_field_distance(const gs4i_field *f, gs4_vec3 p)
     gs4i_to_double(p, x);
     for (a = 0; a < 3; a++) {
         const double t = (x[a] - f->low[a]) / f->spacing,
-                     inside = fmax(0, fmin(t, f->n[a] - 1)); /* the last cell, where t is NaN */
+                     inside = t > 0 ? (t < f->n[a] - 1 ? t : f->n[a] - 1) : 0; /* 0: t is NaN */
+        const int end = 8 * (f->first[a] + f->blocks[a]);
         out += (t - inside) * (t - inside);
         c[a] = (int)inside;
         if (c[a] > f->n[a] - 2) c[a] = f->n[a] - 2;
+        /* beyond the window nobody asks but for NaN */
+        if (c[a] > end - 2) c[a] = end - 2;
+        if (c[a] < 8 * f->first[a]) c[a] = 8 * f->first[a];
         x[a] = inside - c[a];
     }
-    for (i = 0; i < 8; i++) {
-        const gs4_real *row =
-            f->distance
-            + ((size_t)(c[2] + (i >> 2)) * (size_t)f->n[1] + (size_t)(c[1] + (i >> 1 & 1)))
-                  * (size_t)f->n[0];
-        value += (double)row[c[0] + (i & 1)] * (i & 1 ? x[0] : 1 - x[0]) * (i & 2 ? x[1] : 1 - x[1])
+    for (i = 0; i < 8; i++)
+        value += (double)gs4i_field_value(f, c[0] + (i & 1), c[1] + (i >> 1 & 1), c[2] + (i >> 2))
+                 * (i & 1 ? x[0] : 1 - x[0]) * (i & 2 ? x[1] : 1 - x[1])
                  * (i & 4 ? x[2] : 1 - x[2]);
-    }
     return GS4I_C(value + sqrt(out) * f->spacing);
 }
 
@@ -8911,7 +8939,7 @@ static gs4_vec3 gs4i_collider_normal(const gs4i_collider *b, gs4_vec3 p, gs4_rea
     return length > 0 ? gs4i_scale(g, 1 / length) : gs4i_vec3(0, 0, 0);
 }
 
-/* --- closed triangle meshes ------------------------------------------------------------------- */
+/* --- closed triangle meshes: are they? -------------------------------------------------------- */
 
 static void gs4i_mesh_corner(const gs4_shape *s, size_t i, double at[3])
 {
@@ -8920,83 +8948,200 @@ static void gs4i_mesh_corner(const gs4_shape *s, size_t i, double at[3])
     for (a = 0; a < 3; a++) at[a] = (double)v[a];
 }
 
-/* Where the edge leads that begins at corner i and goes round its triangle. */
-static int gs4i_mesh_edge_end(const gs4_shape *s, size_t i)
+/* For each vertex that a triangle has: 1 + the first one at the same place. NULL: out of memory. */
+static int *gs4i_mesh_weld(gs4i_memory *m, const gs4_shape *s)
 {
-    return s->triangles[i % 3 == 2 ? i - 2 : i + 1];
+    size_t room = 4, i, at;
+    int *table, *same, a;
+    while (room < 2 * (size_t)s->vertex_count) room *= 2;
+    table = (int *)gs4i_alloc(m, room, sizeof *table);
+    same = (int *)gs4i_alloc(m, (size_t)s->vertex_count, sizeof *same);
+    for (i = 0; table && same && i < 3 * (size_t)s->triangle_count; i++) {
+        const int v = s->triangles[i];
+        uint64_t key = 0;
+        double x[3];
+        if (same[v]) continue;
+        gs4i_mesh_corner(s, i, x);
+        for (a = 0; a < 3; a++) {
+            uint64_t bits;
+            x[a] += 0.0; /* -0 is 0 */
+            memcpy(&bits, &x[a], sizeof bits);
+            key = gs4i_mix(key ^ bits);
+        }
+        for (at = (size_t)key & (room - 1); table[at]; at = (at + 1) & (room - 1)) {
+            const gs4_real *other = s->vertices + 3 * (size_t)(table[at] - 1);
+            if ((double)other[0] == x[0] && (double)other[1] == x[1] && (double)other[2] == x[2])
+                break;
+        }
+        if (!table[at]) table[at] = v + 1;
+        same[v] = table[at];
+    }
+    if (!table) {
+        gs4i_free(m, same, (size_t)s->vertex_count, sizeof *same);
+        same = NULL;
+    }
+    gs4i_free(m, table, room, sizeof *table);
+    return same;
 }
 
-/* Is each directed edge there once, and its reverse once? -1: out of memory. */
-static int gs4i_mesh_is_closed(gs4i_memory *m, const gs4_shape *s)
+/* From corner i round its triangle: the ends of the edge, lower one first. 1: it goes up, -1: down,
+ * 0: it has no length. */
+static int gs4i_mesh_edge(const gs4_shape *s, const int *same, size_t i, int ends[2])
+{
+    const int from = same[s->triangles[i]] - 1,
+              to = same[s->triangles[i % 3 == 2 ? i - 2 : i + 1]] - 1;
+    ends[0] = from < to ? from : to;
+    ends[1] = from < to ? to : from;
+    return (from < to) - (from > to);
+}
+
+/* Closed is a mesh whose edges are gone along as often one way as the other: then, and only then,
+ * every point has a winding number. Ends of an edge where it is not so. 1: there is one, 0: there
+ * is none, -1: out of memory. */
+static int gs4i_mesh_open_edge(gs4i_memory *m, const gs4_shape *s, const int *same, int open[2])
 {
     const size_t vertices = (size_t)s->vertex_count, edges = 3 * (size_t)s->triangle_count;
-    /* edges from vertex v end at end[first[v]] to end[first[v + 1]] */
+    /* upper ends of the edges of v, negative if they go down: upper[first[v]] to
+     * upper[first[v + 1]] */
     size_t *first = (size_t *)gs4i_alloc(m, vertices + 2, sizeof *first), i, k;
-    int *end = (int *)gs4i_alloc(m, edges, sizeof *end), result = first && end ? 1 : -1;
-    if (result > 0) {
-        for (i = 0; i < edges; i++) first[s->triangles[i] + 2]++;
-        for (i = 2; i < vertices + 2; i++) first[i] += first[i - 1];
-        for (i = 0; i < edges; i++) end[first[s->triangles[i] + 1]++] = gs4i_mesh_edge_end(s, i);
-    }
-    for (i = 0; i < edges && result > 0; i++) {
-        const int from = s->triangles[i], to = gs4i_mesh_edge_end(s, i);
-        int same = 0, reverse = 0;
-        for (k = first[from]; k < first[from + 1]; k++) same += end[k] == to;
-        for (k = first[to]; k < first[to + 1]; k++) reverse += end[k] == from;
-        result = same == 1 && reverse == 1;
+    int *upper = (int *)gs4i_alloc(m, edges, sizeof *upper), ends[2], way,
+        *balance = (int *)gs4i_alloc(m, vertices, sizeof *balance),
+        result = first && upper && balance ? 0 : -1;
+    for (i = 0; i < edges && result == 0; i++)
+        if (gs4i_mesh_edge(s, same, i, ends)) first[ends[0] + 2]++;
+    for (i = 2; i < vertices + 2 && result == 0; i++) first[i] += first[i - 1];
+    for (i = 0; i < edges && result == 0; i++)
+        if ((way = gs4i_mesh_edge(s, same, i, ends)) != 0)
+            upper[first[ends[0] + 1]++] = way * (ends[1] + 1);
+    for (i = 0; i < vertices && result == 0; i++) {
+        for (k = first[i]; k < first[i + 1]; k++)
+            balance[abs(upper[k]) - 1] += upper[k] > 0 ? 1 : -1;
+        for (k = first[i]; k < first[i + 1] && result == 0; k++) {
+            result = balance[abs(upper[k]) - 1] != 0;
+            open[0] = (int)i;
+            open[1] = abs(upper[k]) - 1;
+        }
     }
     gs4i_free(m, first, vertices + 2, sizeof *first);
-    gs4i_free(m, end, edges, sizeof *end);
+    gs4i_free(m, upper, edges, sizeof *upper);
+    gs4i_free(m, balance, vertices, sizeof *balance);
     return result;
 }
 
-/* Enclosed by the mesh: the sum of a . (b x c) / 6 over its triangles; below 0 inside out. */
-static double gs4i_mesh_volume(const gs4_shape *s)
+static int gs4i_fail_open(gs4i_error *e, const gs4_shape *s, const int *same, const int open[2])
 {
-    double volume = 0, a[3], b[3], c[3];
+    int ends[2], count[2] = { 0, 0 };
+    size_t i, first = 0;
+    gs4i_text t = gs4i_begin_error(e);
+    for (i = 0; i < 3 * (size_t)s->triangle_count; i++) {
+        const int way = gs4i_mesh_edge(s, same, i, ends);
+        if (!way || ends[0] != open[0] || ends[1] != open[1]) continue;
+        if (count[0] + count[1] == 0) first = i / 3;
+        count[way > 0]++;
+    }
+    gs4i_put(&t, "shape: the mesh is not closed: along the edge of vertices ");
+    gs4i_put_integer(&t, open[0]);
+    gs4i_put(&t, " and ");
+    gs4i_put_integer(&t, open[1]);
+    gs4i_put(&t, " go ");
+    gs4i_put_integer(&t, count[1]);
+    gs4i_put(&t, " triangles one way and ");
+    gs4i_put_integer(&t, count[0]);
+    gs4i_put(&t, " the other, the first of them triangle ");
+    gs4i_put_integer(&t, (int64_t)first);
+    gs4i_put(&t, ": a hole, a T-junction, or triangles that disagree about the outside");
+    return gs4i_end_error(e, GS4_ERROR_ARGUMENT);
+}
+
+static int gs4i_check_closed(gs4i_error *e, gs4i_memory *m, const gs4_shape *s)
+{
+    int *same = gs4i_mesh_weld(m, s), open[2] = { 0, 0 }, result = GS4_OK,
+        found = same ? gs4i_mesh_open_edge(m, s, same, open) : -1;
+    if (found) result = found < 0 ? gs4i_fail_memory(e) : gs4i_fail_open(e, s, same, open);
+    gs4i_free(m, same, (size_t)s->vertex_count, sizeof *same);
+    return result;
+}
+
+/* Enclosed volume, the sum of a . ((b - a) x (c - a)) / 6 over the triangles, below 0 inside out;
+ * and their area. Places are taken from the first corner: far from the origin nothing cancels. */
+static double gs4i_mesh_volume(const gs4_shape *s, double *area)
+{
+    double volume = 0, origin[3], a[3], b[3], c[3];
     size_t i;
+    int k;
+    *area = 0;
+    gs4i_mesh_corner(s, 0, origin);
     for (i = 0; i < 3 * (size_t)s->triangle_count; i += 3) {
+        double n[3], n2 = 0;
         gs4i_mesh_corner(s, i, a);
         gs4i_mesh_corner(s, i + 1, b);
         gs4i_mesh_corner(s, i + 2, c);
-        volume += (a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2])
-                   + a[2] * (b[0] * c[1] - b[1] * c[0]))
-                  / 6;
+        for (k = 0; k < 3; k++) {
+            const int l = (k + 1) % 3, r = (k + 2) % 3;
+            n[k] = (b[l] - a[l]) * (c[r] - a[r]) - (b[r] - a[r]) * (c[l] - a[l]);
+            n2 += n[k] * n[k];
+            volume += (a[k] - origin[k]) * n[k] / 6;
+        }
+        *area += sqrt(n2) / 2;
     }
     return volume;
 }
 
-/* Closed, faces outwards, and encloses more than rounding. */
-static int gs4i_check_mesh(gs4i_error *e, gs4i_memory *m, const gs4_shape *s)
+/* Indices in range and corners finite; a and b become the corners of the box around the mesh. */
+static int gs4i_check_corners(gs4i_error *e, gs4_shape *s)
 {
-    double extent = 0, volume;
-    int is_finite = 1, is_in_range = 1, is_closed;
+    gs4_real low[3] = { 0, 0, 0 }, high[3] = { 0, 0, 0 };
     size_t i;
+    int a, is_finite = 1;
+    for (i = 0; i < 3 * (size_t)s->triangle_count && is_finite; i++) {
+        const int v = s->triangles[i];
+        GS4I_TRY(gs4i_require_value(e, v >= 0 && v < s->vertex_count,
+                                    "shape: the mesh has no vertex ", v,
+                                    ", which one of its triangles has: the index is out of range"));
+        for (a = 0; a < 3; a++) {
+            const gs4_real x = s->vertices[3 * (size_t)v + (size_t)a];
+            is_finite = is_finite && gs4i_finite(x) && gs4i_abs(x) < GS4I_HUGE;
+            low[a] = i ? gs4i_min(low[a], x) : x;
+            high[a] = i ? gs4i_max(high[a], x) : x;
+        }
+        GS4I_TRY(gs4i_require_value(e, is_finite, "shape: vertex ", v,
+                                    " of the mesh is not finite, or absurdly far away"));
+    }
+    s->a = gs4i_vec3(low[0], low[1], low[2]);
+    s->b = gs4i_vec3(high[0], high[1], high[2]);
+    return GS4_OK;
+}
+
+/* Closed, faces outwards as a whole, and encloses more than rounding. */
+static int gs4i_check_mesh(gs4i_error *e, gs4i_memory *m, gs4_shape *s)
+{
+    double area, volume;
     GS4I_TRY(gs4i_require(
         e, s->vertices && s->triangles && s->vertex_count >= 4 && s->triangle_count >= 4,
         "shape: a mesh needs vertices and triangles, at least four of each"));
-    for (i = 0; i < 3 * (size_t)s->vertex_count && is_finite; i++) {
-        is_finite = gs4i_finite(s->vertices[i]);
-        extent = fmax(extent, fabs((double)s->vertices[i]));
-    }
-    GS4I_TRY(
-        gs4i_require(e, is_finite, "shape: the mesh has a vertex that is not a finite number"));
-    for (i = 0; i < 3 * (size_t)s->triangle_count && is_in_range; i++)
-        is_in_range = s->triangles[i] >= 0 && s->triangles[i] < s->vertex_count;
-    GS4I_TRY(gs4i_require(e, is_in_range,
-                          "shape: the mesh has a triangle with a vertex index out of range"));
-    is_closed = gs4i_mesh_is_closed(m, s);
-    if (is_closed < 0) return gs4i_fail_memory(e);
-    GS4I_TRY(gs4i_require(e, is_closed,
-                          "shape: the mesh is not closed: an edge belongs to one triangle only, or "
-                          "to more than two, or to two that disagree about the outside"));
-    volume = gs4i_mesh_volume(s);
-    GS4I_TRY(gs4i_require(e, fabs(volume) > 1e-12 * extent * extent * extent,
+    GS4I_TRY(gs4i_check_corners(e, s));
+    GS4I_TRY(gs4i_check_closed(e, m, s));
+    volume = gs4i_mesh_volume(s, &area);
+    GS4I_TRY(gs4i_require(e,
+                          fabs(volume) > 1e-12 * area * (double)gs4i_length(gs4i_sub(s->b, s->a)),
                           "shape: the mesh encloses no volume"));
     return gs4i_require(e, volume > 0,
                         "shape: the mesh is inside out: its triangles face inwards; swap two "
                         "vertices of each");
 }
+
+/* A body as thin as that slips between samples. Of a plate 2 volume / area is the thickness, of a
+ * ball two thirds of its radius. */
+static int gs4i_check_thickness(gs4i_error *e, const gs4_shape *s, double h)
+{
+    double area, thickness = 2 * gs4i_mesh_volume(s, &area);
+    thickness /= area;
+    return gs4i_require_value(e, thickness > 0.3 * h, "shape: the mesh is on average ", thickness,
+                              " m thick, below 0.3 cells: material would pass through it; use "
+                              "smaller cells or a thicker mesh");
+}
+
+/* --- distances to triangles ------------------------------------------------------------------- */
 
 /* Squared distance of p to triangle abc: Voronoi regions of corners, edges and face. */
 static double gs4i_triangle_distance2(const double p[3], const double a[3], const double b[3],
@@ -9052,145 +9197,496 @@ static double gs4i_triangle_distance2(const double p[3], const double a[3], cons
     return r;
 }
 
-/* Which side of edge ij of the projection to (y, z) the point is on: the same number for both
- * triangles of the edge. */
-static int gs4i_edge_side(const gs4_shape *s, int i, int j, double y, double z)
+static double gs4i_segment_distance2(const double p[3], const double a[3], const double b[3])
 {
-    int low = i < j ? i : j, high = i < j ? j : i, positive;
-    const gs4_real *a = s->vertices + 3 * (size_t)low, *b = s->vertices + 3 * (size_t)high;
-    positive =
-        ((double)b[1] - y) * ((double)a[2] - z) - ((double)a[1] - y) * ((double)b[2] - z) > 0;
-    return (i < j) == positive;
+    double along = 0, length2 = 0, r = 0;
+    int i;
+    for (i = 0; i < 3; i++) {
+        along += (b[i] - a[i]) * (p[i] - a[i]);
+        length2 += (b[i] - a[i]) * (b[i] - a[i]);
+    }
+    along = length2 > 0 ? fmax(0, fmin(along / length2, 1)) : 0;
+    for (i = 0; i < 3; i++) {
+        const double q = a[i] + along * (b[i] - a[i]) - p[i];
+        r += q * q;
+    }
+    return r;
 }
 
-static gs4_real *gs4i_field_row(const gs4i_field *f, int j, int k)
+/* A triangle to be asked for many distances. Its planes have unit normals and go through the first
+ * corner, but for that of the side opposite to it, which is `beyond`. A needle has no planes that
+ * rounding has not turned: it is its sides. */
+typedef struct gs4i_facet {
+    double corner[3][3], low[3], high[3];
+    double plane[4][3], beyond; /* of the face; of the sides, in the face and outwards */
+    double slack;               /* m, more than all rounding */
+    int is_needle;
+} gs4i_facet;
+
+static void gs4i_cross_double(const double a[3], const double b[3], double scale, double out[3])
 {
-    return f->distance + ((size_t)k * (size_t)f->n[1] + (size_t)j) * (size_t)f->n[0];
+    int k;
+    for (k = 0; k < 3; k++)
+        out[k] = scale * (a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3]);
 }
 
-/* First and last sample that is, along `axis`, between the lowest and the highest corner, and
- * `margin` (m) beyond them. */
-static void gs4i_field_range(const gs4i_field *f, double corner[3][3], int axis, double margin,
+static double gs4i_dot_double(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void gs4i_make_facet(const gs4_shape *s, int t, double spacing, gs4i_facet *f)
+{
+    double side[3][3], n[3], size = 0, n2;
+    int i, a;
+    for (i = 0; i < 3; i++) gs4i_mesh_corner(s, 3 * (size_t)t + (size_t)i, f->corner[i]);
+    for (a = 0; a < 3; a++) {
+        f->low[a] = fmin(f->corner[0][a], fmin(f->corner[1][a], f->corner[2][a]));
+        f->high[a] = fmax(f->corner[0][a], fmax(f->corner[1][a], f->corner[2][a]));
+        size += f->high[a] - f->low[a];
+        for (i = 0; i < 3; i++) side[i][a] = f->corner[(i + 1) % 3][a] - f->corner[i][a];
+    }
+    gs4i_cross_double(side[0], side[1], 1, n);
+    n2 = gs4i_dot_double(n, n);
+    f->slack = 1e-9 * size + 1e-6 * spacing;
+    /* below an angle of 1e-5 at the first corner */
+    f->is_needle =
+        !(n2 > 1e-10 * gs4i_dot_double(side[0], side[0]) * gs4i_dot_double(side[2], side[2]));
+    if (f->is_needle) return;
+    for (a = 0; a < 3; a++) f->plane[0][a] = n[a] / sqrt(n2);
+    for (i = 0; i < 3; i++)
+        gs4i_cross_double(side[i], f->plane[0], 1 / sqrt(gs4i_dot_double(side[i], side[i])),
+                          f->plane[i + 1]);
+    f->beyond = gs4i_dot_double(f->plane[2], side[0]);
+}
+
+static double gs4i_facet_distance2(const gs4i_facet *f, const double p[3])
+{
+    const double(*c)[3] = f->corner;
+    if (!f->is_needle) return gs4i_triangle_distance2(p, c[0], c[1], c[2]);
+    return fmin(gs4i_segment_distance2(p, c[0], c[1]),
+                fmin(gs4i_segment_distance2(p, c[1], c[2]), gs4i_segment_distance2(p, c[2], c[0])));
+}
+
+/* The same or less, quickly: exact where a face or a side is nearest. */
+static double gs4i_facet_bound2(const gs4i_facet *f, const double p[3])
+{
+    double r[3], face, side = 0;
+    int a, i;
+    if (f->is_needle) return gs4i_facet_distance2(f, p);
+    for (a = 0; a < 3; a++) r[a] = p[a] - f->corner[0][a];
+    face = gs4i_dot_double(f->plane[0], r);
+    for (i = 1; i < 4; i++) {
+        const double beyond = gs4i_dot_double(f->plane[i], r) - (i == 2 ? f->beyond : 0);
+        if (beyond > side) side = beyond;
+    }
+    return face * face + side * side;
+}
+
+/* Is a point of the triangle within `reach` (m) of p? At least where it is. */
+GS4I_INLINE int gs4i_facet_is_near(const gs4i_facet *f, const double p[3], double reach)
+{
+    reach += f->slack;
+    return gs4i_facet_bound2(f, p) < reach * reach;
+}
+
+/* May the triangle be nearer to one of 8 points, `spacing` apart along x from p on, than |d|? */
+static int gs4i_facet_is_nearer(const gs4i_facet *f, const double p[3], double spacing,
+                                const gs4_real d[8])
+{
+    double r[3], at[4];
+    int i, c, nearer = f->is_needle;
+    if (nearer) return 1;
+    for (i = 0; i < 3; i++) r[i] = p[i] - f->corner[0][i];
+    for (i = 0; i < 4; i++) at[i] = gs4i_dot_double(f->plane[i], r);
+    at[2] -= f->beyond;
+    for (c = 0; c < 8; c++) {
+        const double x = c * spacing, face = at[0] + x * f->plane[0][0],
+                     one = at[1] + x * f->plane[1][0], two = at[2] + x * f->plane[2][0],
+                     three = at[3] + x * f->plane[3][0], reach = fabs((double)d[c]) + f->slack;
+        double side = one > two ? one : two;
+        side = side > three ? side : three;
+        side = side > 0 ? side : 0;
+        nearer |= face * face + side * side < reach * reach;
+    }
+    return nearer;
+}
+
+/* --- sampled distance of a mesh --------------------------------------------------------------- */
+
+/* First and last sample of the window that is, along `axis`, in the box of the triangle or `margin`
+ * (m) around it. */
+static void gs4i_field_range(const gs4i_field *f, const gs4i_facet *t, int axis, double margin,
                              int range[2])
 {
-    const double low = fmin(corner[0][axis], fmin(corner[1][axis], corner[2][axis])),
-                 high = fmax(corner[0][axis], fmax(corner[1][axis], corner[2][axis]));
-    range[0] = (int)ceil((low - margin - f->low[axis]) / f->spacing);
-    range[1] = (int)floor((high + margin - f->low[axis]) / f->spacing);
-    if (range[0] < 0) range[0] = 0;
-    if (range[1] > f->n[axis] - 1) range[1] = f->n[axis] - 1;
+    const double first = 8 * f->first[axis], last = first + 8 * f->blocks[axis] - 1;
+    range[0] =
+        (int)fmin(fmax(ceil((t->low[axis] - margin - f->low[axis]) / f->spacing), first), last + 1);
+    range[1] = (int)fmax(fmin(floor((t->high[axis] + margin - f->low[axis]) / f->spacing), last),
+                         first - 1);
 }
 
-/* Samples within `band` of a triangle learn how far it is. */
-static void gs4i_field_approach(gs4i_field *f, double corner[3][3])
+static void gs4i_field_place(const gs4i_field *f, double i, double j, double k, double p[3])
 {
-    int x[2], y[2], z[2], i, j, k;
-    gs4i_field_range(f, corner, 0, f->band, x);
-    gs4i_field_range(f, corner, 1, f->band, y);
-    gs4i_field_range(f, corner, 2, f->band, z);
-    for (k = z[0]; k <= z[1]; k++)
-        for (j = y[0]; j <= y[1]; j++)
-            for (i = x[0]; i <= x[1]; i++) {
-                gs4_real *d = gs4i_field_row(f, j, k) + i;
-                const double p[3] = { f->low[0] + i * f->spacing, f->low[1] + j * f->spacing,
-                                      f->low[2] + k * f->spacing };
-                const double r2 = gs4i_triangle_distance2(p, corner[0], corner[1], corner[2]);
-                if (r2 < (double)*d * (double)*d) *d = GS4I_C(sqrt(r2));
+    p[0] = f->low[0] + i * f->spacing;
+    p[1] = f->low[1] + j * f->spacing;
+    p[2] = f->low[2] + k * f->spacing;
+}
+
+/* Has the block that begins at sample i, j, k one within `band` of the triangle? */
+static int gs4i_field_block_is_near(const gs4i_field *f, const gs4i_facet *t, int i, int j, int k)
+{
+    double midst[3];
+    gs4i_field_place(f, i + 3.5, j + 3.5, k + 3.5, midst);
+    return gs4i_facet_is_near(t, midst, f->band + 3.5 * sqrt(3.0) * f->spacing);
+}
+
+/* Blocks near a triangle will have samples. */
+static void gs4i_field_mark(gs4i_field *f, const gs4i_facet *t)
+{
+    int range[3][2], i, j, k, a;
+    for (a = 0; a < 3; a++) gs4i_field_range(f, t, a, f->band, range[a]);
+    if (range[0][0] > range[0][1]) return;
+    for (k = range[2][0] & ~7; k <= range[2][1]; k += 8)
+        for (j = range[1][0] & ~7; j <= range[1][1]; j += 8)
+            for (i = range[0][0] & ~7; i <= range[0][1]; i += 8) {
+                int32_t *block = &f->block[gs4i_field_block_of(f, i, j, k)];
+                if (*block < 0 && gs4i_field_block_is_near(f, t, i, j, k)) *block = 0;
             }
 }
 
-/* Does the line along x at (y, z) cross triangle t? Then where. Of two triangles that share an
- * edge it crosses one. */
-static int gs4i_mesh_crossing(const gs4_shape *s, int t, double q[3][3], double y, double z,
-                              double *x)
+/* Samples of the block that begins at sample `at` learn how far the triangle is, if that is less:
+ * those of the rows in `range`. */
+static void gs4i_field_approach_block(const gs4i_field *f, const gs4i_facet *t, int32_t block,
+                                      const int at[3], int range[3][2])
 {
-    const int *v = s->triangles + 3 * (size_t)t;
-    const int side = gs4i_edge_side(s, v[0], v[1], y, z);
-    double area, w1, w2;
-    if (side != gs4i_edge_side(s, v[1], v[2], y, z) || side != gs4i_edge_side(s, v[2], v[0], y, z))
-        return 0;
-    area = (q[1][1] - q[0][1]) * (q[2][2] - q[0][2]) - (q[2][1] - q[0][1]) * (q[1][2] - q[0][2]);
-    if (area == 0) return 0;
-    w1 = ((y - q[0][1]) * (q[2][2] - q[0][2]) - (q[2][1] - q[0][1]) * (z - q[0][2])) / area;
-    w2 = ((q[1][1] - q[0][1]) * (z - q[0][2]) - (y - q[0][1]) * (q[1][2] - q[0][2])) / area;
-    *x = q[0][0] + w1 * (q[1][0] - q[0][0]) + w2 * (q[2][0] - q[0][0]);
-    return 1;
+    int j, k, c;
+    for (k = at[2]; k < at[2] + 8; k++)
+        for (j = at[1]; j < at[1] + 8; j++) {
+            gs4_real *d = gs4i_field_sample(f, block, at[0], j, k);
+            double p[3], r2;
+            gs4i_field_place(f, at[0], j, k, p);
+            if (k < range[2][0] || k > range[2][1] || j < range[1][0] || j > range[1][1]
+                || !gs4i_facet_is_nearer(t, p, f->spacing, d))
+                continue;
+            for (c = 0; c < 8; c++) {
+                const double now = fabs((double)d[c]);
+                gs4i_field_place(f, at[0] + c, j, k, p);
+                if (!gs4i_facet_is_near(t, p, now)) continue;
+                r2 = gs4i_facet_distance2(t, p);
+                if (r2 < now * now) d[c] = GS4I_C(d[c] < 0 ? -sqrt(r2) : sqrt(r2));
+            }
+        }
 }
 
-/* Each crossing turns the sign of all samples of its row behind it. */
-static void gs4i_field_turn_signs(gs4i_field *f, const gs4_shape *s, int t, double corner[3][3])
+static void gs4i_field_approach(const gs4i_field *f, const gs4i_facet *t)
 {
-    int y[2], z[2], i, j, k;
-    double x;
-    gs4i_field_range(f, corner, 1, f->spacing, y);
-    gs4i_field_range(f, corner, 2, f->spacing, z);
+    int range[3][2], at[3], a;
+    for (a = 0; a < 3; a++) gs4i_field_range(f, t, a, f->band, range[a]);
+    if (range[0][0] > range[0][1]) return;
+    for (at[2] = range[2][0] & ~7; at[2] <= range[2][1]; at[2] += 8)
+        for (at[1] = range[1][0] & ~7; at[1] <= range[1][1]; at[1] += 8)
+            for (at[0] = range[0][0] & ~7; at[0] <= range[0][1]; at[0] += 8) {
+                const int32_t block = f->block[gs4i_field_block_of(f, at[0], at[1], at[2])];
+                if (block >= 0 && gs4i_field_block_is_near(f, t, at[0], at[1], at[2]))
+                    gs4i_field_approach_block(f, t, block, at, range);
+            }
+}
+
+/* By how much does the winding number grow along x where the line at (y, z) crosses the triangle,
+ * and where is that? It is minus the winding number of its projection: edges that cross the ray
+ * from (y, z) to large y. What an edge adds depends on its ends alone, so that a closed mesh adds
+ * up to 0 on every line, whatever is rounded. */
+static int gs4i_facet_crossing(const gs4i_facet *t, double y, double z, double *x)
+{
+    double at_x[2] = { 0, 0 }, at_y[2] = { 0, 0 }; /* of the edges at z: beyond y, and not */
+    int i, winding = 0;
+    for (i = 0; i < 3; i++) {
+        const double *from = t->corner[i], *to = t->corner[(i + 1) % 3];
+        const int rises = to[2] > z;
+        const double *low = rises ? from : to, *high = rises ? to : from;
+        double along;
+        int side;
+        if (rises == (from[2] > z)) continue;
+        along = (z - low[2]) / (high[2] - low[2]);
+        side = (low[1] - y) * (high[2] - z) - (high[1] - y) * (low[2] - z) > 0;
+        at_x[side] = low[0] + along * (high[0] - low[0]);
+        at_y[side] = low[1] + along * (high[1] - low[1]);
+        if (side) winding += rises ? 1 : -1;
+    }
+    if (winding == 0) return 0;
+    *x = at_x[0];
+    if (at_y[1] > at_y[0])
+        *x += fmax(0, fmin((y - at_y[0]) / (at_y[1] - at_y[0]), 1)) * (at_x[1] - at_x[0]);
+    return -winding;
+}
+
+/* The changes of the winding number along x, of each sample to the one before it, as `distance`;
+ * of the first ones of the window as `rows`. */
+static void gs4i_field_count_crossings(const gs4i_field *f, const gs4i_facet *t, int32_t *rows)
+{
+    const int first = 8 * f->first[0], end = first + 8 * f->blocks[0];
+    int y[2], z[2], j, k, grows;
+    double p[3], x;
+    gs4i_field_range(f, t, 1, f->spacing, y);
+    gs4i_field_range(f, t, 2, f->spacing, z);
     for (k = z[0]; k <= z[1]; k++)
         for (j = y[0]; j <= y[1]; j++) {
-            gs4_real *d = gs4i_field_row(f, j, k);
-            if (!gs4i_mesh_crossing(s, t, corner, f->low[1] + j * f->spacing,
-                                    f->low[2] + k * f->spacing, &x))
-                continue;
-            i = (int)ceil((x - f->low[0]) / f->spacing);
-            for (i = i < 0 ? 0 : i; i < f->n[0]; i++) d[i] = -d[i];
+            gs4i_field_place(f, 0, j, k, p);
+            grows = gs4i_facet_crossing(t, p[1], p[2], &x);
+            x = ceil((x - p[0]) / f->spacing);
+            if (!grows || x >= end) continue;
+            if (x <= first)
+                rows[(k - 8 * f->first[2]) * 8 * f->blocks[1] + j - 8 * f->first[1]] += grows;
+            else {
+                const int i = (int)x;
+                const int32_t block = f->block[gs4i_field_block_of(f, i, j, k)];
+                *gs4i_field_sample(f, block, i, j, k) += GS4I_C(grows);
+            }
         }
 }
 
-/* Distances exact within `band` of the surface, +-band beyond. */
-static void gs4i_field_sample(gs4i_field *f, const gs4_shape *s)
+/* Changes of winding numbers along a row become signs of `band`. Returns a sample where the number
+ * is negative at two side by side, or -1: less may be rounding where surfaces touch. */
+static int gs4i_field_sweep(gs4i_field *f, int j, int k, int winding)
 {
-    double corner[3][3];
-    int t, pass, i;
-    size_t e;
-    for (e = 0; e < f->count; e++) f->distance[e] = GS4I_C(f->band);
-    for (pass = 0; pass < 2; pass++)
-        for (t = 0; t < s->triangle_count; t++) {
-            for (i = 0; i < 3; i++) gs4i_mesh_corner(s, 3 * (size_t)t + (size_t)i, corner[i]);
-            if (pass == 0)
-                gs4i_field_approach(f, corner);
-            else
-                gs4i_field_turn_signs(f, s, t, corner);
-        }
-}
-
-#define GS4I_FIELD_BYTES \
-    12e6 /* of the samples of a mesh, at most; chosen: 144^3 of them in float */
-
-static double gs4i_field_bytes(const double size[3], double spacing)
-{
-    return (size[0] / spacing + 14) * (size[1] / spacing + 14) * (size[2] / spacing + 14)
-           * (double)sizeof(gs4_real);
-}
-
-/* Sample the mesh `s` every `spacing` (m), coarser where that would be too much, and seven samples
- * around it. */
-static int gs4i_field_create(gs4i_memory *m, gs4i_field *f, const gs4_shape *s, double spacing)
-{
-    gs4_vec3 low, high;
-    double size[3];
-    int a;
-    gs4i_shape_bounds(s, &low, &high);
-    gs4i_to_double(low, f->low);
-    gs4i_to_double(high, size);
-    for (a = 0; a < 3; a++) size[a] -= f->low[a];
-    while (gs4i_field_bytes(size, spacing) > GS4I_FIELD_BYTES) spacing *= 1.1;
-    f->spacing = spacing;
-    f->band = 6 * spacing;
-    f->count = 1;
-    for (a = 0; a < 3; a++) {
-        f->low[a] -= 6.49 * spacing; /* low faces of a box lie between samples */
-        f->n[a] = (int)ceil(size[a] / spacing) + 14;
-        f->count *= (size_t)f->n[a];
+    const int first = 8 * f->first[0], end = first + 8 * f->blocks[0];
+    int i, c, negative = 0, wrong = -1;
+    for (i = first; i < end; i += 8) {
+        int32_t *block = &f->block[gs4i_field_block_of(f, i, j, k)];
+        if (*block >= 0) {
+            gs4_real *d = gs4i_field_sample(f, *block, i, j, k);
+            for (c = 0; c < 8; c++) {
+                winding += (int)d[c];
+                negative = winding < 0 ? negative + 1 : 0;
+                if (negative > 1) wrong = i + c;
+                d[c] = GS4I_C(winding > 0 ? -f->band : f->band);
+            }
+        } else if (winding < 0)
+            wrong = i;
+        else if (winding > 0 && j % 8 == 0 && k % 8 == 0)
+            *block = GS4I_FIELD_INSIDE;
     }
-    f->distance = (gs4_real *)gs4i_alloc(m, f->count, sizeof *f->distance);
-    if (!f->distance) return GS4_ERROR_MEMORY;
-    gs4i_field_sample(f, s);
-    return GS4_OK;
+    return wrong;
+}
+
+/* "near (x, y, z)", and the triangle nearest to there. */
+static int gs4i_fail_inverted(gs4i_error *e, const gs4i_field *f, const gs4_shape *s,
+                              const int wrong[3])
+{
+    gs4i_text text = gs4i_begin_error(e);
+    double p[3], least = DBL_MAX;
+    int t, a, nearest = 0;
+    gs4i_field_place(f, wrong[0], wrong[1], wrong[2], p);
+    for (t = 0; t < s->triangle_count; t++) {
+        gs4i_facet facet;
+        double r2;
+        gs4i_make_facet(s, t, f->spacing, &facet);
+        r2 = gs4i_facet_distance2(&facet, p);
+        if (r2 < least) nearest = t;
+        least = fmin(least, r2);
+    }
+    gs4i_put(&text, "shape: a part of the mesh is inside out: near (");
+    for (a = 0; a < 3; a++) {
+        gs4i_put_real(&text, p[a]);
+        gs4i_put(&text, a < 2 ? ", " : "), where triangle ");
+    }
+    gs4i_put_integer(&text, nearest);
+    gs4i_put(&text, " is, its triangles face inwards; swap two vertices of each of that part");
+    return gs4i_end_error(e, GS4_ERROR_ARGUMENT);
 }
 
 static void gs4i_field_free(gs4i_memory *m, gs4i_field *f)
 {
-    gs4i_free(m, f->distance, f->count, sizeof *f->distance);
+    gs4i_free(m, f->block, (size_t)f->blocks[0] * (size_t)f->blocks[1] * (size_t)f->blocks[2],
+              sizeof *f->block);
+    gs4i_free(m, f->distance, (size_t)f->count * GS4I_FIELD_BLOCK, sizeof *f->distance);
+    f->block = NULL;
     f->distance = NULL;
+}
+
+/* The samples of a window that is open. */
+static int gs4i_field_sample_mesh(gs4i_error *e, gs4i_memory *m, gs4i_field *f, const gs4_shape *s)
+{
+    const int width = 8 * f->blocks[1], depth = 8 * f->blocks[2];
+    int32_t *rows = (int32_t *)gs4i_alloc(m, (size_t)width * (size_t)depth, sizeof *rows);
+    gs4i_facet facet;
+    int t, i, wrong[3] = { -1, 0, 0 };
+    f->distance =
+        (gs4_real *)gs4i_alloc(m, (size_t)f->count * GS4I_FIELD_BLOCK, sizeof *f->distance);
+    for (t = 0; rows && f->distance && t < s->triangle_count; t++) {
+        gs4i_make_facet(s, t, f->spacing, &facet);
+        gs4i_field_count_crossings(f, &facet, rows);
+    }
+    for (i = 0; rows && f->distance && i < width * depth && wrong[0] < 0; i++) {
+        wrong[1] = 8 * f->first[1] + i % width;
+        wrong[2] = 8 * f->first[2] + i / width;
+        wrong[0] = gs4i_field_sweep(f, wrong[1], wrong[2], rows[i]);
+    }
+    gs4i_free(m, rows, (size_t)width * (size_t)depth, sizeof *rows);
+    if (!rows || !f->distance || wrong[0] >= 0) {
+        const int code = wrong[0] >= 0 ? gs4i_fail_inverted(e, f, s, wrong) : gs4i_fail_memory(e);
+        gs4i_field_free(m, f);
+        return code;
+    }
+    /* in an order in which neighbours are far apart: few are nearer than all before */
+    for (t = i = 0; i < s->triangle_count; i++) {
+        gs4i_make_facet(s, t, f->spacing, &facet);
+        gs4i_field_approach(f, &facet);
+        t = (int)((t + (int64_t)2654435761) % s->triangle_count);
+    }
+    return GS4_OK;
+}
+
+/* --- the part of a mesh that the domain meets ------------------------------------------------- */
+
+/* Bytes of the samples of a body at most; of all of a body that moves, or of more than two a cell,
+ * at most: chosen */
+#define GS4I_FIELD_MOST 1e9
+#define GS4I_FIELD_WHOLE 32e6
+/* cells around the domain where distances are asked for: a particle within 3 cells of a surface has
+ * an image as far behind it, and was moved by 2 before */
+#define GS4I_FIELD_MARGIN 10
+#define GS4I_FIELD_AHEAD 8 /* cells by which a body may move until it is sampled anew; chosen */
+
+/* The window that the domain and so many cells around it can reach. */
+static void gs4i_field_reach(const gs4i_collider *b, const gs4i_grid *g, double cells, int first[3],
+                             int last[3])
+{
+    const gs4i_field *f = &b->field;
+    const double h = (double)g->h;
+    double origin[3], pivot[3], low[3], high[3];
+    int corner, a, c;
+    gs4i_to_double(g->origin, origin);
+    gs4i_to_double(b->is.pivot, pivot);
+    for (corner = 0; corner < 8; corner++)
+        for (a = 0; a < 3; a++) {
+            double x = pivot[a];
+            for (c = 0; c < 3; c++)
+                x +=
+                    (double)b->axes[3 * c + a]
+                    * (origin[c] + (corner >> c & 1 ? g->cells[c] + cells : -cells) * h - b->at[c]);
+            x = floor((x - f->low[a]) / f->spacing);
+            low[a] = corner ? fmin(low[a], x) : x;
+            high[a] = corner ? fmax(high[a], x) : x;
+        }
+    for (a = 0; a < 3; a++) {
+        first[a] = (int)fmax(0, fmin(low[a], f->n[a] - 2)) / 8;
+        last[a] = (int)fmax(1, fmin(high[a] + 1, f->n[a] - 1)) / 8;
+    }
+}
+
+/* Open a window and find its blocks near the surface. The bytes that it takes, with those of
+ * samples; where they are more than `most` it is closed again. -1: out of memory. */
+static double gs4i_field_open(gs4i_memory *m, gs4i_field *f, const gs4_shape *s, const int first[3],
+                              const int last[3], double most)
+{
+    double bytes = sizeof *f->block;
+    size_t i, blocks = 1;
+    int a, t;
+    for (a = 0; a < 3; a++) {
+        f->first[a] = first[a];
+        f->blocks[a] = last[a] - first[a] + 1;
+        bytes *= f->blocks[a];
+    }
+    bytes += 64 * sizeof(int32_t) * (double)f->blocks[1] * f->blocks[2]; /* rows */
+    if (bytes > most) return bytes;
+    for (a = 0; a < 3; a++) blocks *= (size_t)f->blocks[a];
+    f->block = (int32_t *)gs4i_alloc(m, blocks, sizeof *f->block);
+    if (!f->block) return -1;
+    for (i = 0; i < blocks; i++) f->block[i] = GS4I_FIELD_OUTSIDE;
+    for (t = 0; t < s->triangle_count; t++) {
+        gs4i_facet facet;
+        gs4i_make_facet(s, t, f->spacing, &facet);
+        gs4i_field_mark(f, &facet);
+    }
+    for (f->count = 0, i = 0; i < blocks; i++)
+        if (f->block[i] >= 0) f->block[i] = f->count++;
+    bytes += (double)f->count * GS4I_FIELD_BLOCK * sizeof *f->distance;
+    if (bytes > most) gs4i_field_free(m, f);
+    return bytes;
+}
+
+/* Open the window for a body where it is: of all of it where it moves and that is little; else of
+ * what the domain reaches, and may reach soon. */
+static double gs4i_field_open_for(gs4i_memory *m, gs4i_collider *b, const gs4i_grid *g, double most)
+{
+    const int moves = gs4i_length(b->is.velocity) > 0 || gs4i_length(b->is.angular_velocity) > 0;
+    gs4i_field *f = &b->field;
+    int first[3] = { 0, 0, 0 }, last[3], a;
+    double bytes;
+    for (a = 0; a < 3; a++) last[a] = (f->n[a] - 1) / 8;
+    if (moves) {
+        bytes = gs4i_field_open(m, f, &b->is.shape, first, last, GS4I_FIELD_WHOLE);
+        if (bytes <= GS4I_FIELD_WHOLE) return bytes;
+    }
+    gs4i_field_reach(b, g, GS4I_FIELD_MARGIN + (moves ? GS4I_FIELD_AHEAD : 0), first, last);
+    return gs4i_field_open(m, f, &b->is.shape, first, last, most);
+}
+
+static int gs4i_fail_window(gs4i_error *e, double bytes)
+{
+    if (bytes < 0) return gs4i_fail_memory(e);
+    return gs4i_fail_value(e, GS4_ERROR_MEMORY,
+                           "shape: distances to the surface of the mesh in the domain, two a cell, "
+                           "would take ",
+                           bytes, " bytes, above 1e9; use larger cells or a smaller mesh");
+}
+
+/* Samples `spacing` (m) apart, and seven around the mesh. */
+static void gs4i_field_lay(gs4i_field *f, const gs4_shape *s, double spacing)
+{
+    double high[3];
+    int a;
+    gs4i_to_double(s->a, f->low);
+    gs4i_to_double(s->b, high);
+    f->spacing = spacing;
+    f->band = 6 * spacing;
+    for (a = 0; a < 3; a++) {
+        f->n[a] = (int)ceil((high[a] - f->low[a]) / spacing) + 14;
+        f->low[a] -= 6.49 * spacing; /* low faces of a box lie between samples */
+    }
+}
+
+/* Sample the mesh of a body every `spacing` (m), at least twice a cell; coarser down to that where
+ * it would be too much. */
+static int gs4i_field_create(gs4i_error *e, gs4i_memory *m, gs4i_collider *b, const gs4i_grid *g,
+                             double spacing)
+{
+    const gs4_shape *s = &b->is.shape;
+    const gs4_vec3 size = gs4i_sub(s->b, s->a);
+    const double half = 0.5 * (double)g->h,
+                 extent = (double)gs4i_max(size.x, gs4i_max(size.y, size.z));
+    double bytes, most;
+    GS4I_TRY(gs4i_require_value(e, extent < 1e9 * half, "shape: the mesh extends over ", extent,
+                                " m; above 5e8 cells there is no telling where it is"));
+    spacing = fmax(fmin(spacing, half), 1e-9 * extent);
+    for (;;) {
+        gs4i_field_lay(&b->field, s, spacing);
+        most = spacing < half ? GS4I_FIELD_WHOLE : GS4I_FIELD_MOST;
+        bytes = gs4i_field_open_for(m, b, g, most);
+        if (bytes >= 0 && bytes <= most) break;
+        if (bytes < 0 || spacing >= half) return gs4i_fail_window(e, bytes);
+        spacing = fmin(1.1 * spacing, half);
+    }
+    return gs4i_field_sample_mesh(e, m, &b->field, s);
+}
+
+/* Sample anew where the domain has come to the end of what is sampled of a mesh. */
+static int gs4i_field_follow(gs4i_error *e, gs4i_memory *m, gs4i_collider *b, const gs4i_grid *g)
+{
+    const gs4i_field *f = &b->field;
+    int first[3], last[3], a, is_within = f->distance != NULL;
+    double bytes;
+    if (b->is.shape.kind != GS4_SHAPE_MESH) return GS4_OK;
+    gs4i_field_reach(b, g, GS4I_FIELD_MARGIN, first, last);
+    for (a = 0; a < 3; a++)
+        is_within = is_within && first[a] >= f->first[a] && last[a] < f->first[a] + f->blocks[a];
+    if (is_within) return GS4_OK;
+    gs4i_field_free(m, &b->field);
+    bytes = gs4i_field_open_for(m, b, g, GS4I_FIELD_MOST);
+    if (bytes < 0 || bytes > GS4I_FIELD_MOST) return gs4i_fail_window(e, bytes);
+    return gs4i_field_sample_mesh(e, m, &b->field, &b->is.shape);
 }
 
 /* --- images of the walls ---------------------------------------------------------------------- */
@@ -12877,10 +13373,9 @@ static int gs4i_make_collider(gs4_sim *sim, gs4i_collider *b, const gs4_collider
     gs4i_to_double(is->pivot, b->at);
     b->turn[0] = 1;
     gs4i_collider_orient(b);
-    if (is->shape.kind == GS4_SHAPE_MESH
-        && gs4i_field_create(&sim->memory, &b->field, &is->shape, spacing) != GS4_OK)
-        return gs4i_fail_memory(&sim->error);
-    return GS4_OK;
+    return is->shape.kind == GS4_SHAPE_MESH
+               ? gs4i_field_create(&sim->error, &sim->memory, b, &sim->grid, spacing)
+               : GS4_OK;
 }
 
 /* All points of a filling, checked for overlap, into a list that the caller frees. How many, or
@@ -13507,9 +14002,10 @@ static int gs4i_find_spin(gs4_sim *sim, gs4i_node_pass *nodes)
     return result;
 }
 
-/* Rule (4) for this step, and room for what emitters will give. */
+/* Rule (4) for this step, meshes where they are now, and room for what emitters will give. */
 static int gs4i_begin_step(gs4_sim *sim, gs4_real dt, gs4i_node_pass *nodes)
 {
+    int i;
     memset(nodes, 0, sizeof *nodes);
     nodes->sim = sim;
     nodes->lightest = gs4i_max(sim->min_mass * GS4I_EPSILON * GS4I_EPSILON, GS4I_TINY);
@@ -13517,6 +14013,9 @@ static int gs4i_begin_step(gs4_sim *sim, gs4_real dt, gs4i_node_pass *nodes)
     sim->integrator = gs4i_make_integrator(sim, dt);
     sim->heat_integrator = gs4i_make_heat_integrator(sim);
     sim->bad_distance = 0;
+    for (i = 0; i < sim->boundary.collider_count; i++)
+        GS4I_TRY(
+            gs4i_field_follow(&sim->error, &sim->memory, &sim->boundary.colliders[i], &sim->grid));
     GS4I_TRY(gs4i_prepare_emitters(sim, (double)dt));
     return gs4i_check_distances(sim);
 }
@@ -14951,6 +15450,8 @@ static int gs4i_check_collider(gs4_sim *sim, gs4_collider *c)
 {
     gs4i_error *e = &sim->error;
     GS4I_TRY(gs4i_check_shape(e, &sim->memory, &c->shape));
+    if (c->shape.kind == GS4_SHAPE_MESH)
+        GS4I_TRY(gs4i_check_thickness(e, &c->shape, (double)sim->grid.h));
     GS4I_TRY(gs4i_require(e, (int)c->contact >= 0 && c->contact <= GS4_WALL_SEPARATE,
                           "contact of a collider must be stick, slip or separate"));
     GS4I_TRY(gs4i_check(e, "friction", c->friction, GS4I_NOT_NEGATIVE));
@@ -16024,7 +16525,11 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_EPSILON
 #undef GS4I_EULER_SOUND_EIGENVALUE
 #undef GS4I_EULER_VISCOUS_EIGENVALUE
-#undef GS4I_FIELD_BYTES
+#undef GS4I_FIELD_AHEAD
+#undef GS4I_FIELD_BLOCK
+#undef GS4I_FIELD_MARGIN
+#undef GS4I_FIELD_MOST
+#undef GS4I_FIELD_WHOLE
 #undef GS4I_GRAPHS
 #undef GS4I_GREATER
 #undef GS4I_HUGE
@@ -16127,4 +16632,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  * CHANGES 0.1.0  the explicit scheme: GS4 and symplectic Euler, Newtonian and viscoelastic
  * liquids, solids, walls, colliders, emitters, frames, checkpoints. Checkpoints have a byte of
  * flags a node; those written before cannot be read. The rim of a collider that turns counts in the
- * stable step and in default speeds of sound. */
+ * stable step and in default speeds of sound.
+ * Meshes: sampled where the domain meets them, at half a cell whatever their size, before coarser
+ * where they were large. Parts that overlap are a union, before the overlap was empty. Parts inside
+ * out, and bodies thinner than 0.3 cells on average, are refused. */

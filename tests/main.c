@@ -15,6 +15,7 @@
 #include "test_poisson.c"
 #include "test_symmetry.c"
 #include "test_contact.c"
+#include "test_mesh.c"
 #include "test_reference.c"
 
 int main(int count, char **values)
@@ -70,6 +71,7 @@ int main(int count, char **values)
     run_poisson();
     run_symmetry();
     run_contact();
+    run_mesh();
     RUN(test_reference);
     RUN_ONCE(test_stability);
     RUN(test_stability_by_hand);

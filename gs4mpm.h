@@ -14584,7 +14584,10 @@ static int gs4i_check_head(gs4_sim *sim, const gs4i_head *h)
                          "the checkpoint belongs to a scene with other materials, colliders or "
                          "emitters: add the same ones, in the same order, before gs4_load");
     if (h->particles < 0 || h->active < 0 || h->occupied < 0 || h->particles > GS4I_MAX_PARTICLES
-        || (size_t)h->active > sim->grid.table_count || h->occupied > h->active)
+        || (size_t)h->active > sim->grid.table_count
+        || h->occupied > h->active
+        /* more bytes than size_t can say: a particle has less than 2^10, a block than 2^13 */
+        || ((uint64_t)h->particles << 10) + ((uint64_t)h->active << 13) > SIZE_MAX / 2)
         return gs4i_fail(&sim->error, GS4_ERROR_FORMAT, "the checkpoint is damaged");
     if (sim->desc.max_particles && h->particles > sim->desc.max_particles)
         return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT,
@@ -14660,6 +14663,7 @@ static int gs4i_same_scene(const gs4_sim *sim, const gs4i_pieces *p)
             || there.is.contact != here.is.contact || there.is_emitter != here.is_emitter
             || memcmp(&there.is.friction, &here.is.friction, sizeof here.is.friction)
             || memcmp(&there.is.temperature, &here.is.temperature, sizeof here.is.temperature)
+            || memcmp(&there.is.pivot, &here.is.pivot, sizeof here.is.pivot)
             || there.is.is_isothermal != here.is.is_isothermal)
             return 0;
     }
@@ -14667,40 +14671,143 @@ static int gs4i_same_scene(const gs4_sim *sim, const gs4i_pieces *p)
         gs4i_emitter there, here = sim->emitters[i];
         memcpy(&there, p->at[GS4I_PIECE_EMITTERS] + (size_t)i * sizeof there, sizeof there);
         if (memcmp(&there.is.fill, &here.is.fill, sizeof here.is.fill)
+            || memcmp(&there.is.start, &here.is.start, sizeof here.is.start)
+            || memcmp(&there.is.stop, &here.is.stop, sizeof here.is.stop)
             || there.collider != here.collider)
             return 0;
     }
     return 1;
 }
 
-/* Take materials, colliders and emitters from the file, and keep the pointers of those here:
- * callbacks and meshes cannot be saved. */
+/* Take from the file what moves of colliders and emitters. All else is that of those here: it is
+ * the same, follows from what is, or cannot be saved (callbacks and meshes). */
 static void gs4i_restore_scene(gs4_sim *sim, const gs4i_pieces *p)
 {
     int i;
-    for (i = 0; i < sim->material_count; i++) {
-        gs4i_material_constants here = sim->constants[i], *l = &sim->constants[i];
-        memcpy(l, p->at[GS4I_PIECE_CONSTANTS] + (size_t)i * sizeof *l, sizeof *l);
-        l->viscosity_fn = here.viscosity_fn;
-        l->viscosity_user = here.viscosity_user;
-        l->is.viscosity_fn = here.is.viscosity_fn;
-        l->is.viscosity_user = here.is.viscosity_user;
-        sim->solid_phase[i] = *l;
-        gs4i_set_solid_phase(&sim->solid_phase[i]);
-    }
     for (i = 0; i < sim->boundary.collider_count; i++) {
-        gs4i_collider here = sim->boundary.colliders[i], *b = &sim->boundary.colliders[i];
-        memcpy(b, p->at[GS4I_PIECE_COLLIDERS] + (size_t)i * sizeof *b, sizeof *b);
-        b->is.shape = here.is.shape;
-        b->field = here.field;
-        b->bad_distance = here.bad_distance;
+        gs4i_collider there, *b = &sim->boundary.colliders[i];
+        memcpy(&there, p->at[GS4I_PIECE_COLLIDERS] + (size_t)i * sizeof there, sizeof there);
+        b->is.velocity = there.is.velocity;
+        b->is.angular_velocity = there.is.angular_velocity;
+        b->is_off = there.is_off != 0;
+        memcpy(b->at, there.at, sizeof b->at);
+        memcpy(b->turn, there.turn, sizeof b->turn);
+        gs4i_collider_orient(b);
     }
     for (i = 0; i < sim->emitter_count; i++) {
-        const gs4_shape shape = sim->emitters[i].is.shape;
-        memcpy(&sim->emitters[i], p->at[GS4I_PIECE_EMITTERS] + (size_t)i * sizeof(gs4i_emitter),
-               sizeof(gs4i_emitter));
-        sim->emitters[i].is.shape = shape;
+        gs4i_emitter there, *e = &sim->emitters[i];
+        memcpy(&there, p->at[GS4I_PIECE_EMITTERS] + (size_t)i * sizeof there, sizeof there);
+        memcpy(e->offset, there.offset, sizeof e->offset);
+        memcpy(e->emitted_offset, there.emitted_offset, sizeof e->emitted_offset);
+        e->has_emitted = there.has_emitted != 0;
+        e->is.travel = sim->boundary.colliders[e->collider].is.velocity;
     }
+}
+
+/* Numbers of a file are checked like those of a user: it may be forged. */
+static int gs4i_are_sane(const gs4_real *v, int n)
+{
+    int i, sane = 1;
+    for (i = 0; i < n; i++) sane &= v[i] < GS4I_HUGE && v[i] > -GS4I_HUGE;
+    return sane;
+}
+
+/* Rates have more room: what changes in 1e-9 s. */
+static int gs4i_are_rates(const gs4_real *v, int n)
+{
+    const gs4_real most = GS4I_HUGE * GS4I_C(1e9);
+    int i, sane = 1;
+    for (i = 0; i < n; i++) sane &= v[i] < most && v[i] > -most;
+    return sane;
+}
+
+static int gs4i_is_place(const double at[3])
+{
+    return fabs(at[0]) < (double)GS4I_HUGE && fabs(at[1]) < (double)GS4I_HUGE
+           && fabs(at[2]) < (double)GS4I_HUGE;
+}
+
+/* Of the head: times, extremes that set the limit, flags. */
+static int gs4i_head_is_sound(const gs4i_head *h)
+{
+    const double times[5] = { h->time, h->last_dt, h->top_speed, h->min_mass, h->shift };
+    const gs4_real limits[7] = { h->limits.max_speed,     h->limits.max_gradient,
+                                 h->limits.min_J,         h->limits.max_J,
+                                 h->limits.max_viscosity, h->limits.max_sound,
+                                 h->limits.max_stiffness };
+    int i, sound = 1;
+    for (i = 0; i < 5; i++) sound &= times[i] >= 0 && times[i] < (double)GS4I_HUGE;
+    for (i = 0; i < 7; i++) sound &= limits[i] >= 0 && gs4i_finite(limits[i]);
+    return sound && (h->restart | h->needs_sort | h->limits_stale | h->needs_spin) >> 1 == 0
+           && (h->min_mass > 0 || h->particles == 0);
+}
+
+/* Of what moves. */
+static int gs4i_motions_are_sound(const gs4i_head *h, const gs4i_pieces *p)
+{
+    int i, k;
+    for (i = 0; i < h->colliders; i++) {
+        gs4i_collider b;
+        double norm = 0;
+        memcpy(&b, p->at[GS4I_PIECE_COLLIDERS] + (size_t)i * sizeof b, sizeof b);
+        for (k = 0; k < 4; k++) norm += b.turn[k] * b.turn[k];
+        if (!gs4i_is_place(b.at) || !(fabs(norm - 1) < 1e-9) || !gs4i_are_sane(&b.is.velocity.x, 1)
+            || !gs4i_are_sane(&b.is.velocity.y, 1) || !gs4i_are_sane(&b.is.velocity.z, 1)
+            || !gs4i_are_sane(&b.is.angular_velocity.x, 1)
+            || !gs4i_are_sane(&b.is.angular_velocity.y, 1)
+            || !gs4i_are_sane(&b.is.angular_velocity.z, 1))
+            return 0;
+    }
+    for (i = 0; i < h->emitters; i++) {
+        gs4i_emitter e;
+        memcpy(&e, p->at[GS4I_PIECE_EMITTERS] + (size_t)i * sizeof e, sizeof e);
+        if (!gs4i_is_place(e.offset) || !gs4i_is_place(e.emitted_offset)) return 0;
+    }
+    return 1;
+}
+
+/* Of particle i. */
+static int gs4i_particle_is_sound(const gs4_sim *sim, const gs4i_head *h, size_t i)
+{
+    const gs4i_particles *p = &sim->particles;
+    const gs4_real *x = p->position + 4 * i, *v = p->velocity + 4 * i, h1 = sim->grid.h;
+    int k, sound = p->material[i] < sim->material_count && p->id[i] < h->next_id
+                   && gs4i_is_in_domain(&sim->grid, x) && gs4i_are_sane(v, 3) && v[3] > GS4I_J_LOW
+                   && v[3] < GS4I_J_HIGH && (double)x[3] >= h->min_mass;
+    /* the largest that gs4_add_points takes */
+    sound = sound && x[3] <= 9 * h1 * h1 * h1 * sim->constants[p->material[i]].density;
+    for (k = 0; k < 3 && p->affine[k]; k++) sound &= gs4i_are_sane(p->affine[k] + 4 * i, 3);
+    if (p->with_rates) {
+        sound &= gs4i_are_rates(p->rate + 4 * i, 4);
+        for (k = 0; k < 3; k++)
+            sound &= gs4i_finite(gs4i_from_half(p->position_residual[4 * i + (size_t)k]));
+    }
+    if (p->elastic_reals)
+        sound &= gs4i_are_sane(p->elastic + (size_t)p->elastic_reals * i, 6)
+                 && gs4i_are_rates(p->elastic + (size_t)p->elastic_reals * i, p->elastic_reals);
+    if (p->deformation_reals)
+        sound &=
+            gs4i_are_sane(p->deformation + (size_t)p->deformation_reals * i, p->deformation_reals);
+    if (p->with_heat)
+        sound &= gs4i_are_sane(p->heat + 4 * i, 1) && gs4i_are_rates(p->heat + 4 * i, 4)
+                 && p->heat[4 * i + 1] >= 0 && p->heat[4 * i + 1] <= 1 && p->liquid[i] <= 1;
+    if (p->with_flux)
+        sound &= gs4i_are_sane(p->flux + 4 * i, 3) && gs4i_are_rates(p->flux_rate + 4 * i, 3);
+    return sound;
+}
+
+/* Is each number one that a simulation may hold? */
+static int gs4i_state_is_sound(const gs4_sim *next, const gs4i_head *h, const gs4i_pieces *p)
+{
+    const gs4i_grid *g = &next->grid;
+    uint32_t n, nodes = g->remembered ? (uint32_t)g->active * GS4I_BLOCK_NODES : 0;
+    size_t i;
+    if (!gs4i_head_is_sound(h) || !gs4i_motions_are_sound(h, p)) return 0;
+    for (i = 0; i < (size_t)h->particles; i++)
+        if (!gs4i_particle_is_sound(next, h, i)) return 0;
+    for (n = 0; n < nodes; n++)
+        if (!gs4i_are_rates(gs4i_of_node(g->remembered, gs4i_first_node(0) + n), 3)) return 0;
+    return 1;
 }
 
 /* Occupied blocks must be ascending, inside the domain and cover the particles in order; those
@@ -14760,10 +14867,8 @@ static int gs4i_rebuild(gs4_sim *next, const gs4i_head *h, const gs4i_pieces *p)
     for (k = 0; k < GS4I_STATE_ARRAYS; k++)
         if (a[k].wanted && h->particles)
             memcpy(*a[k].data, p->at[GS4I_PIECE_PARTICLES + k], p->size[GS4I_PIECE_PARTICLES + k]);
-    for (k = 0; k < h->particles; k++)
-        if (next->particles.material[k] >= next->material_count) return GS4_ERROR_FORMAT;
     next->particles.count = h->particles;
-    return GS4_OK;
+    return gs4i_state_is_sound(next, h, p) ? GS4_OK : GS4_ERROR_FORMAT;
 }
 
 /* What belongs to the blocks and particles of a simulation. */
@@ -14817,6 +14922,8 @@ static void gs4i_copy_without_state(const gs4_sim *sim, const gs4i_head *h, gs4_
 
 static void gs4i_restore_head(gs4_sim *sim, const gs4i_head *h)
 {
+    sim->top_speed = GS4I_C(h->top_speed);
+    gs4i_set_constants(sim);
     sim->time = h->time;
     sim->last_dt = h->last_dt;
     sim->steps = h->steps;
@@ -14829,7 +14936,6 @@ static void gs4i_restore_head(gs4_sim *sim, const gs4i_head *h)
     sim->needs_spin = h->needs_spin;
     sim->needs_check = 0;
     sim->min_mass = GS4I_C(h->min_mass);
-    sim->top_speed = GS4I_C(h->top_speed);
     sim->shift = GS4I_C(h->shift);
     sim->limits = h->limits;
 }
@@ -14845,8 +14951,10 @@ static int gs4i_restore(gs4_sim *sim, const gs4i_head *h, const gs4i_pieces *p)
         gs4i_release_state(&next);
         return result == GS4_ERROR_MEMORY
                    ? gs4i_fail_memory(&sim->error)
-                   : gs4i_fail(&sim->error, GS4_ERROR_FORMAT,
-                               "the checkpoint is damaged: its blocks are out of order");
+                   : gs4i_fail(
+                       &sim->error, GS4_ERROR_FORMAT,
+                       "the checkpoint is damaged: its blocks are out of order, or it holds "
+                       "numbers that no simulation has");
     }
     old = *sim;
     old.memory = next.memory; /* the count of bytes is with the new state */
@@ -14858,20 +14966,36 @@ static int gs4i_restore(gs4_sim *sim, const gs4i_head *h, const gs4i_pieces *p)
     return GS4_OK;
 }
 
-/* The rest of the file, of known size, with its hash; then the state. */
-static int gs4i_load_body(gs4_sim *sim, FILE *f, const gs4i_head *h, unsigned char *data,
-                          size_t size, gs4i_pieces *p)
+/* The rest of the file, which says that it has `size` bytes: memory grows with what there is. */
+static int gs4i_read_body(gs4_sim *sim, FILE *f, size_t size, gs4i_scratch *body)
+{
+    size_t have = 0, more;
+    for (; have < size; have += more) {
+        more = have ? have : (size_t)1 << 22;
+        if (more > size - have) more = size - have;
+        if (!gs4i_scratch_reserve(&sim->memory, body, have + more, have))
+            return gs4i_fail_memory(&sim->error);
+        if (fread((unsigned char *)body->data + have, 1, more, f) != more)
+            return gs4i_fail(&sim->error, ferror(f) ? GS4_ERROR_IO : GS4_ERROR_FORMAT,
+                             "the checkpoint is cut off");
+    }
+    return GS4_OK;
+}
+
+/* The same, with its hash; then the state. */
+static int gs4i_load_body(gs4_sim *sim, FILE *f, const gs4i_head *h, size_t size,
+                          gs4i_scratch *body, gs4i_pieces *p)
 {
     static const int order[] = { GS4I_PIECE_CONSTANTS, GS4I_PIECE_COLLIDERS, GS4I_PIECE_EMITTERS };
     static const int after[] = { GS4I_PIECE_OCCUPIED, GS4I_PIECE_FIRST, GS4I_PIECE_BLOCKS,
                                  GS4I_PIECE_REMEMBERED, GS4I_PIECE_FLAGS };
+    const unsigned char *data;
     uint64_t hash, stored;
     unsigned char more;
     size_t at = 0;
     int k, sequence[GS4I_PIECES], n = 0;
-    if (fread(data, 1, size, f) != size)
-        return gs4i_fail(&sim->error, ferror(f) ? GS4_ERROR_IO : GS4_ERROR_FORMAT,
-                         "the checkpoint is cut off");
+    GS4I_TRY(gs4i_read_body(sim, f, size, body));
+    data = (const unsigned char *)body->data;
     if (fread(&more, 1, 1, f) == 1)
         return gs4i_fail(&sim->error, GS4_ERROR_FORMAT,
                          "the checkpoint has something behind its end");
@@ -14900,8 +15024,7 @@ static int gs4i_load(gs4_sim *sim, const char *path)
 {
     gs4i_head h;
     gs4i_pieces p;
-    unsigned char *data;
-    size_t size;
+    gs4i_scratch body = { NULL, 0 };
     FILE *f;
     int result;
     if (!path || !*path) return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT, "path is empty");
@@ -14917,16 +15040,10 @@ static int gs4i_load(gs4_sim *sim, const char *path)
                                  "the checkpoint is cut off, or no checkpoint at all");
     else
         result = gs4i_check_head(sim, &h);
-    if (result == GS4_OK) {
-        size = gs4i_piece_sizes(sim, &h, &p) + sizeof(uint64_t);
-        data = (unsigned char *)gs4i_alloc(&sim->memory, size, 1);
-        if (!data)
-            result = gs4i_fail_memory(&sim->error);
-        else {
-            result = gs4i_load_body(sim, f, &h, data, size, &p);
-            gs4i_free(&sim->memory, data, size, 1);
-        }
-    }
+    if (result == GS4_OK)
+        result =
+            gs4i_load_body(sim, f, &h, gs4i_piece_sizes(sim, &h, &p) + sizeof(uint64_t), &body, &p);
+    gs4i_free(&sim->memory, body.data, body.bytes, 1);
     fclose(f);
     return result;
 }

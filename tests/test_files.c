@@ -1064,6 +1064,165 @@ static void test_files_damaged(void)
     }
 }
 
+/* Where the pieces of a checkpoint of `sim` are, in its order, and how large: as gs4i_save writes
+ * them. Returns how many there are. */
+static int files_pieces(gs4_sim *sim, const unsigned char *data, size_t at[], size_t size[])
+{
+    const int behind[5] = { GS4I_PIECE_OCCUPIED, GS4I_PIECE_FIRST, GS4I_PIECE_BLOCKS,
+                            GS4I_PIECE_REMEMBERED, GS4I_PIECE_FLAGS };
+    size_t next = sizeof(gs4i_head);
+    gs4i_pieces p;
+    gs4i_head h;
+    int k, n = 0;
+    memcpy(&h, data, sizeof h);
+    gs4i_piece_sizes(sim, &h, &p);
+    for (k = 0; k < 3 + GS4I_STATE_ARRAYS + 5; k++, n++) {
+        size[n] = p.size[k < 3                       ? k
+                         : k < 3 + GS4I_STATE_ARRAYS ? GS4I_PIECE_PARTICLES + k - 3
+                                                     : behind[k - 3 - GS4I_STATE_ARRAYS]];
+        at[n] = next;
+        next += size[n];
+    }
+    return n;
+}
+
+/* The checksum that the contents have now. */
+static void files_sign(gs4_sim *sim, unsigned char *data)
+{
+    size_t at[64], size[64];
+    uint64_t hash = gs4i_hash_bytes(0, data, sizeof(gs4i_head));
+    const int n = files_pieces(sim, data, at, size);
+    int k;
+    for (k = 0; k < n; k++) hash = gs4i_hash_bytes(hash, data + at[k], size[k]);
+    memcpy(data + at[n - 1] + size[n - 1], &hash, sizeof hash);
+}
+
+/* `bytes` of a good checkpoint are others, under a right checksum: refused. */
+static void files_forge(gs4_sim *to, unsigned char *data, size_t whole, size_t where,
+                        const void *with, size_t bytes, const char *what)
+{
+    unsigned char before[8], checksum[8];
+    memcpy(before, data + where, bytes);
+    memcpy(checksum, data + whole - 8, 8);
+    memcpy(data + where, with, bytes);
+    files_sign(to, data);
+    files_reject(to, gs4_state_hash(to), data, whole, what, where);
+    memcpy(data + where, before, bytes);
+    memcpy(data + whole - 8, checksum, 8);
+}
+
+/* A bad number in place of each real of the first, a middle and the last particle, of nodes, of
+ * what moves and of the head. */
+static void test_files_forged(void)
+{
+    const gs4_real bad[] = { (gs4_real)ERR_NAN, (gs4_real)ERR_INFINITY, (gs4_real)-ERR_INFINITY };
+    const double wrong[] = { ERR_NAN, ERR_INFINITY, -1e200 };
+    const gs4_real far_away = (gs4_real)1e9;
+    const uint8_t seven = 7;
+    int euler;
+    for (euler = 0; euler < 2; euler++) {
+        static const int whole_numbers[3] = { 7, 8, 13 }; /* ids, materials, liquid or solid */
+        size_t at[64], size[64], bytes = 0, i;
+        gs4_sim *sim, *to;
+        unsigned char *data;
+        int n, k, v;
+        files_warm = 1;
+        sim = files_small(euler, 12);
+        to = files_small(euler, 5);
+        CHECK_RESULT(sim, gs4_save(sim, files_path("f.sav")), 0);
+        data = files_read(files_path("f.sav"), &bytes);
+        n = files_pieces(sim, data, at, size);
+        CHECK(at[n - 1] + size[n - 1] + 8 == bytes && sim->particles.heat && sim->emitter_count
+              && sim->particles.elastic && sim->particles.deformation && sim->particles.flux);
+        for (k = 0; k < GS4I_STATE_ARRAYS; k++) {
+            const size_t count = (size_t)sim->particles.count, each = size[3 + k] / count;
+            const size_t real = k == 6 ? sizeof(gs4i_half) : sizeof(gs4_real);
+            int whole = 0, which;
+            for (i = 0; i < 3; i++) whole |= k == whole_numbers[i];
+            for (which = 0; which < 3 && !whole && size[3 + k]; which++)
+                for (i = 0; i + real <= each; i += real)
+                    for (v = 0; v < 3; v++) {
+                        gs4i_half half = gs4i_to_half(bad[v]);
+                        const size_t where =
+                            at[3 + k] + each * ((count - 1) * (size_t)which / 2) + i;
+                        /* rows of four with three numbers */
+                        if (i == 3 * real && (k < 3 || k == 6 || k == 11 || k == 12)) continue;
+                        files_forge(to, data, bytes, where,
+                                    k == 6 ? (const void *)&half : (const void *)&bad[v], real,
+                                    "particle");
+                    }
+        }
+        files_forge(to, data, bytes, at[3 + 3], &far_away, sizeof far_away, "position");
+        files_forge(to, data, bytes, at[3 + 3] + 3 * sizeof far_away, &far_away, sizeof far_away,
+                    "mass");
+        files_forge(to, data, bytes, at[3 + 4] + 3 * sizeof far_away, &far_away, sizeof far_away,
+                    "J");
+        files_forge(to, data, bytes, at[3 + 8], &seven, 1, "material");
+        files_forge(to, data, bytes, at[3 + 13], &seven, 1, "liquid");
+        for (v = 0; v < 3 && !euler; v++)
+            files_forge(to, data, bytes, at[n - 2] + size[n - 2] / 2, &bad[v], sizeof bad[v],
+                        "node");
+        for (v = 0; v < 3; v++) {
+            files_forge(to, data, bytes, at[1] + offsetof(gs4i_collider, at), &wrong[v], 8, "at");
+            files_forge(to, data, bytes, at[1] + offsetof(gs4i_collider, turn), &wrong[v], 8,
+                        "turn");
+            files_forge(to, data, bytes, at[1] + offsetof(gs4i_collider, is.velocity), &bad[v],
+                        sizeof bad[v], "velocity");
+            files_forge(to, data, bytes, at[1] + offsetof(gs4i_collider, is.angular_velocity),
+                        &bad[v], sizeof bad[v], "angular velocity");
+            files_forge(to, data, bytes, at[2] + offsetof(gs4i_emitter, offset), &wrong[v], 8,
+                        "offset");
+            files_forge(to, data, bytes, offsetof(gs4i_head, time), &wrong[v], 8, "time");
+            files_forge(to, data, bytes, offsetof(gs4i_head, last_dt), &wrong[v], 8, "last dt");
+            files_forge(to, data, bytes, offsetof(gs4i_head, min_mass), &wrong[v], 8, "mass");
+            files_forge(to, data, bytes, offsetof(gs4i_head, top_speed), &wrong[v], 8, "speed");
+            files_forge(to, data, bytes, offsetof(gs4i_head, shift), &wrong[v], 8, "shift");
+            files_forge(to, data, bytes, offsetof(gs4i_head, limits.max_speed), &bad[v],
+                        sizeof bad[v], "limit");
+        }
+        free(data);
+        gs4_destroy(sim);
+        gs4_destroy(to);
+        remove(files_path("f.sav"));
+        files_warm = 0;
+    }
+}
+
+/* Any number of a checkpoint is a bad one, under a right checksum: refused, or it goes on with
+ * finite numbers. What materials have become does not come from the file. */
+static void test_files_forged_anywhere(void)
+{
+    const uint32_t patterns[] = { 0x7fc00000u, 0x7f800000u, 0xff800000u, 0x60ad78ecu,
+                                  0xffffffffu, 0x7fffffffu, 0x00000001u, 0xbf800000u };
+    int euler;
+    for (euler = 0; euler < 2; euler++) {
+        size_t bytes = 0, where;
+        gs4_sim *sim;
+        unsigned char *data;
+        files_warm = 1;
+        sim = files_small(euler, 12);
+        CHECK_RESULT(sim, gs4_save(sim, files_path("g.sav")), 0);
+        data = files_read(files_path("g.sav"), &bytes);
+        for (where = 0; where + 12 <= bytes; where += where < 9000 ? (test_full ? 4 : 92) : 484) {
+            const uint32_t pattern = patterns[gs4i_mix(where) % 8];
+            unsigned char before[4];
+            memcpy(before, data + where, 4);
+            memcpy(data + where, &pattern, 4);
+            if (where >= sizeof(gs4i_head)) files_sign(sim, data);
+            files_write(files_path("h.sav"), data, bytes);
+            if (gs4_load(sim, files_path("h.sav")) == GS4_OK)
+                err_report(err_goes_on(sim), "checkpoint", "byte", (double)where, 0,
+                           gs4_last_error(sim));
+            memcpy(data + where, before, 4);
+        }
+        free(data);
+        gs4_destroy(sim);
+        remove(files_path("g.sav"));
+        remove(files_path("h.sav"));
+        files_warm = 0;
+    }
+}
+
 /* Something endless is no checkpoint; that can be seen before it is read whole. */
 static void test_files_endless(void)
 {
@@ -1083,6 +1242,20 @@ static void test_files_endless(void)
     CHECK(m.most < 2000000);
     if (m.most < 2000000 && files_exists("/dev/zero"))
         CHECK_RESULT(sim, gs4_load(sim, "/dev/zero"), GS4_ERROR_FORMAT);
+    gs4_destroy(sim);
+    /* a file that is short says that it is long */
+    CHECK(gs4_create(&d, &sim) == GS4_OK);
+    CHECK_RESULT(sim, gs4_save(sim, files_path("junk")), 0);
+    {
+        size_t size, at_byte = offsetof(gs4i_head, particles);
+        unsigned char *data = files_read(files_path("junk"), &size);
+        data[at_byte + 3] = 0x3f; /* 2^30 particles */
+        if (*(const uint16_t *)(const void *)"\1" == 1) files_write(files_path("junk"), data, size);
+        free(data);
+    }
+    m.most = 0;
+    CHECK_RESULT(sim, gs4_load(sim, files_path("junk")), GS4_ERROR_FORMAT);
+    CHECK(m.most < 10000000);
     free(junk);
     remove(files_path("junk"));
     gs4_destroy(sim);
@@ -1182,6 +1355,9 @@ static gs4_sim *files_variant(int which)
     e.shape = which == 8 ? gs4_sphere(at(0.5, 0.5, 0.8), (gs4_real)0.1)
                          : gs4_box(at(0.4, 0.4, 0.7), at(0.6, 0.6, 0.9));
     e.fill = scene_fill(at(0, 0, which == 9 ? -1.0 : -0.5));
+    if (which == 14) c.pivot = at(0.5, 0.5, 0.1);
+    if (which == 15) e.start = 1;
+    if (which == 16) e.stop = 1;
     for (i = 0; i < 2; i++) {
         /* 10: in the other order */
         if ((which == 10) != (i == 1))
@@ -1234,7 +1410,7 @@ static void test_files_other_scene(void)
     gs4_sim *from = files_variant(0);
     int which;
     CHECK_RESULT(from, gs4_save(from, files_path("s.sav")), 0);
-    for (which = 0; which < 14; which++) {
+    for (which = 0; which < 17; which++) {
         gs4_sim *sim = files_variant(which);
         const uint64_t h = gs4_state_hash(sim);
         const int r = gs4_load(sim, files_path("s.sav"));
@@ -1401,6 +1577,8 @@ static void run_files(void)
     RUN(test_files_continue_edited);
     RUN(test_files_bad_edit);
     RUN(test_files_damaged);
+    RUN_ONCE(test_files_forged);
+    RUN_ONCE(test_files_forged_anywhere);
     RUN(test_files_endless);
     RUN(test_files_other_desc);
     RUN(test_files_padding);

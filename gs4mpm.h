@@ -1755,18 +1755,17 @@ static void gs4i_smooth_row(float *GS4I_RESTRICT z, const float *GS4I_RESTRICT a
                             const double *GS4I_RESTRICT r, const float *GS4I_RESTRICT inverse,
                             const gs4i_stencil *q, const gs4i_span *row)
 {
+    const gs4i_stencil here = *q; /* in registers */
     const size_t end = row->at + (size_t)row->n;
     size_t m, l;
-    for (m = row->at; m < end; m += GS4I_STRIP) {
-        if (q->uniform)
-            for (l = 0; l < GS4I_STRIP; l++)
-                z[m + l] =
-                    ((float)r[m + l] + gs4i_sum_neighbours(q, around, m + l, 1)) * inverse[m + l];
-        else
-            for (l = 0; l < GS4I_STRIP; l++)
-                z[m + l] =
-                    ((float)r[m + l] + gs4i_sum_neighbours(q, around, m + l, 0)) * inverse[m + l];
-    }
+    if (q->uniform)
+        for (m = row->at; m < end; m += GS4I_STRIP)
+            for (l = m; l < m + GS4I_STRIP; l++)
+                z[l] = ((float)r[l] + gs4i_sum_neighbours(&here, around, l, 1)) * inverse[l];
+    else
+        for (m = row->at; m < end; m += GS4I_STRIP)
+            for (l = m; l < m + GS4I_STRIP; l++)
+                z[l] = ((float)r[l] + gs4i_sum_neighbours(&here, around, l, 0)) * inverse[l];
 }
 
 /* r - A z in float, from the beginning of `out` on; 0 where there is no unknown. */
@@ -1775,35 +1774,44 @@ static void gs4i_float_residual_row(float *GS4I_RESTRICT out, const float *GS4I_
                                     const double *GS4I_RESTRICT r, const gs4i_stencil *q,
                                     const gs4i_span *row)
 {
+    const gs4i_stencil here = *q; /* in registers */
     const size_t end = row->at + (size_t)row->n;
     size_t m, l;
-    for (m = row->at; m < end; m += GS4I_STRIP, out += GS4I_STRIP) {
-        if (q->uniform)
-            for (l = 0; l < GS4I_STRIP; l++)
-                out[l] = gs4i_float_residual(q, (float)r[m + l], z[m + l], around, m + l, 1);
-        else
-            for (l = 0; l < GS4I_STRIP; l++)
-                out[l] = gs4i_float_residual(q, (float)r[m + l], z[m + l], around, m + l, 0);
-    }
+    if (q->uniform)
+        for (m = row->at; m < end; m += GS4I_STRIP)
+            for (l = m; l < m + GS4I_STRIP; l++)
+                out[l - row->at] = gs4i_float_residual(&here, (float)r[l], z[l], around, l, 1);
+    else
+        for (m = row->at; m < end; m += GS4I_STRIP)
+            for (l = m; l < m + GS4I_STRIP; l++)
+                out[l - row->at] = gs4i_float_residual(&here, (float)r[l], z[l], around, l, 0);
 }
 
 /* p.Ap from differences in float: it sets the length of a step alone. */
 static double gs4i_p_dot_ap_row(const float *GS4I_RESTRICT p, const float *GS4I_RESTRICT around,
                                 const gs4i_stencil *q, const gs4i_span *row)
 {
+    const gs4i_stencil here = *q; /* in registers */
     const size_t end = row->at + (size_t)row->n;
     double sum[GS4I_STRIP] = { 0 };
     size_t m, l;
-    for (m = row->at; m < end; m += GS4I_STRIP) {
-        if (q->uniform)
-            for (l = 0; l < GS4I_STRIP; l++)
-                sum[l] +=
-                    (double)p[m + l] * (double)gs4i_float_product(q, p[m + l], around, m + l, 1);
-        else
-            for (l = 0; l < GS4I_STRIP; l++)
-                sum[l] +=
-                    (double)p[m + l] * (double)gs4i_float_product(q, p[m + l], around, m + l, 0);
-    }
+    if (q->uniform)
+        for (m = row->at; m < end; m += GS4I_STRIP)
+            for (l = m; l < m + GS4I_STRIP; l++)
+                sum[l - m] += (double)p[l] * (double)gs4i_float_product(&here, p[l], around, l, 1);
+    else
+        for (m = row->at; m < end; m += GS4I_STRIP)
+            for (l = m; l < m + GS4I_STRIP; l++)
+                sum[l - m] += (double)p[l] * (double)gs4i_float_product(&here, p[l], around, l, 0);
+    return gs4i_sum_lanes(sum);
+}
+
+static double gs4i_square_row(const double *GS4I_RESTRICT r, int n)
+{
+    double sum[GS4I_STRIP] = { 0 };
+    int m, l;
+    for (m = 0; m < n; m += GS4I_STRIP)
+        for (l = 0; l < GS4I_STRIP; l++) sum[l] += r[m + l] * r[m + l];
     return gs4i_sum_lanes(sum);
 }
 
@@ -1815,7 +1823,6 @@ static double gs4i_update_row(double *GS4I_RESTRICT x, double *GS4I_RESTRICT r, 
                               const gs4i_stencil *q, const gs4i_span *row)
 {
     const size_t end = row->at + (size_t)row->n;
-    double sum[GS4I_STRIP] = { 0 };
     size_t m, l;
     for (m = row->at; m < end; m += GS4I_STRIP) {
         const float *low = q->diagonal_low ? q->diagonal_low + m : gs4i_zeros;
@@ -1825,12 +1832,9 @@ static double gs4i_update_row(double *GS4I_RESTRICT x, double *GS4I_RESTRICT r, 
         else
             for (l = 0; l < GS4I_STRIP; l++)
                 r[m + l] -= alpha * gs4i_product(q, p, around, (double)low[l], m + l, 0);
-        for (l = 0; l < GS4I_STRIP; l++) {
-            x[m + l] += alpha * (double)p[m + l];
-            sum[l] += r[m + l] * r[m + l];
-        }
     }
-    return gs4i_sum_lanes(sum);
+    for (m = row->at; m < end; m++) x[m] += alpha * (double)p[m];
+    return gs4i_square_row(r + row->at, row->n);
 }
 
 /* r -= A x; gives r.r */
@@ -1839,7 +1843,6 @@ static double gs4i_residual_row(double *GS4I_RESTRICT r, const double *GS4I_REST
                                 const gs4i_span *row)
 {
     const size_t end = row->at + (size_t)row->n;
-    double sum[GS4I_STRIP] = { 0 };
     size_t m, l;
     for (m = row->at; m < end; m += GS4I_STRIP) {
         const float *low = q->diagonal_low ? q->diagonal_low + m : gs4i_zeros;
@@ -1849,9 +1852,8 @@ static double gs4i_residual_row(double *GS4I_RESTRICT r, const double *GS4I_REST
         else
             for (l = 0; l < GS4I_STRIP; l++)
                 r[m + l] -= gs4i_product_of_double(q, x, around, (double)low[l], m + l, 0);
-        for (l = 0; l < GS4I_STRIP; l++) sum[l] += r[m + l] * r[m + l];
     }
-    return gs4i_sum_lanes(sum);
+    return gs4i_square_row(r + row->at, row->n);
 }
 
 static double gs4i_dot_row(const double *GS4I_RESTRICT r, const float *GS4I_RESTRICT z, int n)
@@ -1860,15 +1862,6 @@ static double gs4i_dot_row(const double *GS4I_RESTRICT r, const float *GS4I_REST
     int m, l;
     for (m = 0; m < n; m += GS4I_STRIP)
         for (l = 0; l < GS4I_STRIP; l++) sum[l] += r[m + l] * (double)z[m + l];
-    return gs4i_sum_lanes(sum);
-}
-
-static double gs4i_square_row(const double *GS4I_RESTRICT r, int n)
-{
-    double sum[GS4I_STRIP] = { 0 };
-    int m, l;
-    for (m = 0; m < n; m += GS4I_STRIP)
-        for (l = 0; l < GS4I_STRIP; l++) sum[l] += r[m + l] * r[m + l];
     return gs4i_sum_lanes(sum);
 }
 
@@ -2691,7 +2684,7 @@ typedef struct gs4i_built {
     float face[3][GS4I_BOTH], low[3][GS4I_BOTH], inverse[GS4I_BOTH], diagonal[GS4I_BOTH],
         diagonal_low[GS4I_BOTH];
     /* what level 1 gets: of faces towards + between liquid cells, of those to the air */
-    float coarse[3][GS4I_BOTH], air[GS4I_BOTH];
+    float coarse[3][GS4I_BOTH], air[GS4I_BOTH], held[GS4I_BOTH]; /* held: air and diagonal */
     int deep; /* all faces are 1 and between liquid cells */
 } gs4i_built;
 
@@ -2710,15 +2703,18 @@ GS4I_INLINE void gs4i_build_faces(gs4i_built *b, const gs4i_given_row *q, int i,
     const gs4_real *GS4I_RESTRICT face = q->face[f] ? q->face[f] + i : NULL;
     double *GS4I_RESTRICT w = b->w[f];
     float *GS4I_RESTRICT coarse = b->coarse[f >> 1], *GS4I_RESTRICT air = b->air;
-    int l;
+    int l, any = 0; /* of these cells beside air */
     if (face)
         for (l = 0; l < n; l++)
             w[l] = kind[l] & other[l] & (kind[l] | other[l]) >> 1 ? (double)face[l] * q->unit : 0;
     else
         for (l = 0; l < n; l++) w[l] = (kind[l] & other[l] & (kind[l] | other[l]) >> 1) * q->unit;
-    for (l = 0; l < n; l++) air[l] += (float)(0.75 * w[l]) * (float)((kind[l] & ~other[l]) >> 1);
+    for (l = 0; l < n; l++) any |= kind[l] & ~other[l] & other[l] << 1;
+    for (l = 0; l < n && any; l++)
+        air[l] += (float)(0.75 * w[l]) * (float)((kind[l] & ~other[l]) >> 1);
     if (!(f & 1)) return;
     for (l = 0; l < n; l++) coarse[l] = (float)(0.5 * w[l]) * (float)((kind[l] & other[l]) >> 1);
+    for (l = 0; l < n && f == 1; l += 2) coarse[l] = 0; /* within a cell of level 1 */
 }
 
 /* Where all faces are 1, `diagonal` has the faces that do not conduct as well: -1 for each. */
@@ -2737,6 +2733,7 @@ GS4I_INLINE void gs4i_build_cells(gs4i_built *GS4I_RESTRICT b, const gs4i_given_
                      center = b->given[l] + faces,
                      diagonal = b->given[l] + (q->uniform ? faces - 6 : 0);
         const double unknown = (double)(kind[l] / GS4I_IS_LIQUID) * (center > 0 ? 1.0 : 0.0);
+        b->held[l] = b->air[l] + (float)b->given[l];
         b->inverse[l] = (float)(unknown / (center + (1 - unknown)));
         b->diagonal[l] = (float)(unknown * diagonal + (double)GS4I_NO_UNKNOWN * (1 - unknown));
         b->diagonal_low[l] = (float)(unknown * (diagonal - (double)(float)diagonal));
@@ -2775,24 +2772,28 @@ static void gs4i_split_colours(float *GS4I_RESTRICT even, float *GS4I_RESTRICT o
     if (n & 1) even[m] = from[2 * m];
 }
 
-/* What the n cells of a strip of level 0 from cell `place` on add to level 1, four cells to two;
- * h->z has the faces to the air alone, while setting up. */
-static void gs4i_add_to_level_1(const gs4i_level *h, const gs4i_built *b, const int place[3], int n)
+/* Adds the first two of every four cells of a strip to the cells of level 1 above it. */
+static void gs4i_add_pairs(float *GS4I_RESTRICT to, const float *GS4I_RESTRICT from)
 {
-    const int i = place[0], j = place[1], k = place[2], c = (i / 2 + j / 2 + k / 2) & 1;
+    int m;
+    for (m = 0; m < GS4I_BOTH / 4; m++) to[m] = (to[m] + from[4 * m]) + from[4 * m + 1];
+}
+
+/* What a strip of level 0 from cell `place` on adds to level 1: zeros behind the end of the row.
+ * h->z has the faces to the air alone, while setting up. */
+static void gs4i_add_to_level_1(const gs4i_level *h, const gs4i_built *b, const int place[3])
+{
+    const int i = place[0], j = place[1], k = place[2];
     const size_t row = gs4i_row_of(h, j / 2, k / 2) + (size_t)(i / 4);
-    int m, l;
-    for (m = 0; m < (n + 3) / 4; m++)
-        for (l = 4 * m; l < 4 * m + 4; l += 2) {
-            const int up = l & 2 ? !c : c;
-            const size_t to = row + (size_t)m;
-            h->w[0][up][to] += b->coarse[0][l + 1];
-            if (j & 1) h->w[1][up][to] = (h->w[1][up][to] + b->coarse[1][l]) + b->coarse[1][l + 1];
-            if (k & 1) h->w[2][up][to] = (h->w[2][up][to] + b->coarse[2][l]) + b->coarse[2][l + 1];
-            h->diagonal[up][to] = (h->diagonal[up][to] + (b->air[l] + (float)b->given[l]))
-                                  + (b->air[l + 1] + (float)b->given[l + 1]);
-            h->z[up][to] = (h->z[up][to] + b->air[l]) + b->air[l + 1];
-        }
+    int l;
+    for (l = 0; l < 4; l += 2) {
+        const int up = ((i + l) / 2 + j / 2 + k / 2) & 1;
+        gs4i_add_pairs(h->w[0][up] + row, b->coarse[0] + l);
+        if (j & 1) gs4i_add_pairs(h->w[1][up] + row, b->coarse[1] + l);
+        if (k & 1) gs4i_add_pairs(h->w[2][up] + row, b->coarse[2] + l);
+        gs4i_add_pairs(h->diagonal[up] + row, b->held + l);
+        gs4i_add_pairs(h->z[up] + row, b->air + l);
+    }
 }
 
 /* A row of level 0, and what its cells add to level 1. */
@@ -2819,7 +2820,7 @@ static void gs4i_build_row(gs4i_solver *s, const gs4_poisson_desc *d, int j, int
                 memset(&b, 0, sizeof b);
                 gs4i_build_strip(&b, &q, place[0], n);
             }
-            gs4i_add_to_level_1(&s->level[1], &b, place, n);
+            gs4i_add_to_level_1(&s->level[1], &b, place);
         } else {
             memset(&b, 0, sizeof b);
             for (l = 0; l < n; l++) b.diagonal[l] = GS4I_NO_UNKNOWN;
@@ -3086,28 +3087,26 @@ GS4I_INLINE int gs4i_block_edges(const gs4i_solver *s, int bi, int bj, int bk, g
     for (q = 0; q < 8; q++) {
         const int c = gs4i_child_colour(q);
         const size_t at = gs4i_child(g, block, q);
-        if (2 * bj + (q >> 1 & 1) >= g->n[1] || 2 * bk + (q >> 2) >= g->n[2]
-            || s->parent[c][at] < 0)
-            continue;
+        int32_t from;
+        if (2 * bj + (q >> 1 & 1) >= g->n[1] || 2 * bk + (q >> 2) >= g->n[2]) continue;
+        from = s->parent[c][at];
+        if (from < 0) continue;
         for (f = 0; f < 6; f++) {
             const int a = f >> 1, high = f & 1, x = q & 1;
             const size_t step = a == 1 ? g->stride : g->plane,
                          beside = a      ? (high ? at + step : at - step)
                                   : high ? at + (size_t)x
                                          : at + (size_t)x - 1;
+            const int32_t to = s->parent[!c][beside];
             const float w = high ? g->w[a][c][at] : g->w[a][!c][beside];
-            if (!(w > 0) || s->parent[!c][beside] == s->parent[c][at]) continue;
-            for (e = count - 1;
-                 e >= 0
-                 && !(edge[e].from == s->parent[c][at] && edge[e].to == s->parent[!c][beside]);
-                 e--) {
+            if (to == from || !(w > 0)) continue;
+            for (e = count - 1; e >= 0 && !(edge[e].from == from && edge[e].to == to); e--) {
             }
             if (e < 0) {
-                e = count;
-                edge[e].from = s->parent[c][at];
-                edge[e].to = s->parent[!c][beside];
+                e = count++;
+                edge[e].from = from;
+                edge[e].to = to;
                 edge[e].w = 0;
-                count++;
             }
             if (!weigh) continue;
             if ((q >> a & 1) != high)

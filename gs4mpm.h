@@ -240,10 +240,13 @@
  * ACCURACY (tests/test_order.c and tests/test_physics.c hold these)
  *     order in time 1.9 to 2.15 in x, v, J, F, 1.86 to 2.16 in T, q (a rest of first order shows in
  *     T below 1e-6); elastic waves within 1.3 % at 32 cells a wave (tests/test_solid.c); order in
- *     space 2.0 for Poiseuille flow, 1.8 to 2.0 for heat, whose modes are off by up to 0.16 % of
+ *     space 2.0 for Poiseuille flow, 2.0 to 2.15 for heat, whose modes are off by up to 0.16 % of
  *     their first amplitude at 32 cells a wave (tests/test_heat.c); sound within 1.5 % at 32 cells
  *     a wave; a melting front within 0.3 cells; heat in an insulated box conserved to the tolerance
- *     of the solver, temperatures beyond those given by up to 1 % of a jump;
+ *     of the solver; temperatures beyond those given by up to 0.1 % of a jump where D dt/h^2 is at
+ *     most 1/2, D = k/(rho c) (a longer first step overshoots, at worst by the jump); particles in
+ *     the first two cells at an isothermal wall off by up to 1 % of a jump from h^2/D after it on,
+ *     0.2 % from 5 h^2/D on;
  *     with sharp_gradients elastic waves and sound within 0.1 % at 32 cells a wave, order in space
  *     2.5; the pressure of a column at rest is off by up to 0.045 rho g h in the cells at its
  *     surface, 0.035 above its floor, and 0.02 between (else 0.02, 0.015 and 0.005);
@@ -5933,7 +5936,6 @@ typedef struct gs4i_integrator {
     gs4_real decayed_at_once; /* share that goes in the step itself, where k dt > 1; else 0 */
     gs4_real fast_decay;      /* c0 / h, 1/s: added to k where the grid sees little */
     gs4_real stopping;        /* 1/s: how fast friction stops a node; half of what (4) bears */
-    gs4_real mixing;          /* 1/s, at most: of temperatures, see [[heat]] */
     /* 1/h^2; 1 / mass of a node in the midst of the lightest material, and of the densest */
     gs4_real inv_area, inv_node_mass, inv_densest_node_mass;
 } gs4i_integrator;
@@ -6364,6 +6366,7 @@ typedef struct gs4i_material_constants {
     /* of solids: G, Pa (0: a liquid), and between what the singular values of F stay */
     gs4_real shear_modulus, low, high;
     gs4_real capacity, conductivity, flux_time, fourier; /* c; k; tau; F_T, 1 where tau is 0 */
+    gs4_real reach; /* sqrt(k tau / (rho0 c)), m: of a wave of heat in tau */
     /* T_m, beyond every temperature where the phase is fixed; L / c, K */
     gs4_real melting, latent;
     /* with the shear rate or the temperature: Cross-WLF, or by viscosity_fn */
@@ -6487,6 +6490,9 @@ static void gs4i_set_material_constants(gs4i_material_constants *l, gs4_real tem
     l->conductivity = m->conductivity;
     l->flux_time = m->flux_relaxation_time;
     l->fourier = l->flux_time > 0 ? m->fourier_fraction : 1;
+    l->reach = l->flux_time > 0 ? GS4I_SQRT(l->conductivity * l->inv_density / l->capacity)
+                                      * GS4I_SQRT(l->flux_time)
+                                : GS4I_C(0);
     l->melting = m->can_melt                ? m->melting_temperature
                  : m->solid == GS4_NO_SOLID ? -4 * GS4I_HUGE
                                             : 4 * GS4I_HUGE;
@@ -7982,20 +7988,33 @@ static void gs4i_set_spin(const gs4i_particles *p, size_t i, gs4_vec3 w)
  * is conserved.
  *
  * What the grid does not see of the temperature of particles decays: r gets
- * -rate (T** - sum_i w_ip (T** - h^2/4 lap T**)_i), which conserves heat and leaves alone what the
- * grid does see. The rate is GS4I_MIXING k / (rho c h^2). Of the non-local part of conduction it
- * is at most 1/t_q; and no rate is above what the integrator takes (gs4i_integrator.mixing). */
+ * -rate (T** - sum_i w_ip (T** - h^2/4 lap T** + 13/240 h^4 lap lap T**)_i), which conserves heat
+ * and leaves alone what the grid does see, along an axis to O(h^6). Beside a jump temperatures
+ * overshoot by 0.03 % of it; by 0.6 % without the last term. The rate is m = GS4I_MIXING k/(rho c
+ * h^2); of the non-local part of conduction m / (1 + m t_q), at most 1/t_q. No rate is above
+ * 1/(2 dt): (4) is stable to four times that, but faster ones overshoot after a first step.
+ *
+ * Isothermal walls: R is odd about them. At h/4 a particle gathers 0.41 of the rate of its node,
+ * at the wall itself none. It would hardly follow, and its neighbours would make up for it: by 4
+ * to 9 % of the jump beyond the wall. So there the rate is 1 + GS4I_WALL_MIXING w times as large,
+ * w the weight of mirror nodes. That of the non-local part is m / (1 + sqrt(m t_q)) times as much:
+ * waves of heat pass a cell in h sqrt(rho c t_q / k). */
 
 /* Chosen: 4 k/(rho c h^2) is how fast the grid's own shortest mode along an axis decays, and what
  * is shorter decays no slower. */
 #define GS4I_MIXING GS4I_C(4.0)
 
+/* Chosen: at h/4 from a wall that makes 15 k/(rho c h^2), and heat takes h^2/(16 k/(rho c)) for
+ * the way. Measured: 6 and 20 do as well. */
+#define GS4I_WALL_MIXING GS4I_C(10.0)
+
 /* W/(m K), in place of 0, so that resistances can be added: materials have 0 or at least 1e-12 */
 #define GS4I_LEAST_CONDUCTIVITY GS4I_C(1e-15)
 
-/* J/(kg K); W/(m K); t_q, s; F_T; T_m, K; 1 where viscosity heats, else 0 */
+/* J/(kg K); W/(m K); t_q, s; F_T; T_m, K; 1 where viscosity heats, else 0;
+ * how far a wave of heat goes in t_q, m */
 typedef struct gs4i_heat_constants {
-    gs4i_lanes capacity, conductivity, flux_time, fourier, melting, heating;
+    gs4i_lanes capacity, conductivity, flux_time, fourier, melting, heating, reach;
     const gs4i_material_constants *of[GS4I_BATCH];
     int melts; /* some of those seen so far do */
 } gs4i_heat_constants;
@@ -8037,6 +8056,7 @@ static void gs4i_load_heat_constants(const gs4i_batch_constants *constants, gs4i
         GS4I_NTH(l->flux_time, n) = mat->flux_time;
         GS4I_NTH(l->fourier, n) = mat->fourier;
         GS4I_NTH(l->melting, n) = mat->melting;
+        GS4I_NTH(l->reach, n) = mat->reach;
         GS4I_NTH(l->heating, n) = mat->is.viscous_heating ? GS4I_C(1) : GS4I_C(0);
     }
 }
@@ -8189,17 +8209,45 @@ static void gs4i_give_heat(gs4i_heat_work *w, gs4i_gradient L, const gs4i_wide *
     gs4i_from_lanes(q[2], none, none, none, sources->z);
 }
 
-/* S7 of H: from[] is R s, the rate of mixing, and that times the temperature to mix to. */
+/* By how much mixing is faster than from[] says, near isothermal walls: there from[3] is the part
+ * of the rate from[1] that comes from mirror nodes. With y = sqrt(m t_q) the non-local part of
+ * conduction has m / (1 + y^2) in from[1], and m / (1 + y) here. */
+static void gs4i_mixing_near_walls(const gs4i_heat_work *w, gs4i_lanes from[4], gs4i_lanes factor)
+{
+    const gs4i_heat_constants *l = &w->constants;
+    const gs4_real per_reach = GS4I_SQRT(GS4I_MIXING * w->integrator->inv_area);
+    int b;
+    GS4I_BATCH_LOOP(b) {
+        const gs4i_wide zero = from[3][b] - from[3][b], one = zero + GS4I_C(1),
+                        most = zero + GS4I_C(0.5) / w->integrator->dt, tiny = zero + GS4I_TINY,
+                        absurd = zero + GS4I_C(1e9) /* its square is a float */,
+                        local = l->fourier[b];
+        gs4i_wide y = per_reach * l->reach[b], rate, own;
+        GS4I_WIDE_MIN(y, y, absurd);
+        rate = from[1][b]
+               + from[3][b] * GS4I_WALL_MIXING * (local + (one - local) / (one + y))
+                     / (local + (one - local) / (one + y * y));
+        GS4I_WIDE_MIN(rate, rate, most);
+        GS4I_WIDE_MAX(own, from[1][b], tiny);
+        rate = rate / own;
+        GS4I_CHOOSE(factor[b], from[3][b] > zero, rate, one);
+    }
+}
+
+/* S7 of H: from[] is R s, the rate of mixing, that times the temperature to mix to, and of the rate
+ * what isothermal mirror nodes give. */
 static void gs4i_correct_enthalpy(gs4i_heat_work *w, gs4i_lanes from[4])
 {
     const gs4i_integrator *integrator = w->integrator;
     gs4i_heat *h = &w->h;
-    gs4i_lanes gain, T, fraction;
+    gs4i_lanes gain, T, fraction, factor;
     int b;
     gs4i_predict_temperature(&w->constants, h, integrator->before, T);
+    gs4i_mixing_near_walls(w, from, factor);
     GS4I_BATCH_LOOP(b) {
         const gs4i_wide change =
-            ((from[0][b] * (1 / integrator->s) - (from[1][b] * T[b] - from[2][b])) - h->rate[b])
+            ((from[0][b] * (1 / integrator->s) - factor[b] * (from[1][b] * T[b] - from[2][b]))
+             - h->rate[b])
             * integrator->inv_alpha_m;
         gain[b] = (integrator->dt * h->rate[b] + integrator->gamma * integrator->dt * change)
                   + h->remainder[b];
@@ -10156,8 +10204,9 @@ typedef struct gs4i_emitter {
 
 /* Heat on nodes: only while a step is made, see [[conduction]]. What heat_nodes hold until the
  * solve: m c (J/K), m c T** (J), V / k_eff (m^4 K/W), V (m^3); and after it: T~ - T** (K), rate of
- * mixing (1/s), that times the temperature to mix to (K/s). What heat_sources hold until the
- * solve: power (W), mixing (W/K); for what they hold after it see gs4i_heat_from_box. */
+ * mixing (1/s), that times the temperature to mix to (K/s); in mirror nodes of isothermal walls
+ * the rate once more, else 0. What heat_sources hold until the solve: power (W), mixing (W/K); for
+ * what they hold after it see gs4i_heat_from_box. */
 enum {
     GS4I_NODE_CAPACITY,
     GS4I_NODE_HEAT,
@@ -12429,8 +12478,8 @@ static void gs4i_fold_heat(const gs4_sim *sim)
 }
 
 /* How mirror nodes continue what particles gather: (T~ - T**, rate of mixing, rate times the
- * temperature to mix to, -) and (components of T~, resistance); oddly about its temperature where
- * a wall is isothermal. */
+ * temperature to mix to, rate of mixing behind isothermal walls) and (components of T~,
+ * resistance); oddly about its temperature where a wall is isothermal. */
 static void gs4i_fill_heat(const gs4_sim *sim)
 {
     const gs4i_conduction *k = &sim->conduction;
@@ -12440,15 +12489,16 @@ static void gs4i_fill_heat(const gs4_sim *sim)
     for (wall = 0; wall < 6; wall++) {
         const int odd = sim->desc.wall_is_isothermal[wall];
         const gs4_real twice = odd ? 2 * sim->desc.wall_temperature[wall] : 0;
-        for (c = 0; c < 4; c++) nodes[wall].sign[c] = GS4I_C(odd && c != 1 && c != 3 ? -1 : 1);
-        nodes[wall].reals = 3;
+        for (c = 0; c < 4; c++) nodes[wall].sign[c] = GS4I_C(!odd || c == 1 ? 1 : c == 3 ? 0 : -1);
+        nodes[wall].reals = 4;
         nodes[wall].always = 1;
         flux[wall] = nodes[wall];
         nodes[wall].shift[2] = twice;
+        nodes[wall].shift[3] = GS4I_C(odd);
         nodes[wall].by = 1;
-        flux[wall].reals = 4;
         flux[wall].by = -1;
         flux[wall].sign[1] = flux[wall].sign[0];
+        flux[wall].sign[3] = 1;
         for (c = 0; c < 3; c++) flux[wall].shift[c] = twice;
     }
     gs4i_fill(&sim->boundary, &sim->grid, k->heat_nodes, nodes);
@@ -12505,7 +12555,7 @@ GS4I_INLINE gs4_real gs4i_node_mixing(const gs4_sim *sim, size_t node)
     const gs4_real all = k->heat_sources ? k->heat_sources[node + GS4I_SOURCE_MIXING]
                                          : GS4I_MIXING * q[GS4I_NODE_VOLUME] * q[GS4I_NODE_VOLUME]
                                                / q[GS4I_NODE_RESISTANCE] * inv_h * inv_h;
-    return gs4i_min(all / q[GS4I_NODE_CAPACITY], sim->heat_integrator.mixing)
+    return gs4i_min(all / q[GS4I_NODE_CAPACITY], GS4I_C(0.5) / sim->heat_integrator.dt)
            * q[GS4I_NODE_CAPACITY] * inv_cell;
 }
 
@@ -12757,10 +12807,27 @@ static gs4_real gs4i_second_differences(const gs4_sim *sim, const gs4_real *fiel
     return difference[0] + difference[1] + difference[2];
 }
 
+/* The second differences of T** that mixing needs twice, of one plane of the box. They take the
+ * place of the right-hand side, which is done with. */
+static void gs4i_heat_curvature(int z, void *context)
+{
+    const gs4_sim *sim = ((const gs4i_node_pass *)context)->sim;
+    const gs4i_conduction *k = &sim->conduction;
+    gs4_real along[3];
+    size_t i;
+    int at[3];
+    GS4I_BOX_PLANE(&k->box, GS4I_AT_CELL, z, at, i)
+        if (k->mixing[i] > 0)
+            k->system.rhs[i] = gs4i_second_differences(sim, k->temperature, k->mixing,
+                                                       sim->desc.wall_temperature, at, along);
+}
+
 /* What particles gather, on the nodes of a group of blocks. A field scattered and gathered is
- * f + (h^2/4) lap f, half of that from each way (the second moment of the kernel is h^2/4).
+ * f + (h^2/4) lap f, half of that from each way (the second moment of the kernel is h^2/4). More of
+ * it: the kernel's spectrum is sinc^3, there and back sinc^6 = 1 - q^2/4 + 7/240 q^4 with q = h k,
+ * and with second differences D, -q^2 + q^4/12, the inverse is 1 - D/4 + 13/240 D^2.
  *     nodes:   x - (h^2/4) lap x;  rate of mixing r_mix (1/s);
- *              r_mix (T** - (h^2/4) lap T**) (K/s);  0
+ *              r_mix (1 - D/4 + 13/240 D^2) T** (K/s);  0
  *     sources, for the flux: T~ - (h^2/4) lap T~ + (h^2/12) d2T~/da2 for each axis a, whose
  *              gradient there and back is the second difference of the box; 1/k_eff (m K/W) */
 static void gs4i_heat_from_box(int index, void *context)
@@ -12793,8 +12860,10 @@ static void gs4i_heat_from_box(int index, void *context)
                 q[GS4I_NODE_MIXING_RATE] = k->mixing[cell] / capacity;
                 q[GS4I_NODE_MIXING_TARGET] =
                     q[GS4I_NODE_MIXING_RATE]
-                    * (T[cell]
-                       - GS4I_C(0.25) * gs4i_second_differences(sim, T, k->mixing, wall, at, T_2));
+                    * ((T[cell] - GS4I_C(0.25) * k->system.rhs[cell])
+                       + GS4I_C(13.0 / 240)
+                             * gs4i_second_differences(sim, k->system.rhs, k->mixing, NULL, at,
+                                                       T_2));
             }
             if (!flux) continue;
             sum += gs4i_second_differences(sim, T, k->capacity, wall, at, T_2);
@@ -12858,6 +12927,7 @@ static int gs4i_solve_heat(gs4_sim *sim, gs4i_node_pass *nodes)
     gs4i_parallel_for(&sim->tasks, k->box.size[2], gs4i_heat_equation, nodes);
     result = gs4i_solve_heat_equation(sim);
     if (result != GS4_OK) return result;
+    gs4i_parallel_for(&sim->tasks, k->box.size[2], gs4i_heat_curvature, nodes);
     gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_heat_from_box, nodes);
     gs4i_fill_heat(sim);
     sim->seconds[GS4I_CLOCK_SOLVE] += gs4i_now(sim) - start;
@@ -13810,13 +13880,6 @@ static void gs4i_family(gs4i_integrator *k, gs4_real r, gs4_real s, int restart)
     k->gamma = restart ? GS4I_C(1) : 1 / (1 + s);
 }
 
-/* Temperatures mix as velocities fade, but no faster than a step can follow; 2 s is at least dt. */
-static gs4_real gs4i_mixing(const gs4i_integrator *k)
-{
-    const gs4_real most = GS4I_C(0.5) / k->s;
-    return k->decayed_at_once > 0 ? most : gs4i_min(k->decay, most);
-}
-
 /* Decay of the sub-grid velocity v~ - V at the rate k = 1/flip_decay_time. In S7 it stands in the
  * rate of velocity, explicitly, and (4) is stable up to k_max = 4 (1 - r s)/((3 + r + s - r s) dt).
  * With x = k/(0.8 k_max) the rate taken is k (1 + x)/(1 + x + x^2): k for small x, 0.8 k_max for
@@ -13859,7 +13922,6 @@ static gs4i_integrator gs4i_make_integrator(const gs4_sim *sim, gs4_real dt)
     k.s = k.alpha_f * k.gamma * dt / k.alpha_m;
     k.before = with_rates ? k.prediction.ahead - k.s : GS4I_C(0);
     gs4i_set_decay(&k, sim->desc.flip_decay_time, r, s);
-    k.mixing = with_rates ? gs4i_mixing(&k) : GS4I_C(0.5) / k.s;
     k.inv_area = sim->grid.inv_h * sim->grid.inv_h;
     k.fast_decay = k.inv_node_mass = 0;
     k.inv_densest_node_mass = GS4I_HUGE;
@@ -13886,7 +13948,6 @@ static gs4i_integrator gs4i_make_heat_integrator(const gs4_sim *sim)
         k.prediction.ahead = k.before = 0;
         k.s = k.alpha_f * k.gamma * k.dt / k.alpha_m;
         k.inv_alpha_m = 1 / k.alpha_m;
-        k.mixing = gs4i_mixing(&k);
     }
     return k;
 }
@@ -16737,6 +16798,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_VECTORS
 #undef GS4I_VISCOUS_EIGENVALUE
 #undef GS4I_VISITED
+#undef GS4I_WALL_MIXING
 #undef GS4I_WIDE_MAX
 #undef GS4I_WIDE_MIN
 #undef GS4I_WIDTH
@@ -16768,4 +16830,6 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  * stable step and in default speeds of sound.
  * Meshes: sampled where the domain meets them, at half a cell whatever their size, before coarser
  * where they were large. Parts that overlap are a union, before the overlap was empty. Parts inside
- * out, and bodies thinner than 0.3 cells on average, are refused. */
+ * out, and bodies thinner than 0.3 cells on average, are refused.
+ * Heat: temperatures that the grid does not see fade as fast as heat is conducted, before no faster
+ * than flip_decay_time; beside isothermal walls faster yet. */

@@ -49,6 +49,9 @@ int main(int count, char **values)
     RUN_FULL(test_heat_surface);
     RUN(test_heat_seam);
     RUN_ONCE(test_heat_walls);
+    RUN(test_heat_bounds);
+    RUN_ONCE(test_heat_beside_walls);
+    RUN_ONCE(test_heat_waves_at_walls);
     RUN_ONCE(test_heat_stefan);
     RUN_ONCE(test_heat_conserved);
     RUN_ONCE(test_heat_cycles);

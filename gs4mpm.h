@@ -10094,7 +10094,7 @@ static int gs4i_collider_hold(const gs4i_collider *b, gs4_vec3 p, gs4_real h,
     if (into + integrator->dt * push <= 0) return 0;
     side = gs4i_add(rel, gs4i_scale(n, into)); /* tangential velocity */
     slip = gs4i_length(side);
-    if (b->is.contact == GS4_WALL_SEPARATE && b->is.friction > 0) {
+    if (b->is.friction > 0) {
         gs4_vec3 drag = gs4i_add(gs4i_vec3(acc[0], acc[1], acc[2]), gs4i_scale(n, push));
         /* Coulomb, on the impact */
         bite = gs4i_min(b->is.friction * gs4i_max(into, 0), slip);

@@ -40,6 +40,8 @@ int main(int count, char **values)
     RUN_ONCE(test_channel_overshoot);
     RUN_FULL(test_elastic_couette);
     RUN(test_stress_is_paid_for_where_it_is);
+    RUN(test_stress_counts);
+    RUN(test_stress_edited_euler);
     RUN_SLOW(test_drop_draws_back);
     RUN_SLOW(test_die_swell);
     RUN_ONCE(test_heat_modes);
@@ -48,6 +50,9 @@ int main(int count, char **values)
     RUN_ONCE(test_heat_pulse);
     RUN_FULL(test_heat_surface);
     RUN(test_heat_seam);
+    RUN_ONCE(test_heat_on_each_wall);
+    RUN_ONCE(test_heat_drifts);
+    RUN_ONCE(test_heat_around);
     RUN_ONCE(test_heat_walls);
     RUN(test_heat_bounds);
     RUN_ONCE(test_heat_beside_walls);
@@ -59,6 +64,8 @@ int main(int count, char **values)
     RUN_ONCE(test_heat_slowly);
     RUN_ONCE(test_phase_freezing);
     RUN_ONCE(test_phase_melting);
+    RUN_ONCE(test_phase_between);
+    RUN_ONCE(test_phase_forgets);
     RUN(test_heat_rims);
     RUN(test_heat_full_box);
     RUN_ONCE(test_heat_extremes);
@@ -85,6 +92,7 @@ int main(int count, char **values)
     RUN_ONCE(test_short_decay);
     RUN(test_tiny_step);
     RUN(test_thickening);
+    RUN(test_thickening_within_a_step);
     RUN(test_nozzle_from_outside);
     RUN(test_order_as_printed);
     RUN(test_order_in_time);

@@ -1642,6 +1642,119 @@ static void test_errors_distances(void)
     }
 }
 
+/* Where a shape is said to be flat the half space is all that there is of it: for any point within
+ * reach, and not deeper than said, its distance is that from the face. In the midst of each face it
+ * is said, near edges and of thin slabs not. */
+static void err_flat(const gs4_shape *s, const double p[3], double reach, double deep, int *flat,
+                     double *worst)
+{
+    const double d = (double)gs4i_shape_distance(s, at(p[0], p[1], p[2]));
+    gs4_vec3 n;
+    int i;
+    if (!gs4i_shape_is_flat(s, at(p[0], p[1], p[2]), (gs4_real)reach, (gs4_real)deep, &n)) return;
+    ++*flat;
+    for (i = 0; i < 125; i++) {
+        const double r[3] = { reach * (i % 5 - 2) / 2, reach * (i / 5 % 5 - 2) / 2,
+                              reach * (i / 25 - 2) / 2 },
+                     there = d + (double)n.x * r[0] + (double)n.y * r[1] + (double)n.z * r[2];
+        if (r[0] * r[0] + r[1] * r[1] + r[2] * r[2] > reach * reach || there < -deep) continue;
+        *worst =
+            fmax(*worst,
+                 fabs(there
+                      - (double)gs4i_shape_distance(s, at(p[0] + r[0], p[1] + r[1], p[2] + r[2]))));
+    }
+}
+
+static void test_errors_flat_shapes(void)
+{
+    const gs4_shape shapes[3] = { gs4_box(at(-0.5, -0.45, -0.15), at(0.5, 0.45, 0.15)),
+                                  gs4_cylinder(at(-0.05, -0.1, -0.1), at(0.05, 0.1, 0.1),
+                                               (gs4_real)0.5),
+                                  gs4_plane(at(0.1, 0, 0), at(0.6, 0, 0.8)) };
+    static const double axis[3] = { 1.0 / 3, 2.0 / 3, 2.0 / 3 }, half[3] = { 0.5, 0.45, 0.15 };
+    double worst = 0;
+    int k, i, size, flat[3] = { 0, 0, 0 };
+    for (k = 0; k < 3; k++)
+        for (size = 0; size < 4; size++)
+            for (i = 0; i < 1331; i++) {
+                const double p[3] = { 0.13 * (i % 11) - 0.65, 0.13 * (i / 11 % 11) - 0.65,
+                                      0.13 * (i / 121) - 0.65 };
+                err_flat(&shapes[k], p, size % 2 ? 0.3 : 0.1, size / 2 ? 0.25 : 0.05, &flat[k],
+                         &worst);
+            }
+    if (test_filter[0])
+        printf("flat: box %d, cylinder %d, plane %d of 5324, off by %.1e\n", flat[0], flat[1],
+               flat[2], worst);
+    CHECK(worst < 3e-7);
+    CHECK(flat[2] == 5324);
+    for (i = 0; i < 6; i++) { /* 0.02 before each face of the box, both ends of the cylinder */
+        const double way = i % 2 ? 1 : -1;
+        double p[3] = { 0, 0, 0 };
+        int n = 0;
+        p[i / 2] = way * (half[i / 2] + 0.02);
+        err_flat(&shapes[0], p, 0.05, 0.05, &n, &worst);
+        for (k = 0; k < 3; k++) p[k] = way * 0.17 * axis[k];
+        err_flat(&shapes[1], p, 0.2, 0.1, &n, &worst);
+        CHECK(n == 2);
+    }
+    CHECK(worst < 3e-7);
+}
+
+#ifdef GS4_PTHREADS
+static void err_count_task(int index, void *context) { ((unsigned char *)context)[index]++; }
+#endif
+
+/* Threads do each task once, none twice and none beyond the last, however many there are. */
+static void test_errors_pool(void)
+{
+#ifdef GS4_PTHREADS
+    static unsigned char done[1024];
+    int workers, count, i, wrong = 0;
+    for (workers = 1; workers < 4; workers++) {
+        gs4i_memory memory;
+        gs4i_pool *pool;
+        memset(&memory, 0, sizeof memory);
+        memory.hook.alloc_fn = gs4i_default_alloc;
+        memory.hook.free_fn = gs4i_default_free;
+        pool = gs4i_pool_create(&memory, workers);
+        CHECK(pool != NULL);
+        for (count = 1; pool && count < 300; count += count < 150 ? 1 : 7) {
+            memset(done, 0, sizeof done);
+            gs4i_pool_run(pool, count, err_count_task, done);
+            for (i = 0; i < 1024; i++) wrong += done[i] != (i < count);
+        }
+        gs4i_pool_destroy(&memory, pool, workers);
+    }
+    CHECK(wrong == 0);
+#endif
+}
+
+/* A drop that flies 40 cells has no more nodes there than at the start: those that it leaves are
+ * given back, in its box of blocks and one block around. */
+static void test_errors_flight(void)
+{
+    int euler, i;
+    for (euler = 0; euler < 2; euler++) {
+        gs4_sim_desc d = scene_cube(8);
+        const gs4_material m = scene_liquid(1000, 0, 10);
+        const gs4_fill f = scene_fill(at(5, 0, 0));
+        gs4_sim *sim;
+        int most = 0;
+        d.cells[0] = 56;
+        d.integrator = physics_integrators[euler];
+        CHECK(gs4_create(&d, &sim) == GS4_OK && gs4_add_material(sim, &m) == 0);
+        CHECK(gs4_add_particles(sim, gs4_box(at(0.5, 0.25, 0.25), at(1, 0.75, 0.75)), &f) > 0);
+        for (i = 0; gs4_get_stats(sim).time < 1; i++) {
+            CHECK_RESULT(sim, gs4_step(sim, gs4_stable_dt(sim) / 2), GS4_OK);
+            if (gs4_get_stats(sim).active_cells > most) most = gs4_get_stats(sim).active_cells;
+        }
+        if (test_filter[0]) printf("integrator %d: %d cells at most\n", euler, most);
+        /* along x it is in 2 blocks, or 3 by the cell that it may be ahead; and 1 on each side */
+        CHECK(most <= 5 * 4 * 4 * 64);
+        gs4_destroy(sim);
+    }
+}
+
 /* Which members of the family there are: rho_inf_spurious <= rho_inf, and a product up to 0.98. */
 static void test_errors_members(void)
 {
@@ -1755,6 +1868,9 @@ static void run_errors(void)
     RUN(test_errors_numbers);
     RUN(test_errors_hash);
     RUN(test_errors_distances);
+    RUN(test_errors_flat_shapes);
+    RUN(test_errors_pool);
+    RUN(test_errors_flight);
     RUN(test_errors_desc);
     RUN(test_errors_material);
     RUN(test_errors_fill);

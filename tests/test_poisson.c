@@ -525,6 +525,24 @@ static void test_poisson_reuse(void)
 
 /* --- failures --------------------------------------------------------------------------------- */
 
+/* What a diagonal has beyond the digits of a float counts: it rules here, and the solver begins at
+ * a guess that is wrong everywhere. */
+static void test_poisson_diagonal(void)
+{
+    poisson_case p = pois_random(13, 9, 11, 5, 1);
+    gs4_solve_stats stats;
+    size_t at;
+    for (at = 0; at < p.count; at++) {
+        p.diagonal[at] = (gs4_real)(1e3 * (1 + poisson_random(&p.random)));
+        p.x[at] = (gs4_real)(1 + poisson_random(&p.random));
+    }
+    p.desc.cell_size = (gs4_real)0.3;
+    p.desc.tolerance = (gs4_real)1e-13;
+    CHECK_RESULT(NULL, pois_solve(&p, &stats), GS4_OK);
+    CHECK_CLOSE(pois_distance(&p), 0, sizeof(gs4_real) == 8 ? 1e-11 : 1e-7);
+    poisson_free(&p);
+}
+
 static void test_poisson_limit(void)
 {
     poisson_case p = poisson_make("P2", 32);
@@ -863,6 +881,7 @@ static void run_poisson(void)
     RUN(test_poisson_graphs);
     RUN_ONCE(test_poisson_same_bits);
     RUN_ONCE(test_poisson_reuse);
+    RUN(test_poisson_diagonal);
     RUN(test_poisson_limit);
     RUN_ONCE(test_poisson_bad_guess);
     RUN(test_poisson_contrast);

@@ -84,6 +84,57 @@ static void test_solid_stress(void)
         }
 }
 
+/* Viscosity of what melts at 0: there is none of the solid. */
+static gs4_real solid_viscosity(gs4_real T, gs4_real rate, void *user)
+{
+    (void)rate;
+    (void)user;
+    return T > 0 ? 7 : (gs4_real)NAN;
+}
+
+/* Solid it has s_F alone, liquid 2 mu D alone: of a point that is stretched and sheared, and flows.
+ * The viscosity of the other phase is not asked for. */
+static void test_solid_melts(void)
+{
+    static const double F[9] = { 1.2, 0.3, 0, 0, 0.9, 0.1, -0.2, 0, 1.1 },
+                        L[9] = { 2, -1, 0.5, 3, -1, 0, 0, 1, -1 };
+    int i, j, k, callback, T;
+    for (callback = 0; callback < 2; callback++)
+        for (T = -5; T <= 5; T += 10) {
+            gs4_material m = scene_liquid(1000, callback ? 0 : 7, 10);
+            gs4_real flow[9], cauchy[6];
+            gs4_point p;
+            double J, trace = 0, B[3][3];
+            memset(&p, 0, sizeof p);
+            m.heat_capacity = 1000;
+            m.can_melt = 1;
+            m.solid = GS4_NEO_HOOKEAN;
+            m.shear_modulus = 40;
+            if (callback) {
+                m.viscosity_law = GS4_VISCOSITY_CALLBACK;
+                m.viscosity_fn = solid_viscosity;
+            }
+            for (i = 0; i < 9; i++) {
+                p.deformation[i] = (gs4_real)F[i];
+                flow[i] = (gs4_real)L[i];
+            }
+            p.temperature = (gs4_real)T;
+            J = solid_determinant(F);
+            for (i = 0; i < 3; i++)
+                for (j = 0; j < 3; j++)
+                    for (B[i][j] = 0, k = 0; k < 3; k++)
+                        B[i][j] += pow(J, -2.0 / 3) * F[3 * i + k] * F[3 * j + k];
+            for (i = 0; i < 3; i++) trace += B[i][i] / 3;
+            CHECK_RESULT(NULL, gs4_point_stress(&m, &p, flow, cauchy), GS4_OK);
+            for (i = 0; i < 3; i++)
+                for (j = i; j < 3; j++)
+                    CHECK_CLOSE(cauchy[solid_index[i][j]],
+                                T < 0 ? 40 / J * (B[i][j] - (i == j ? trace : 0))
+                                      : 7 * (L[3 * i + j] + L[3 * j + i]),
+                                sizeof(gs4_real) == 8 ? 1e-12 : 3e-5);
+        }
+}
+
 /* Singular values and the rotation nearest to F, of flat and inverted F too: the energy |F -
  * R|^2 + (J - 1)^2 has a stress for each. */
 static void test_solid_svd(void)
@@ -978,6 +1029,7 @@ static void test_solid_stability(void)
 static void run_solid(void)
 {
     RUN(test_solid_stress);
+    RUN(test_solid_melts);
     RUN(test_solid_svd);
     RUN(test_solid_rubber);
     RUN(test_solid_clamp);

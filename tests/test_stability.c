@@ -280,6 +280,47 @@ static void test_short_decay(void)
         }
 }
 
+static gs4_real stability_viscosity(gs4_real T, gs4_real rate, void *user)
+{
+    (void)T;
+    (void)rate;
+    return *(const gs4_real *)user;
+}
+
+/* Viscosity alone limits the step, dt ~ 1/mu, and is higher once the step is under way: up to a
+ * quarter is let pass, more is refused and nothing has happened. */
+static void test_thickening_within_a_step(void)
+{
+    static const double rise[4] = { 1, 1.24, 1.26, 100 };
+    gs4_real viscosity = 1;
+    int i, k;
+    for (k = 0; k < 2; k++) {
+        gs4_sim_desc d = scene_cube(8);
+        gs4_material m = scene_liquid(1, 0, 1e-4);
+        const gs4_fill f = scene_fill(at(1e-3, 0, 0));
+        gs4_sim *sim;
+        d.integrator = physics_integrators[k];
+        m.viscosity_law = GS4_VISCOSITY_CALLBACK;
+        m.viscosity_fn = stability_viscosity;
+        m.viscosity_user = &viscosity;
+        viscosity = 1;
+        sim = physics_create(&d, &m);
+        CHECK(gs4_add_particles(sim, gs4_box(at(0.25, 0.25, 0.25), at(0.75, 0.75, 0.75)), &f) > 0);
+        for (i = 0; i < 4; i++) {
+            gs4_real dt;
+            uint64_t before;
+            viscosity = 1;
+            CHECK_RESULT(sim, gs4_step(sim, gs4_stable_dt(sim)), GS4_OK);
+            dt = gs4_stable_dt(sim);
+            before = gs4_state_hash(sim);
+            viscosity = (gs4_real)rise[i];
+            CHECK_RESULT(sim, gs4_step(sim, dt), rise[i] < 1.25 ? GS4_OK : GS4_ERROR_UNSTABLE);
+            CHECK((gs4_state_hash(sim) == before) == (rise[i] > 1.25));
+        }
+        gs4_destroy(sim);
+    }
+}
+
 /* What thickens in shear says little of its limit at rest: gs4_advance finds it. */
 static void test_thickening(void)
 {
@@ -500,6 +541,21 @@ static void test_stability_by_hand(void)
         CHECK(gs4_create(&d, &sim) == GS4_OK && gs4_add_material(sim, &m) == 0);
         CHECK(gs4_add_particles(sim, gs4_box(at(0.5, 0.5, 0.5), at(0.625, 0.625, 0.625)), &f) == 8);
         CHECK_CLOSE(gs4_stable_dt(sim) * 50 * sqrt(2.0), 1, 3 * tiny);
+        gs4_destroy(sim);
+    }
+    /* symplectic Euler: (om dt)^2 + 2 d dt = 4, om = sqrt(12) c/h, d = 16 nu/h^2 */
+    for (i = 0; i < 3; i++) {
+        const double c = i == 1 ? 1e-6 : 3, nu = i == 2 ? 0 : 0.05, dt_h = 16 * nu / (h * h);
+        gs4_sim_desc d = scene_cube(8);
+        const gs4_material m = scene_liquid(10, 10 * nu, c);
+        const gs4_fill f = scene_fill(at(0, 0, 0));
+        gs4_sim *sim;
+        double dt;
+        d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER;
+        CHECK(gs4_create(&d, &sim) == GS4_OK && gs4_add_material(sim, &m) == 0);
+        CHECK(gs4_add_particles(sim, gs4_box(at(0.4, 0.4, 0.4), at(0.6, 0.6, 0.6)), &f) > 0);
+        dt = (double)gs4_stable_dt(sim);
+        CHECK_CLOSE((12 * c * c * dt / (h * h) + 2 * dt_h) * dt / 4, 1, 3 * tiny);
         gs4_destroy(sim);
     }
     for (i = 0; i < 2; i++) {

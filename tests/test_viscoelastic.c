@@ -223,6 +223,78 @@ static void test_stress_is_paid_for_where_it_is(void)
     gs4_destroy(mixed);
 }
 
+/* gs4_stats counts particles. A first step of more than a relaxation time is beyond the midpoint
+ * rule, so each needs substeps, and so does each in the first step after an edit; at rest none does
+ * in any other. None is bounded but where anisotropy is above 1 and the flow is fast. */
+static void test_stress_counts(void)
+{
+    gs4_sim_desc d = scene_cube(8);
+    const gs4_fill f = scene_fill(at(0, 0, 0));
+    gs4_material m = viscoelastic_liquid(1, 0.5, 1e-3, 1e-2);
+    uint64_t all;
+    gs4_sim *sim;
+    int i, k;
+    m.density = 1;
+    sim = physics_create(&d, &m);
+    CHECK(gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1, 1, 1)), &f) > 0);
+    all = (uint64_t)gs4_get_stats(sim).particles;
+    for (i = 0; i < 6; i++) {
+        if (i == 3) CHECK(gs4_edit_particles(sim, GS4_FIELD_VELOCITY).data != NULL);
+        CHECK_RESULT(sim, gs4_step(sim, (gs4_real)2e-3), GS4_OK);
+        CHECK(gs4_get_stats(sim).stress_substeps == (i < 3 ? all : 2 * all));
+    }
+    CHECK(gs4_get_stats(sim).stress_bounded == 0);
+    gs4_destroy(sim);
+    for (k = 0; k < 2; k++) {
+        m = scene_liquid(1000, 1, 10);
+        m.liquid = GS4_POM_POM;
+        m.relaxation_time = 1;
+        m.stretch_time = (gs4_real)0.9;
+        m.arms = 8;
+        m.anisotropy = (gs4_real)(k ? 100 : 1);
+        sim = physics_create(&d, &m);
+        CHECK(gs4_add_particles(sim, gs4_sphere(at(0.5, 0.5, 0.5), (gs4_real)0.15), &f) > 0);
+        order_stir(sim);
+        CHECK(physics_run(sim, 0.1) == 0);
+        if (test_filter[0])
+            printf("anisotropy %g: %ld bounded, %ld with substeps\n", (double)m.anisotropy,
+                   (long)gs4_get_stats(sim).stress_bounded,
+                   (long)gs4_get_stats(sim).stress_substeps);
+        CHECK((gs4_get_stats(sim).stress_bounded > 0) == (k == 1));
+        gs4_destroy(sim);
+    }
+}
+
+/* Symplectic Euler keeps no rates, so an edit that changes nothing changes nothing afterwards: the
+ * next step is no first step. */
+static void test_stress_edited_euler(void)
+{
+    gs4_sim_desc d = scene_cube(8);
+    gs4_material m = scene_liquid(1000, 20, 10);
+    const gs4_fill f = scene_fill(at(0, 0, 0));
+    uint64_t hash[2];
+    int k, i;
+    d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER;
+    m.liquid = GS4_POM_POM;
+    m.relaxation_time = (gs4_real)0.5;
+    m.stretch_time = (gs4_real)0.25;
+    m.arms = 2;
+    m.anisotropy = (gs4_real)0.3;
+    for (k = 0; k < 2; k++) {
+        gs4_sim *sim = physics_create(&d, &m);
+        CHECK(gs4_add_particles(sim, gs4_sphere(at(0.5, 0.5, 0.5), (gs4_real)0.15), &f) > 0);
+        order_stir(sim);
+        for (i = 0; i < 20; i++) {
+            if (k && i > 10) CHECK(gs4_edit_particles(sim, GS4_FIELD_VELOCITY).data != NULL);
+            CHECK_RESULT(sim, gs4_step(sim, (gs4_real)1e-3), GS4_OK);
+        }
+        CHECK(gs4_get_stats(sim).stress_substeps == 0);
+        hash[k] = gs4_state_hash(sim);
+        gs4_destroy(sim);
+    }
+    CHECK(hash[0] == hash[1]);
+}
+
 /* A drop of Oldroyd-B, We 1, local fraction 0.1 (shared reference: drop_oldroyd_b): spreads, and
  * draws back. */
 static void test_drop_draws_back(void)

@@ -31,8 +31,8 @@
  *     }
  *
  * WHAT IT DOES NOT DO, YET. Implicit and projection schemes are declared and refused with a
- * sentence. It has no surface tension, no two-way coupling to colliders, no domain beyond 2^36
- * cells.
+ * sentence. It has no surface tension, no two-way coupling to colliders, no domain beyond
+ * 3992^3 cells.
  *
  * MAP. Sections carry a tag; grep -n '^/. ==== ' gs4mpm.h is the table of contents. A section uses
  * only sections above it.
@@ -288,7 +288,9 @@
  *
  * ERRORS. Every call returns 0 or more for success and a negative gs4_result otherwise;
  * gs4_last_error has a sentence. Every field is checked, NaN included. A call that fails has
- * changed nothing, out of memory included; a step that is refused has not been taken.
+ * changed nothing, out of memory included; a step that is refused has not been taken, though
+ * gs4_advance keeps those before it. Callbacks must not change the simulation that calls them:
+ * such calls are refused. What is allowed but hardly meant is said through `log`, once.
  *
  * MEMORY. GS4: 65 bytes a particle in float (position, velocity, J and their rates, mass, id,
  * material, and 4 for sorting), 16 more unless flip_decay_time is INFINITY, 49 a cell near material
@@ -312,8 +314,8 @@
  * file and undone at its end, so that -O0, -O2 and -O3 -march=native of one compiler agree too. Not
  * with -ffast-math, clang's -ffp-contract=fast, nor where doubles are kept in x87 registers.
  *
- * LIMITS. 2^30 particles, 2^36 cells, 256 materials. Time steps follow sound: viscosities above
- * some 100 Pa s at millimetre cells mean steps of microseconds. There is one velocity at a node:
+ * LIMITS. 1073741808 particles, 3992^3 cells, 256 materials. Time steps follow sound: viscosities
+ * above some 100 Pa s at millimetre cells mean steps of microseconds. One velocity is at a node:
  * solids that touch stick together until they are two cells apart. Filling is refused where
  * material is already; emitters pause when max_particles is reached. An emitter gives what its
  * velocity says whatever is before it. Where that goes slower, as in a sticky pipe as wide as the
@@ -698,7 +700,8 @@ GS4_API int gs4_add_emitter(gs4_sim *sim, const gs4_emitter *emitter);
 GS4_API int gs4_move_emitter(gs4_sim *sim, int emitter, gs4_vec3 travel);
 
 /* One step of exactly dt (s), at most gs4_stable_dt; or as many as it takes to end after exactly
- * `duration` (s). What is refused with GS4_ERROR_UNSTABLE has not been done. */
+ * `duration` (s). A step that is refused has not been done. The steps that gs4_advance took before
+ * it have: the sentence says how many, and how much time is left (gs4_stats.time_left). */
 GS4_API int gs4_step(gs4_sim *sim, gs4_real dt);
 GS4_API int gs4_advance(gs4_sim *sim, gs4_real duration);
 GS4_API gs4_real gs4_stable_dt(const gs4_sim *sim); /* s, see STABILITY; without `cfl` */
@@ -729,8 +732,8 @@ typedef struct gs4_edit {
 
 GS4_API gs4_view gs4_particles(const gs4_sim *sim, gs4_field field);
 
-/* Position, velocity and temperature. The next call checks what was written; the next step starts
- * the integrator anew. */
+/* Position, velocity and temperature. The next call checks what was written, and melts or freezes
+ * what temperatures say; the next step starts the integrator anew. */
 GS4_API gs4_edit gs4_edit_particles(gs4_sim *sim, gs4_field field);
 
 /* Sorting changes the order of particles and not their ids. */
@@ -755,6 +758,7 @@ typedef struct gs4_stats {
     uint64_t stress_bounded;
     /* so far; stress is evaluated within the transfers */
     double seconds_transfer, seconds_stress, seconds_solve, seconds_sort, seconds_total;
+    double time_left; /* s, of the duration of the last gs4_advance: 0 unless it was refused */
 } gs4_stats;
 GS4_API gs4_stats gs4_get_stats(gs4_sim *sim);
 
@@ -841,8 +845,8 @@ typedef struct gs4_solve_stats {
 GS4_API int gs4_poisson_create(const gs4_poisson_desc *desc, gs4_poisson **solver);
 
 /* x holds a guess and the values in the air, then the solution; stats may be NULL. After
- * GS4_ERROR_NOT_CONVERGED x is the last iterate, the best in the energy norm, and `residual` is
- * true; after other errors x is as it was. */
+ * GS4_ERROR_NOT_CONVERGED x is the last iterate, the best in the energy norm, or the guess or 0
+ * where its residual is less, and `residual` is true; after other errors x is as it was. */
 GS4_API int gs4_poisson_solve(gs4_poisson *solver, const gs4_real *rhs, gs4_real *x,
                               gs4_solve_stats *stats);
 GS4_API void gs4_poisson_destroy(gs4_poisson *solver); /* NULL is fine */
@@ -1099,7 +1103,7 @@ static void gs4i_put_real(gs4i_text *t, double v)
  * return the code, so that checks need no simulation. */
 typedef struct gs4i_error {
     int code;
-    char text[320];
+    char text[480];
     gs4_log_fn log;
     void *log_user;
 } gs4i_error;
@@ -3872,22 +3876,24 @@ static void gs4i_clear_directions(gs4i_solver *s)
     }
 }
 
+/* What is said of each gs4i_outcome, before and after the residual. */
+static const char *const gs4i_ends[4][2] = {
+    { "", "" },
+    { "the residual is ", " of the right-hand side after max_iterations; more of them, or a "
+                          "larger tolerance, would do" },
+    { "the residual stays at ", " of the right-hand side; a larger tolerance would do" },
+    { "the iteration broke down, twice; the residual is ",
+      " of the right-hand side; less contrast of coefficient and diagonal would do" }
+};
+
 /* x: guess in the liquid and values in the air; out: the solution in the liquid, of mean 0 in
  * closed pockets. */
 static int gs4i_solver_solve(gs4i_solver *s, const gs4_real *rhs, gs4_real *x, double tolerance,
                              int limit, gs4_solve_stats *stats)
 {
     gs4i_given v;
-    static const char *const sentence[4][2] = {
-        { "", "" },
-        { "the residual is ", " of the right-hand side after max_iterations; more of them, or a "
-                              "larger tolerance, would do" },
-        { "the residual stays at ", " of the right-hand side; a larger tolerance would do" },
-        { "the iteration broke down, twice; the residual is ",
-          " of the right-hand side; less contrast of coefficient and diagonal would do" }
-    };
     gs4i_outcome end = GS4I_CONVERGED;
-    double size, norm, before = HUGE_VAL;
+    double size, norm, start, before = HUGE_VAL;
     int guess, diagonal = 0, iterations = 0;
     s->fault = NULL;
     v.s = s;
@@ -3904,6 +3910,7 @@ static int gs4i_solver_solve(gs4i_solver *s, const gs4_real *rhs, gs4_real *x, d
         norm = gs4i_true_residual(s, &v, GS4I_FROM_ZERO, NULL);
         guess = 0;
     }
+    start = norm;
     while (norm > tolerance * size) { /* until the true residual agrees */
         if (norm > 0.9 * before) {
             end = GS4I_STAGNATED;
@@ -3925,13 +3932,16 @@ static int gs4i_solver_solve(gs4i_solver *s, const gs4_real *rhs, gs4_real *x, d
         }
         if (end != GS4I_CONVERGED) break;
     }
+    /* iterates improve in the energy norm: the residual may be far above that of the start */
+    if (!(norm <= start))
+        norm = gs4i_true_residual(s, &v, guess ? GS4I_FROM_GUESS : GS4I_FROM_ZERO, NULL);
     gs4i_subtract_means(s, s->x);
     gs4i_parallel_for(s->tasks, s->level[0].n[2], gs4i_store_plane, &v);
     stats->iterations = iterations;
     stats->residual = size > 0 ? norm / size : 0;
     if (norm <= tolerance * size) return GS4_OK;
-    s->fault = sentence[end][0];
-    s->accepted = sentence[end][1];
+    s->fault = gs4i_ends[end][0];
+    s->accepted = gs4i_ends[end][1];
     return GS4_ERROR_NOT_CONVERGED;
 }
 
@@ -6753,7 +6763,7 @@ static void gs4i_elastic_rate(const gs4i_elastic_constants *l, gs4i_lanes G, gs4
 typedef struct gs4i_split {
     double inv_lambda, stretch, nu, alpha, L[3][3],
         swing /* how far f h / lambda_b moves within a relaxation */;
-    int bounded;
+    int bounded, substeps;
 } gs4i_split;
 
 /* Eigenvalues and eigenvectors (columns of Q) of a symmetric matrix, by Jacobi's rotations. */
@@ -7018,7 +7028,7 @@ static int gs4i_split_advance(gs4i_split *p, double c[6], double dt)
         gs4i_linear_advance(p, c, dt);
         left = 0;
     }
-    for (n = 0; n < GS4I_SPLIT_LIMIT && left > 0; n++) {
+    for (n = 0; n < GS4I_SPLIT_LIMIT && left > 0; n++, p->substeps++) {
         double one[6], two[6], error = 0, change = 0, before = 0, after = 0, size, ratio;
         if (h > left * (1 - 1e-12)) h = left;
         gs4i_exponential(p->L, 0.5 * h, half);
@@ -7090,6 +7100,7 @@ static void gs4i_conformation_rate(const gs4i_split *p, const double c[6], doubl
  * the batch that could not be done. */
 typedef struct gs4i_elastic_count {
     int split, bounded;
+    int substeps;
     int failed, no_modulus; /* number in the batch, from 1, of one whose stress, G0 failed */
 } gs4i_elastic_count;
 
@@ -7131,7 +7142,7 @@ static void gs4i_split_one(const gs4i_split_batch *batch, int n, gs4i_symmetric 
     p.stretch = (double)GS4I_NTH_CONST(l->stretch, n);
     p.nu = (double)GS4I_NTH_CONST(l->nu, n);
     p.alpha = (double)GS4I_NTH_CONST(l->alpha, n);
-    p.bounded = 0;
+    p.bounded = p.substeps = 0;
     for (i = 0; i < 3; i++)
         for (j = 0; j < 3; j++) p.L[i][j] = (double)GS4I_NTH(batch->L[3 * i + j], n);
     for (i = 0; i < 6; i++)
@@ -7140,6 +7151,7 @@ static void gs4i_split_one(const gs4i_split_batch *batch, int n, gs4i_symmetric 
     if (gs4i_split_advance(&p, c, dt) != GS4_OK) count->failed = n + 1;
     for (i = 0; i < 6; i++) GS4I_NTH(after[i], n) = GS4I_C(modulus * (c[i] - (i < 3)));
     count->bounded += p.bounded;
+    count->substeps += p.substeps;
     if (!rate) return;
     gs4i_conformation_rate(&p, c, end);
     for (i = 0; i < 6; i++) {
@@ -8348,10 +8360,11 @@ typedef struct gs4i_report {
     gs4_real max_stiffness; /* over density: squared speed of elastic waves */
     /* particles that need the robust local integrator; that took it; whose stretch was bounded */
     int hard, split, bounded;
-    int left_tile; /* particles outside of the tile: sort and try again */
-    int left;      /* particles that went out through an open wall */
-    uint64_t rows; /* of the tile that its particles touch */
-    int bad;       /* GS4I_BAD_*: a particle cannot be trusted */
+    int left_tile;     /* particles outside of the tile: sort and try again */
+    int left;          /* particles that went out through an open wall */
+    uint64_t substeps; /* of non-local stress */
+    uint64_t rows;     /* of the tile that its particles touch */
+    int bad;           /* GS4I_BAD_*: a particle cannot be trusted */
     uint32_t bad_id;
 } gs4i_report;
 
@@ -8385,6 +8398,7 @@ static void gs4i_report_merge(gs4i_report *into, const gs4i_report *r)
     into->max_stiffness = gs4i_max(into->max_stiffness, r->max_stiffness);
     into->split += r->split;
     into->bounded += r->bounded;
+    into->substeps += r->substeps;
     into->left_tile += r->left_tile;
     into->left += r->left;
     if (r->bad && !into->bad) {
@@ -8548,13 +8562,14 @@ static void gs4i_see_elastic_count(gs4i_response *r, const gs4i_elastic_count *c
     const uint32_t *id = r->p->id + r->i;
     if (count->no_modulus) gs4i_see_bad(r->report, GS4I_BAD_VISCOSITY, id[count->no_modulus - 1]);
     if (count->failed) gs4i_see_bad(r->report, GS4I_BAD_STRESS, id[count->failed - 1]);
+    r->report->substeps += (uint64_t)count->substeps;
 }
 
 /* Add the non-local stress of the stage (GS4) or of now to sigma. */
 static void gs4i_add_elastic(gs4i_response *r, gs4i_gradient L, gs4i_symmetric sigma)
 {
     gs4i_elastic e;
-    gs4i_elastic_count count = { 0, 0, 0, 0 };
+    gs4i_elastic_count count = { 0, 0, 0, 0, 0 };
     gs4i_symmetric s;
     gs4i_lanes G, stiffness;
     int b, c;
@@ -8636,7 +8651,7 @@ static void gs4i_advance_elastic(gs4i_response *r, gs4i_gradient L, int commit)
 {
     const gs4i_integrator euler = gs4i_without_rates(r->integrator);
     gs4i_elastic e;
-    gs4i_elastic_count count = { 0, 0, 0, 0 };
+    gs4i_elastic_count count = { 0, 0, 0, 0, 0 };
     gs4i_load_elastic_constants(&r->constants, &r->elastic);
     gs4i_load_elastic(gs4i_elastic_of(r), r->p->elastic_reals, r->n, &e);
     gs4i_correct_elastic(&r->elastic, &e, r->p->with_rates ? r->integrator : &euler, L, r->n,
@@ -10274,12 +10289,55 @@ struct gs4_sim {
     /* particles were edited by hand: check them; velocities too: find the spin of solids */
     int needs_check, needs_spin;
     int bad_distance; /* see gs4i_shape_or_field */
+    unsigned warned;  /* gs4i_warning */
+    int busy;         /* a callback may be running: no call may change anything */
+    double time_left; /* s, of gs4_advance */
     gs4i_error error; /* the last one */
 };
 
 static double gs4i_now(const gs4_sim *sim)
 {
     return sim->desc.now ? sim->desc.now(sim->desc.now_user) : 0;
+}
+
+/* What is likely not meant, though it is allowed: said once a simulation, at level 1. */
+typedef enum gs4i_warning {
+    GS4I_WARN_CUT_OFF = 1,
+    GS4I_WARN_INSIDE_BODY = 2,
+    GS4I_WARN_EMITTER_IN_BODY = 4,
+    GS4I_WARN_THIN_EMITTER = 8,
+    GS4I_WARN_STILL_EMITTER = 16,
+    GS4I_WARN_SHORT_STEPS = 32,
+    GS4I_WARN_COLD = 64,
+    GS4I_WARN_SUBSTEPS = 128,
+    GS4I_WARN_DISTANCE = 256,
+    GS4I_WARN_FULL = 512
+} gs4i_warning;
+
+static int gs4i_will_warn(const gs4_sim *sim, gs4i_warning which)
+{
+    return sim->desc.log && !(sim->warned & (unsigned)which);
+}
+
+/* "<before><value><after>" */
+static void gs4i_warn_value(gs4_sim *sim, gs4i_warning which, const char *before, double value,
+                            const char *after)
+{
+    char line[320];
+    gs4i_text t = gs4i_text_into(line, sizeof line);
+    if (!gs4i_will_warn(sim, which)) return;
+    sim->warned |= (unsigned)which;
+    gs4i_put(&t, before);
+    gs4i_put_real(&t, value);
+    gs4i_put(&t, after);
+    sim->desc.log(1, line, sim->desc.log_user);
+}
+
+static void gs4i_warn(gs4_sim *sim, gs4i_warning which, const char *line)
+{
+    if (!gs4i_will_warn(sim, which)) return;
+    sim->warned |= (unsigned)which;
+    sim->desc.log(1, line, sim->desc.log_user);
 }
 
 /* The law of a particle in its phase. */
@@ -13213,6 +13271,74 @@ static void gs4i_fill_one(gs4_sim *sim, const gs4_real at[3], gs4_vec3 centre, c
     gs4i_note_speed(sim, gs4i_length(v));
 }
 
+/* Deeper in a collider than rounding of surfaces that touch? */
+static int gs4i_is_in_body(const gs4_sim *sim, const gs4_real x[3])
+{
+    int i;
+    for (i = 0; i < sim->boundary.collider_count; i++)
+        if (!sim->boundary.colliders[i].is_emitter
+            && gs4i_collider_distance(&sim->boundary.colliders[i], gs4i_vec3(x[0], x[1], x[2]))
+                   < GS4I_C(-0.1) * sim->grid.h)
+            return 1;
+    return 0;
+}
+
+/* Are any of n rows of `stride` numbers, places first, in a body? */
+static void gs4i_warn_of_bodies(gs4_sim *sim, const gs4_real *x, int stride, int64_t n)
+{
+    int64_t i;
+    if (!sim->boundary.collider_count || !gs4i_will_warn(sim, GS4I_WARN_INSIDE_BODY)) return;
+    for (i = 0; i < n; i++)
+        if (gs4i_is_in_body(sim, x + i * stride)) break;
+    if (i < n)
+        gs4i_warn(sim, GS4I_WARN_INSIDE_BODY,
+                  "there is material inside of a collider: the first step puts it on its surface, "
+                  "far too densely; leave the collider out of the filling");
+}
+
+/* What a filling of an emitter or of now is likely not meant to be. */
+static void gs4i_warn_of_filling(gs4_sim *sim, const gs4_shape *shape, const gs4_fill *f)
+{
+    gs4_vec3 low = sim->grid.origin, high = low;
+    double from[3], to[3], origin[3];
+    int a, cut = 0;
+    const gs4_material *m = &sim->constants[f->material].is;
+    gs4i_shape_bounds(shape, &low, &high);
+    gs4i_to_double(low, from);
+    gs4i_to_double(high, to);
+    gs4i_to_double(sim->grid.origin, origin);
+    for (a = 0; a < 3; a++)
+        cut |= from[a] < origin[a] - 0.01 * (double)sim->grid.h
+               || to[a] > origin[a] + (sim->grid.cells[a] + 0.01) * (double)sim->grid.h;
+    if (cut && shape->kind != GS4_SHAPE_SDF && shape->kind != GS4_SHAPE_PLANE)
+        gs4i_warn(sim, GS4I_WARN_CUT_OFF,
+                  "a shape of material reaches beyond the grid and is cut off at its walls");
+    if (m->can_melt && f->temperature == 0)
+        gs4i_warn_value(sim, GS4I_WARN_COLD,
+                        "material that can melt begins at fill.temperature 0, the default; its "
+                        "melting_temperature is ",
+                        (double)m->melting_temperature, "");
+}
+
+/* There is no memory for so many. */
+static int gs4i_fail_particles(gs4i_error *e, const gs4i_particles *p, double wanted)
+{
+    gs4i_particles store = *p;
+    gs4i_array a[GS4I_ARRAYS];
+    gs4i_text t = gs4i_begin_error(e);
+    double each = 0;
+    int i;
+    gs4i_particle_arrays(&store, a);
+    for (i = 0; i < GS4I_ARRAYS; i++)
+        if (a[i].wanted) each += (double)a[i].size;
+    gs4i_put(&t, "out of memory: ");
+    gs4i_put_real(&t, wanted);
+    gs4i_put(&t, " particles need ");
+    gs4i_put_real(&t, each * wanted);
+    gs4i_put(&t, " bytes; nothing has changed");
+    return gs4i_end_error(e, GS4_ERROR_MEMORY);
+}
+
 /* Room for n more particles. */
 static int gs4i_make_room(gs4_sim *sim, int64_t n)
 {
@@ -13225,7 +13351,7 @@ static int gs4i_make_room(gs4_sim *sim, int64_t n)
     if ((uint64_t)sim->next_id + (uint64_t)n >= UINT32_MAX)
         return gs4i_fail(&sim->error, GS4_ERROR_MEMORY, "all 2^32 particle ids are used up");
     if (gs4i_particles_reserve(&sim->memory, &sim->particles, (int)wanted) != GS4_OK)
-        return gs4i_fail_memory(&sim->error);
+        return gs4i_fail_particles(&sim->error, &sim->particles, (double)wanted);
     return GS4_OK;
 }
 
@@ -13464,6 +13590,25 @@ static int gs4i_make_collider(gs4_sim *sim, gs4i_collider *b, const gs4_collider
                : GS4_OK;
 }
 
+/* About how many points of a lattice are in its shape: of 32^3 spread over it; or all, if they are
+ * no more than `few`. */
+static double gs4i_estimate_points(const gs4i_lattice *l, double few)
+{
+    double at[3], inside = 0, all = 1;
+    int i, a;
+    for (a = 0; a < 3; a++) all *= (double)(l->to[a] - l->from[a]);
+    if (all <= few) return all;
+    for (i = 0; i < 32 * 32 * 32; i++) {
+        for (a = 0; a < 3; a++)
+            at[a] = l->low[a]
+                    + ((double)l->from[a]
+                       + ((i >> 5 * a & 31) + 0.5) / 32 * (double)(l->to[a] - l->from[a]))
+                          * (double)l->fill->spacing;
+        inside += gs4i_lattice_is_inside(l, at);
+    }
+    return all * inside / (32 * 32 * 32);
+}
+
 /* All points of a filling, checked for overlap, into a list that the caller frees. How many, or
  * an error. */
 static int64_t gs4i_collect_points(gs4_sim *sim, const gs4i_lattice *l, gs4_real **points)
@@ -13474,7 +13619,12 @@ static int64_t gs4i_collect_points(gs4_sim *sim, const gs4i_lattice *l, gs4_real
     gs4_real x[3];
     int64_t n = 0, i;
     int overlap;
+    const double most = 1.2 * (double)room + 1e6, about = gs4i_estimate_points(l, most);
     sim->bad_distance = 0;
+    if (about > most) /* counting takes seconds for each 1e8 */
+        return gs4i_fail_value(&sim->error, GS4_ERROR_MEMORY, "shape holds about ", about,
+                               " particles, more than there is room for (max_particles); a larger "
+                               "spacing would do; nothing was added");
     while (n <= room && gs4i_next_filled(&sim->grid, &at, x)) n++;
     GS4I_TRY(gs4i_check_distances(sim));
     if (n > room)
@@ -13489,6 +13639,7 @@ static int64_t gs4i_collect_points(gs4_sim *sim, const gs4i_lattice *l, gs4_real
     if (!*points) return gs4i_fail_memory(&sim->error);
     for (at = *l, i = 0; i < n; i++) gs4i_next_filled(&sim->grid, &at, *points + 3 * i);
     overlap = gs4i_overlaps(sim, l, *points, (int)n);
+    if (!overlap) gs4i_warn_of_bodies(sim, *points, 3, n);
     if (!overlap) return n;
     gs4i_free(&sim->memory, *points, (size_t)n, 3 * sizeof **points);
     return overlap < 0
@@ -13549,6 +13700,23 @@ static int gs4i_add_collider(gs4_sim *sim, const gs4_collider *c, double spacing
     return b->collider_count++;
 }
 
+/* What an emitter is likely not meant to be. */
+static void gs4i_warn_of_emitter(gs4_sim *sim, const gs4_emitter *e)
+{
+    const gs4_vec3 flow = gs4i_sub(e->fill.velocity, e->travel);
+    gs4_vec3 low = e->shape.a, high = e->shape.b, size;
+    gs4i_shape_bounds(&e->shape, &low, &high);
+    size = gs4i_sub(high, low);
+    if (gs4i_min(size.x, gs4i_min(size.y, size.z)) < e->fill.spacing)
+        gs4i_warn(sim, GS4I_WARN_THIN_EMITTER,
+                  "an emitter is thinner than fill.spacing: rows of particles may miss it");
+    if (flow.x == 0 && flow.y == 0 && flow.z == 0)
+        gs4i_warn(sim, GS4I_WARN_STILL_EMITTER,
+                  "an emitter has the velocity of its material, fill.velocity: it is filled once "
+                  "and then gives nothing");
+    gs4i_warn_of_filling(sim, &e->shape, &e->fill);
+}
+
 /* An emitter is a collider too, which holds what is inside at the velocity of its filling. */
 static int gs4i_add_emitter(gs4_sim *sim, const gs4_emitter *is)
 {
@@ -13575,6 +13743,7 @@ static int gs4i_add_emitter(gs4_sim *sim, const gs4_emitter *is)
     e->is = *is;
     e->collider = id;
     gs4i_note_speed(sim, gs4i_length(is->fill.velocity));
+    gs4i_warn_of_emitter(sim, is);
     return sim->emitter_count++;
 }
 
@@ -13672,7 +13841,7 @@ static int gs4i_prepare_emitters(gs4_sim *sim, double dt)
     wanted = sim->particles.count + n;
     if (wanted <= sim->particles.capacity) return GS4_OK;
     if (wanted > GS4I_MAX_PARTICLES)
-        return gs4i_fail(&sim->error, GS4_ERROR_MEMORY, "more than 2^30 particles");
+        return gs4i_fail(&sim->error, GS4_ERROR_MEMORY, "more than 1073741808 particles");
     wanted += wanted / 8;
     if (gs4i_particles_reserve(&sim->memory, &sim->particles, wanted) != GS4_OK)
         return gs4i_fail_memory(&sim->error);
@@ -13707,13 +13876,16 @@ static void gs4i_emit(gs4_sim *sim, double dt)
         memcpy(e->offset, offset, sizeof offset);
         if (!gs4i_emission_is_due(e, offset)) continue;
         if (gs4i_emitter_lattice(sim, e, offset, 0, &l))
-            while (gs4i_next_emitted(&sim->grid, e, &l, x))
+            while (gs4i_next_emitted(&sim->grid, e, &l, x)) {
+                if (gs4i_will_warn(sim, GS4I_WARN_EMITTER_IN_BODY) && gs4i_is_in_body(sim, x))
+                    gs4i_warn(sim, GS4I_WARN_EMITTER_IN_BODY,
+                              "a collider covers a part of an emitter: what comes out there is put "
+                              "back on its surface");
                 if (!gs4i_add_particle(sim, gs4i_vec3(x[0], x[1], x[2]), f->velocity, mass, f)) {
-                    if (sim->desc.log)
-                        sim->desc.log(1, "an emitter pauses: max_particles is reached",
-                                      sim->desc.log_user);
+                    gs4i_warn(sim, GS4I_WARN_FULL, "an emitter pauses: max_particles is reached");
                     break;
                 }
+            }
         memcpy(e->emitted_offset, offset, sizeof offset);
         e->has_emitted = 1;
         gs4i_note_emission(sim, &sim->constants[f->material]);
@@ -13998,9 +14170,10 @@ static int gs4i_rasterise(gs4_sim *sim, gs4i_node_pass *nodes)
         gs4i_scatter(sim, gs4i_scheme_of(sim)->scatter[sim->particles.with_heat]);
         if (!gs4i_all_reports(sim).left_tile) return GS4_OK;
     }
-    return gs4i_fail(&sim->error, GS4_ERROR_UNSTABLE,
-                     "particles would move more than a cell beyond the domain in one step; the "
-                     "step was not taken");
+    return gs4i_fail(
+        &sim->error, GS4_ERROR_UNSTABLE,
+        "particles would move more than a cell beyond the domain in one step, or their "
+        "places would not be numbers; the step was not taken");
 }
 
 /* Mass and velocities of the nodes, with what walls and colliders take from them. */
@@ -14030,6 +14203,9 @@ static int gs4i_check_stage(gs4_sim *sim)
 
 /* --- the end of a step ------------------------------------------------------------------------ */
 
+/* A particle takes about 1 ms with so many, a thousand times what it takes else. */
+#define GS4I_MANY_SUBSTEPS 1000
+
 /* S8: colliders move, emitters give, what left the domain goes. */
 static void gs4i_finish(gs4_sim *sim)
 {
@@ -14042,6 +14218,11 @@ static void gs4i_finish(gs4_sim *sim)
         sim->limits = r;
         sim->split += (uint64_t)r.split;
         sim->bounded += (uint64_t)r.bounded;
+        if (r.substeps > GS4I_MANY_SUBSTEPS * (uint64_t)sim->particles.count)
+            gs4i_warn_value(sim, GS4I_WARN_SUBSTEPS, "the non-local stress took ",
+                            (double)r.substeps / sim->particles.count,
+                            " substeps a particle in one step; shorter steps (max_dt), longer "
+                            "relaxation_time and stretch_time or less anisotropy would do");
         if (r.left) gs4i_drop_outside(sim);
     }
     for (b = 0; b < sim->boundary.collider_count; b++)
@@ -14053,6 +14234,10 @@ static void gs4i_finish(gs4_sim *sim)
     sim->restart = 0;
     sim->shift = sim->integrator.next_shift;
     gs4i_emit(sim, dt);
+    if (sim->bad_distance)
+        gs4i_warn(sim, GS4I_WARN_DISTANCE,
+                  "a distance function (gs4_sdf) gave NaN or infinity at the end of a step: it "
+                  "counted as outside there");
 }
 
 /* How solids turn whose velocities were set by hand: by the grid, which sees less of it at their
@@ -14366,6 +14551,12 @@ typedef struct gs4i_column {
     size_t stride;
 } gs4i_column;
 
+/* Number i of the first row; NULL where there are none. */
+static const gs4_real *gs4i_from_number(const gs4_real *rows, int i)
+{
+    return rows ? rows + i : NULL;
+}
+
 static int gs4i_columns(gs4_sim *sim, gs4i_column c[GS4I_COLUMNS])
 {
     gs4i_particles *p = &sim->particles;
@@ -14373,13 +14564,14 @@ static int gs4i_columns(gs4_sim *sim, gs4i_column c[GS4I_COLUMNS])
                *real_npy = sizeof(gs4_real) == 4 ? "<f4" : "<f8";
     const size_t r = sizeof(gs4_real);
     int n = 0;
-    const gs4i_column columns[] = { { "position", real_ply, real_npy, p->position, r, 3, 4 * r },
-                                    { "velocity", real_ply, real_npy, p->velocity, r, 3, 4 * r },
-                                    { "volume_ratio", real_ply, real_npy, p->velocity + 3, r, 1,
-                                      4 * r },
-                                    { "mass", real_ply, real_npy, p->position + 3, r, 1, 4 * r },
-                                    { "id", "uint", "<u4", p->id, 4, 1, 4 },
-                                    { "material", "uchar", "|u1", p->material, 1, 1, 1 } };
+    const gs4i_column columns[] = {
+        { "position", real_ply, real_npy, p->position, r, 3, 4 * r },
+        { "velocity", real_ply, real_npy, p->velocity, r, 3, 4 * r },
+        { "volume_ratio", real_ply, real_npy, gs4i_from_number(p->velocity, 3), r, 1, 4 * r },
+        { "mass", real_ply, real_npy, gs4i_from_number(p->position, 3), r, 1, 4 * r },
+        { "id", "uint", "<u4", p->id, 4, 1, 4 },
+        { "material", "uchar", "|u1", p->material, 1, 1, 1 }
+    };
     const gs4i_column stress = {
         "stress", real_ply, real_npy, p->elastic, r, 6, (size_t)p->elastic_reals * r
     };
@@ -14388,7 +14580,7 @@ static int gs4i_columns(gs4_sim *sim, gs4i_column c[GS4I_COLUMNS])
     };
     const gs4i_column temperature = { "temperature", real_ply, real_npy, p->heat, r, 1, 4 * r };
     const gs4i_column fraction = {
-        "liquid_fraction", real_ply, real_npy, p->heat ? p->heat + 1 : NULL, r, 1, 4 * r
+        "liquid_fraction", real_ply, real_npy, gs4i_from_number(p->heat, 1), r, 1, 4 * r
     };
     const gs4i_column flux = { "flux", real_ply, real_npy, p->flux, r, 3, 4 * r };
     for (; n < (int)(sizeof columns / sizeof columns[0]); n++) c[n] = columns[n];
@@ -14822,6 +15014,7 @@ static int gs4i_head_is_sound(const gs4i_head *h)
 /* Of what moves. */
 static int gs4i_motions_are_sound(const gs4i_head *h, const gs4i_pieces *p)
 {
+    const double far_away = 1e12 * h->cell_size; /* whole numbers of a lattice end there */
     int i, k;
     for (i = 0; i < h->colliders; i++) {
         gs4i_collider b;
@@ -14838,7 +15031,8 @@ static int gs4i_motions_are_sound(const gs4i_head *h, const gs4i_pieces *p)
     for (i = 0; i < h->emitters; i++) {
         gs4i_emitter e;
         memcpy(&e, p->at[GS4I_PIECE_EMITTERS] + (size_t)i * sizeof e, sizeof e);
-        if (!gs4i_is_place(e.offset) || !gs4i_is_place(e.emitted_offset)) return 0;
+        for (k = 0; k < 3; k++)
+            if (!(fabs(e.offset[k]) < far_away && fabs(e.emitted_offset[k]) < far_away)) return 0;
     }
     return 1;
 }
@@ -15146,7 +15340,8 @@ static int gs4i_check(gs4i_error *e, const char *field, gs4_real value, gs4i_mus
     static const char *const accepted[] = { "a finite number", "a finite number above 0",
                                             "0 or a finite number above", "a number from 0 to 1" };
     const int sane = gs4i_finite(value) && value < GS4I_HUGE && value > -GS4I_HUGE,
-              tiny = !gs4i_is_zero(value) && value >= 0 && !(value > 1 / GS4I_HUGE);
+              tiny = !gs4i_is_zero(value) && value >= 0
+                     && !(value > (must == GS4I_FRACTION ? GS4I_TINY : 1 / GS4I_HUGE));
     int good = sane;
     gs4i_text t;
     switch (must) {
@@ -15243,7 +15438,25 @@ static int gs4i_check_plane(gs4i_error *e, gs4_shape *s)
     return GS4_OK;
 }
 
-static int gs4i_check_shape(gs4i_error *e, gs4i_memory *memory, gs4_shape *s)
+/* Distances from shapes far out are rounded there: to a tenth of a cell at most. Of functions only
+ * the bounds are far, which lattices begin at. */
+static int gs4i_check_reach(gs4i_error *e, double h, const gs4_shape *s)
+{
+    const double most = s->kind == GS4_SHAPE_SDF ? 1e9 * h : 0.1 * h / (double)GS4I_EPSILON;
+    gs4_vec3 low = s->a, high = s->a;
+    double from[3], to[3], reach = 0;
+    int a;
+    gs4i_shape_bounds(s, &low, &high);
+    gs4i_to_double(low, from);
+    gs4i_to_double(high, to);
+    for (a = 0; a < 3; a++) reach = fmax(reach, fmax(fabs(from[a]), fabs(to[a])));
+    return gs4i_require_value(
+        e, reach <= most, "shape reaches to the coordinate ", reach,
+        ", so far out that distances could not tell a tenth of a cell; cut it off near the grid, "
+        "use gs4_plane, or define GS4_DOUBLE");
+}
+
+static int gs4i_check_form(gs4i_error *e, gs4i_memory *memory, gs4_shape *s)
 {
     switch (s->kind) {
     case GS4_SHAPE_BOX: return gs4i_check_box(e, s);
@@ -15261,6 +15474,13 @@ static int gs4i_check_shape(gs4i_error *e, gs4i_memory *memory, gs4_shape *s)
     return gs4i_require(e, 0,
                         "shape is empty: make it with gs4_box, gs4_sphere, gs4_cylinder, "
                         "gs4_plane, gs4_sdf or gs4_mesh");
+}
+
+/* All of a shape for a grid of cells of h (m). */
+static int gs4i_check_shape(gs4i_error *e, gs4i_memory *memory, gs4_real h, gs4_shape *s)
+{
+    GS4I_TRY(gs4i_check_form(e, memory, s));
+    return gs4i_check_reach(e, (double)h, s);
 }
 
 /* --- rules of descriptions -------------------------------------------------------------------- */
@@ -15375,7 +15595,9 @@ static int gs4i_check_desc(gs4i_error *e, const gs4_sim_desc *d)
     int i;
     GS4I_TRY(gs4i_check_cells(e, d->cells, 4, 1 << 22, "; it must be from 4 to 4194304"));
     for (i = 0; i < 3; i++) blocks *= (d->cells[i] + 3) / 4 + 2;
-    GS4I_TRY(gs4i_require(e, blocks <= 1e9, "cells: more than 2^36 cells in all"));
+    GS4I_TRY(gs4i_require_value(e, blocks <= 1e9, "cells[] need ", blocks,
+                                " blocks of 4^3 cells, with one around; there may be 1e9, as of "
+                                "3992^3 cells"));
     GS4I_TRY(gs4i_check_cell_size(e, d->cell_size));
     GS4I_TRY(gs4i_check3(e, "origin", d->origin));
     gs4i_to_double(d->origin, origin);
@@ -15643,7 +15865,7 @@ static int gs4i_check_fill(gs4_sim *sim, gs4_fill *f)
 static int gs4i_check_collider(gs4_sim *sim, gs4_collider *c)
 {
     gs4i_error *e = &sim->error;
-    GS4I_TRY(gs4i_check_shape(e, &sim->memory, &c->shape));
+    GS4I_TRY(gs4i_check_shape(e, &sim->memory, sim->grid.h, &c->shape));
     if (c->shape.kind == GS4_SHAPE_MESH)
         GS4I_TRY(gs4i_check_thickness(e, &c->shape, (double)sim->grid.h));
     GS4I_TRY(gs4i_require(e, (int)c->contact >= 0 && c->contact <= GS4_WALL_SEPARATE,
@@ -15660,7 +15882,7 @@ static int gs4i_check_collider(gs4_sim *sim, gs4_collider *c)
 static int gs4i_check_emitter(gs4_sim *sim, gs4_emitter *m)
 {
     gs4i_error *e = &sim->error;
-    GS4I_TRY(gs4i_check_shape(e, &sim->memory, &m->shape));
+    GS4I_TRY(gs4i_check_shape(e, &sim->memory, sim->grid.h, &m->shape));
     GS4I_TRY(gs4i_require(e, m->shape.kind != GS4_SHAPE_PLANE,
                           "shape: a plane has no volume to emit from"));
     GS4I_TRY(gs4i_check_fill(sim, &m->fill));
@@ -15736,14 +15958,16 @@ static int gs4i_init(gs4_sim *sim)
     sim->restart = sim->needs_sort = sim->limits_stale = 1;
     g->table = (int32_t *)gs4i_alloc(&sim->memory, g->table_count, sizeof *g->table);
     if (!g->table) {
+        const double bytes = (double)g->table_count * sizeof *g->table;
         g->table_count = 0;
-        return gs4i_fail_memory(&sim->error);
+        return gs4i_fail_value(&sim->error, GS4_ERROR_MEMORY, "out of memory: the grid needs ",
+                               bytes, " bytes for the numbers of its blocks; fewer cells would do");
     }
     if (gs4i_grid_reserve_occupied(&sim->memory, g, 1) != GS4_OK)
         return gs4i_fail_memory(&sim->error);
     if (d->max_particles
         && gs4i_particles_reserve(&sim->memory, &sim->particles, d->max_particles) != GS4_OK)
-        return gs4i_fail_memory(&sim->error);
+        return gs4i_fail_particles(&sim->error, &sim->particles, d->max_particles);
     if (gs4i_start_tasks(&sim->memory, &sim->tasks, d->threads, d->parallel_for, d->parallel_user)
         != GS4_OK)
         return gs4i_fail(&sim->error, GS4_ERROR_MEMORY, "the threads could not be started");
@@ -15791,6 +16015,11 @@ static int gs4i_create(gs4i_error *e, const gs4_sim_desc *desc, gs4_sim **out)
     gs4i_set_defaults(&sim->desc);
     sim->memory = memory;
     sim->error = *e;
+    if (desc->log && !gs4i_finite(desc->flip_decay_time))
+        desc->log(1,
+                  "flip_decay_time is infinity: motion that the grid cannot see stays for ever, "
+                  "which shows as noise",
+                  desc->log_user);
     result = gs4i_init(sim);
     *e = sim->error;
     if (result == GS4_OK)
@@ -15819,7 +16048,7 @@ GS4_API void gs4_destroy(gs4_sim *sim)
 {
     gs4i_memory memory;
     int i;
-    if (!sim) return;
+    if (!sim || sim->busy) return; /* a callback of its own would go on in what is freed */
 #ifdef GS4_PTHREADS
     gs4i_pool_destroy(&sim->memory, sim->tasks.pool, sim->desc.threads - 1);
 #endif
@@ -15918,16 +16147,35 @@ GS4_API gs4_shape gs4_mesh(const gs4_real *vertices_xyz, int vertex_count, const
 
 /* --- scene ------------------------------------------------------------------------------------ */
 
+/* May this call change the simulation? Not while one of its callbacks runs. */
+static int gs4i_check_idle(gs4_sim *sim)
+{
+    if (!sim) return GS4_ERROR_ARGUMENT;
+    return gs4i_require(&sim->error, !sim->busy,
+                        "a callback must not change the simulation that called it: do that before "
+                        "or after the step");
+}
+
 GS4_API int gs4_add_material(gs4_sim *sim, const gs4_material *material)
 {
     gs4i_scene scene;
-    if (!sim) return GS4_ERROR_ARGUMENT;
+    GS4I_TRY(gs4i_check_idle(sim));
     scene = gs4i_scene_of(sim);
     GS4I_TRY(gs4i_require(&sim->error, material != NULL, "material is NULL"));
     GS4I_TRY(gs4i_check_material(&sim->error, &scene, material));
     GS4I_TRY(gs4i_require(&sim->error, sim->material_count < 256,
                           "there are 256 materials already, which is all there can be"));
     return gs4i_add_material(sim, material);
+}
+
+/* After an edit by hand: the phases that temperatures say, for whoever asks first. */
+static void gs4i_settle_edit(const gs4_sim *sim)
+{
+    const gs4i_particles *p = &sim->particles;
+    int i;
+    for (i = 0; i < p->count && p->with_heat && sim->needs_check; i++)
+        if (gs4i_abs(p->heat[4 * (size_t)i]) < GS4I_HUGE)
+            gs4i_settle_phase(p, (size_t)i, &sim->constants[p->material[i]]);
 }
 
 /* After an edit by hand: all that a user may have written, before it can do harm. */
@@ -15948,8 +16196,7 @@ static int gs4i_check_edit(gs4_sim *sim)
                 &sim->error, GS4_ERROR_ARGUMENT, "an edit has left particle ", (double)p->id[i],
                 " outside of the grid or with a number that is not finite; edit it again");
     }
-    for (i = 0; i < p->count && p->with_heat; i++)
-        gs4i_settle_phase(p, (size_t)i, &sim->constants[p->material[i]]);
+    gs4i_settle_edit(sim);
     gs4i_note_speed(sim, gs4i_top_speed(p));
     sim->needs_check = 0;
     return GS4_OK;
@@ -15958,13 +16205,18 @@ static int gs4i_check_edit(gs4_sim *sim)
 GS4_API int gs4_add_particles(gs4_sim *sim, gs4_shape shape, const gs4_fill *fill)
 {
     gs4_fill f;
-    if (!sim) return GS4_ERROR_ARGUMENT;
+    int result;
+    GS4I_TRY(gs4i_check_idle(sim));
     GS4I_TRY(gs4i_require(&sim->error, fill != NULL, "fill is NULL"));
     f = *fill;
     GS4I_TRY(gs4i_check_edit(sim));
     GS4I_TRY(gs4i_check_fill(sim, &f));
-    GS4I_TRY(gs4i_check_shape(&sim->error, &sim->memory, &shape));
-    return gs4i_fill_shape(sim, &shape, &f);
+    GS4I_TRY(gs4i_check_shape(&sim->error, &sim->memory, sim->grid.h, &shape));
+    gs4i_warn_of_filling(sim, &shape, &f);
+    sim->busy = 1;
+    result = gs4i_fill_shape(sim, &shape, &f);
+    sim->busy = 0;
+    return result;
 }
 
 /* Points in the domain, and their mean. */
@@ -15988,7 +16240,7 @@ GS4_API int gs4_add_points(gs4_sim *sim, const gs4_real *xyz, int count, gs4_rea
     gs4i_error *e;
     gs4_fill f;
     gs4_vec3 mean;
-    if (!sim) return GS4_ERROR_ARGUMENT;
+    GS4I_TRY(gs4i_check_idle(sim));
     e = &sim->error;
     GS4I_TRY(gs4i_require(e, fill && (xyz || count <= 0), "xyz or fill is NULL"));
     GS4I_TRY(gs4i_require_value(e, count >= 0, "count is ", count, "; it must be 0 or above"));
@@ -16000,6 +16252,7 @@ GS4_API int gs4_add_points(gs4_sim *sim, const gs4_real *xyz, int count, gs4_rea
                                 "volume_each is ", (double)volume_each,
                                 "; above eight cells there would be holes in the material"));
     GS4I_TRY(gs4i_check_points(sim, xyz, count, &mean));
+    gs4i_warn_of_bodies(sim, xyz, 3, count);
     return gs4i_add_points(sim, xyz, count, sim->constants[f.material].density * volume_each, mean,
                            &f);
 }
@@ -16007,18 +16260,21 @@ GS4_API int gs4_add_points(gs4_sim *sim, const gs4_real *xyz, int count, gs4_rea
 GS4_API int gs4_add_collider(gs4_sim *sim, const gs4_collider *collider)
 {
     gs4_collider c;
-    if (!sim) return GS4_ERROR_ARGUMENT;
+    int result;
+    GS4I_TRY(gs4i_check_idle(sim));
     GS4I_TRY(gs4i_require(&sim->error, collider != NULL, "collider is NULL"));
     c = *collider;
     GS4I_TRY(gs4i_check_collider(sim, &c));
-    return gs4i_add_collider(sim, &c, 0.5 * (double)sim->grid.h);
+    result = gs4i_add_collider(sim, &c, 0.5 * (double)sim->grid.h);
+    if (result >= 0) gs4i_warn_of_bodies(sim, sim->particles.position, 4, sim->particles.count);
+    return result;
 }
 
 GS4_API int gs4_move_collider(gs4_sim *sim, int collider, gs4_vec3 velocity,
                               gs4_vec3 angular_velocity)
 {
     gs4i_collider *c;
-    if (!sim) return GS4_ERROR_ARGUMENT;
+    GS4I_TRY(gs4i_check_idle(sim));
     GS4I_TRY(gs4i_check_id(&sim->error, "collider", collider, sim->boundary.collider_count));
     c = &sim->boundary.colliders[collider];
     GS4I_TRY(gs4i_require(&sim->error, !c->is_emitter,
@@ -16035,7 +16291,7 @@ GS4_API int gs4_move_collider(gs4_sim *sim, int collider, gs4_vec3 velocity,
 GS4_API int gs4_add_emitter(gs4_sim *sim, const gs4_emitter *emitter)
 {
     gs4_emitter e;
-    if (!sim) return GS4_ERROR_ARGUMENT;
+    GS4I_TRY(gs4i_check_idle(sim));
     GS4I_TRY(gs4i_require(&sim->error, emitter != NULL, "emitter is NULL"));
     e = *emitter;
     GS4I_TRY(gs4i_check_emitter(sim, &e));
@@ -16044,7 +16300,7 @@ GS4_API int gs4_add_emitter(gs4_sim *sim, const gs4_emitter *emitter)
 
 GS4_API int gs4_move_emitter(gs4_sim *sim, int emitter, gs4_vec3 travel)
 {
-    if (!sim) return GS4_ERROR_ARGUMENT;
+    GS4I_TRY(gs4i_check_idle(sim));
     GS4I_TRY(gs4i_check_id(&sim->error, "emitter", emitter, sim->emitter_count));
     GS4I_TRY(gs4i_check3(&sim->error, "travel", travel));
     sim->emitters[emitter].is.travel = travel;
@@ -16072,13 +16328,20 @@ GS4_API gs4_real gs4_stable_dt(const gs4_sim *sim) { return sim ? gs4i_limit_now
 static int gs4i_try_step(gs4_sim *sim, gs4_real dt)
 {
     gs4_real limit;
+    int result;
     GS4I_TRY(gs4i_check(&sim->error, "dt", dt, GS4I_POSITIVE));
     GS4I_TRY(gs4i_check_edit(sim));
+    sim->busy = 1;
     if (sim->limits_stale) {
         gs4i_find_limits(sim, sim->top_speed, &sim->limits);
         sim->limits_stale = 0;
     }
     limit = gs4i_limit_now(sim);
+    sim->busy = 0;
+    if (limit < GS4I_C(1e-6) && dt <= limit)
+        gs4i_warn_value(sim, GS4I_WARN_SHORT_STEPS, "the stable step is ", (double)limit,
+                        " s: a second of the scene takes more than a million steps; less "
+                        "viscosity, stiffness, sound_speed or speed, or larger cells, would do");
     if (dt > limit * (1 + 8 * GS4I_EPSILON)) {
         gs4i_text t = gs4i_begin_error(&sim->error);
         gs4i_put(&t, "dt is ");
@@ -16088,12 +16351,15 @@ static int gs4i_try_step(gs4_sim *sim, gs4_real dt)
         gs4i_put(&t, " s (gs4_stable_dt); the step was not taken");
         return gs4i_end_error(&sim->error, GS4_ERROR_UNSTABLE);
     }
-    return gs4i_step(sim, dt);
+    sim->busy = 1;
+    result = gs4i_step(sim, dt);
+    sim->busy = 0;
+    return result;
 }
 
 GS4_API int gs4_step(gs4_sim *sim, gs4_real dt)
 {
-    if (!sim) return GS4_ERROR_ARGUMENT;
+    GS4I_TRY(gs4i_check_idle(sim));
     return gs4i_try_step(sim, dt);
 }
 
@@ -16107,13 +16373,11 @@ static double gs4i_less(const gs4_sim *sim)
     return part > 0 && part < 0.5 ? part : 0.5;
 }
 
-GS4_API int gs4_advance(gs4_sim *sim, gs4_real duration)
+/* Steps until nothing of sim->time_left (s) is left. */
+static int gs4i_advance(gs4_sim *sim)
 {
-    double left;
-    if (!sim) return GS4_ERROR_ARGUMENT;
-    GS4I_TRY(gs4i_check(&sim->error, "duration", duration, GS4I_NOT_NEGATIVE));
-    GS4I_TRY(gs4i_check_edit(sim));
-    for (left = (double)duration; left > 0;) {
+    double *left = &sim->time_left;
+    while (*left > 0) {
         double fraction = (double)sim->desc.cfl, dt, steps;
         int tries, result = GS4_OK;
         /* a refused step is tried again, shorter */
@@ -16121,20 +16385,44 @@ GS4_API int gs4_advance(gs4_sim *sim, gs4_real duration)
             dt = fraction * (double)gs4i_limit_now(sim);
             if (sim->desc.max_dt > 0 && dt > (double)sim->desc.max_dt)
                 dt = (double)sim->desc.max_dt;
-            steps = ceil(left / dt * (1 - 1e-9));
+            steps = ceil(*left / dt * (1 - 1e-9));
             if (!(steps < GS4I_MAX_STEPS))
                 return gs4i_fail_value(
                     &sim->error, GS4_ERROR_UNSTABLE, "the stable step is ", dt,
                     " s, so short that the rest would take more than 1e8 steps; a larger "
                     "cell_size, or less viscosity, sound_speed or speed, would do");
-            dt = left / steps;
+            dt = *left / steps;
             result = gs4i_try_step(sim, GS4I_C(dt));
             if (result != GS4_ERROR_UNSTABLE) break;
         }
         if (result != GS4_OK) return result;
-        left = steps <= 1 ? 0 : left - sim->last_dt;
+        *left = steps <= 1 ? 0 : *left - sim->last_dt;
     }
     return GS4_OK;
+}
+
+GS4_API int gs4_advance(gs4_sim *sim, gs4_real duration)
+{
+    uint64_t before;
+    size_t used;
+    gs4i_text t;
+    int result;
+    GS4I_TRY(gs4i_check_idle(sim));
+    GS4I_TRY(gs4i_check(&sim->error, "duration", duration, GS4I_NOT_NEGATIVE));
+    GS4I_TRY(gs4i_check_edit(sim));
+    before = sim->steps;
+    sim->time_left = (double)duration;
+    result = gs4i_advance(sim);
+    if (result == GS4_OK || sim->steps == before) return result;
+    /* what it did nevertheless */
+    used = strlen(sim->error.text);
+    t = gs4i_text_into(sim->error.text + used, sizeof sim->error.text - used);
+    gs4i_put(&t, "; before it gs4_advance took ");
+    gs4i_put_integer(&t, (int64_t)(sim->steps - before));
+    gs4i_put(&t, " steps, and ");
+    gs4i_put_real(&t, sim->time_left);
+    gs4i_put(&t, " s are left");
+    return result;
 }
 
 /* --- looking ---------------------------------------------------------------------------------- */
@@ -16165,6 +16453,10 @@ GS4_API gs4_view gs4_particles(const gs4_sim *sim, gs4_field field)
 {
     gs4_view v;
     int components;
+    if (sim
+        && (field == GS4_FIELD_LIQUID_FRACTION || field == GS4_FIELD_STRESS
+            || field == GS4_FIELD_DEFORMATION))
+        gs4i_settle_edit(sim);
     v.data = gs4i_field_data(sim, field, &components);
     v.count = v.data ? sim->particles.count : 0;
     v.components = v.data ? components : 0;
@@ -16179,6 +16471,8 @@ GS4_API gs4_edit gs4_edit_particles(gs4_sim *sim, gs4_field field)
 {
     gs4_edit e;
     int components = 0;
+    memset(&e, 0, sizeof e);
+    if (gs4i_check_idle(sim) != GS4_OK) return e;
     e.data =
         field == GS4_FIELD_POSITION || field == GS4_FIELD_VELOCITY || field == GS4_FIELD_TEMPERATURE
             ? gs4i_field_data(sim, field, &components)
@@ -16186,7 +16480,7 @@ GS4_API gs4_edit gs4_edit_particles(gs4_sim *sim, gs4_field field)
     e.count = e.data ? sim->particles.count : 0;
     e.components = e.data ? components : 0;
     e.stride = e.data ? 4 : 0;
-    if (sim && !e.data)
+    if (!e.data)
         gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT,
                   "only position, velocity and, in a scene with heat, temperature can be edited");
     if (e.data && field == GS4_FIELD_VELOCITY) {
@@ -16216,7 +16510,9 @@ GS4_API gs4_stats gs4_get_stats(gs4_sim *sim)
     int c;
     memset(&s, 0, sizeof s);
     if (!sim) return s;
+    gs4i_settle_edit(sim);
     s.time = sim->time;
+    s.time_left = sim->time_left;
     s.steps = sim->steps;
     s.dt = sim->last_dt;
     s.particles = sim->particles.count;
@@ -16271,6 +16567,7 @@ GS4_API uint64_t gs4_state_hash(const gs4_sim *sim)
     size_t i, n;
     int s, k;
     if (!sim) return 0;
+    gs4i_settle_edit(sim);
     p = &sim->particles;
     for (i = 0; i < (size_t)p->count; i++) {
         h = gs4i_hash_bytes(gs4i_mix(p->id[i]), p->position + 4 * i, 4 * sizeof(gs4_real));
@@ -16321,28 +16618,29 @@ GS4_API uint64_t gs4_state_hash(const gs4_sim *sim)
 
 GS4_API int gs4_write_ply(gs4_sim *sim, const char *path)
 {
-    if (!sim) return GS4_ERROR_ARGUMENT;
+    GS4I_TRY(gs4i_check_idle(sim));
     GS4I_TRY(gs4i_check_edit(sim));
     return gs4i_write_ply(sim, path);
 }
 
 GS4_API int gs4_write_raw(gs4_sim *sim, const char *path)
 {
-    if (!sim) return GS4_ERROR_ARGUMENT;
+    GS4I_TRY(gs4i_check_idle(sim));
     GS4I_TRY(gs4i_check_edit(sim));
     return gs4i_write_raw(sim, path);
 }
 
 GS4_API int gs4_save(gs4_sim *sim, const char *path)
 {
-    if (!sim) return GS4_ERROR_ARGUMENT;
+    GS4I_TRY(gs4i_check_idle(sim));
     GS4I_TRY(gs4i_check_edit(sim));
     return gs4i_save(sim, path);
 }
 
 GS4_API int gs4_load(gs4_sim *sim, const char *path)
 {
-    return sim ? gs4i_load(sim, path) : GS4_ERROR_ARGUMENT;
+    GS4I_TRY(gs4i_check_idle(sim));
+    return gs4i_load(sim, path);
 }
 
 /* --- one material point ----------------------------------------------------------------------- */
@@ -16458,7 +16756,7 @@ static int gs4i_step_solid_point(gs4i_error *e, gs4i_point_batch *q, gs4i_integr
 static int gs4i_step_liquid_point(gs4i_error *e, gs4i_point_batch *q, gs4i_integrator *integrator,
                                   const gs4_real rho[2], gs4_point *point)
 {
-    gs4i_elastic_count count = { 0, 0, 0, 0 };
+    gs4i_elastic_count count = { 0, 0, 0, 0, 0 };
     int i, restart = 1;
     for (i = 0; i < 6; i++) restart &= point->stress_rate[i] == 0;
     gs4i_family(integrator, rho[0], rho[1], restart);
@@ -16745,6 +17043,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_MAD
 #undef GS4I_MAX_PARTICLES
 #undef GS4I_MAX_STEPS
+#undef GS4I_MANY_SUBSTEPS
 #undef GS4I_MIXING
 #undef GS4I_MORE_SWEEPS
 #undef GS4I_NEGLIGIBLE_FACE
@@ -16832,4 +17131,8 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  * where they were large. Parts that overlap are a union, before the overlap was empty. Parts inside
  * out, and bodies thinner than 0.3 cells on average, are refused.
  * Heat: temperatures that the grid does not see fade as fast as heat is conducted, before no faster
- * than flip_decay_time; beside isothermal walls faster yet. */
+ * than flip_decay_time; beside isothermal walls faster yet.
+ * Refused now: numbers too small for a reciprocal, callbacks that give no number, shapes too far
+ * out for gs4_real, changes of a simulation by its own callbacks, checkpoints with numbers that no
+ * simulation has or with other pivots, starts or stops. `log` says at level 1, once each, what is
+ * allowed but hardly meant. gs4_stats has time_left. Files follow symbolic links. */

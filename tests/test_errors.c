@@ -1859,8 +1859,302 @@ static void test_errors_growth(void)
     gs4_destroy(sim);
 }
 
+/* --- what is hardly meant, and what takes long ------------------------------------------------ */
+
+/* A shape that reaches far out gives what one gives that ends at the walls, or is refused. */
+static void test_errors_far_shapes(void)
+{
+    const double ends[] = { 1, 1e3, 1e6, 1e12, 1e17 };
+    int i, n[5];
+    for (i = 0; i < 5; i++) {
+        const double most = ends[i];
+        gs4_sim *sim = err_sim();
+        gs4_emitter e;
+        gs4_collider c;
+        int r;
+        memset(&e, 0, sizeof e);
+        memset(&c, 0, sizeof c);
+        e.shape = gs4_box(at(i ? -most : 0, 0.75, i ? -most : 0), at(most, most, most));
+        e.fill = scene_fill(at(0, -0.5, 0));
+        c.shape = e.shape;
+        r = gs4_add_emitter(sim, &e);
+        n[i] = 0;
+        if (r >= 0) {
+            CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)0.002), 0);
+            n[i] = gs4_get_stats(sim).particles;
+            CHECK(n[i] == n[0] && n[0] == 16 * 16 * 4);
+        } else {
+            CHECK(r == GS4_ERROR_ARGUMENT && strstr(gs4_last_error(sim), "far out"));
+            ERR_REFUSED(sim, gs4_add_collider(sim, &c), GS4_ERROR_ARGUMENT, "far out");
+            ERR_REFUSED(sim, gs4_add_particles(sim, e.shape, &e.fill), GS4_ERROR_ARGUMENT,
+                        "far out");
+        }
+        gs4_destroy(sim);
+    }
+    CHECK(n[1] && !n[4] && (n[2] != 0) == (sizeof(gs4_real) == 8));
+}
+
+/* Temperatures written by hand melt at once, for every call: a refused one changes nothing. */
+static void test_errors_melt_by_hand(void)
+{
+    gs4_sim *sim = NULL;
+    const gs4_sim_desc d = err_desc();
+    gs4_material m = err_material();
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    gs4_edit e;
+    m.solid = GS4_NEO_HOOKEAN;
+    m.shear_modulus = 1000;
+    m.heat_capacity = 1000;
+    m.can_melt = 1;
+    m.melting_temperature = 30;
+    f.temperature = 20;
+    gs4_create(&d, &sim);
+    CHECK(gs4_add_material(sim, &m) == 0);
+    CHECK(gs4_add_particles(sim, gs4_sphere(at(0.5, 0.5, 0.5), (gs4_real)0.2), &f) > 0);
+    e = gs4_edit_particles(sim, GS4_FIELD_TEMPERATURE);
+    e.data[0] = 50;
+    ERR_REFUSED(sim, gs4_step(sim, 2 * gs4_stable_dt(sim)), GS4_ERROR_UNSTABLE, "dt is");
+    e = gs4_edit_particles(sim, GS4_FIELD_TEMPERATURE);
+    e.data[4] = 50;
+    CHECK(gs4_particles(sim, GS4_FIELD_LIQUID_FRACTION).data[4] == 1);
+    ERR_REFUSED(sim, gs4_write_ply(sim, ""), GS4_ERROR_ARGUMENT, "path");
+    gs4_destroy(sim);
+}
+
+static void *err_little_alloc(size_t bytes, size_t alignment, void *user)
+{
+    (void)user;
+    return bytes < 100000000 ? gs4i_default_alloc(bytes, alignment, NULL) : NULL;
+}
+
+/* Too much is refused at once, by a sentence that says how much it is. */
+static void test_errors_too_much(void)
+{
+    const clock_t start = clock();
+    gs4_sim_desc d = err_desc();
+    const gs4_fill f = scene_fill(at(0, 0, 0));
+    gs4_sim *sim = NULL;
+    int a;
+    d.allocator.alloc_fn = err_little_alloc;
+    d.allocator.free_fn = gs4i_default_free;
+    for (a = 0; a < 3; a++) d.cells[a] = 4096;
+    CHECK(gs4_create(&d, &sim) == GS4_ERROR_ARGUMENT);
+    CHECK(strstr(gs4_last_error(NULL), "1.08005e9") && strstr(gs4_last_error(NULL), "1e9"));
+    d.cell_size = (gs4_real)1e-3;
+    for (a = 0; a < 3; a++) d.cells[a] = 3992;
+    CHECK(gs4_create(&d, &sim) == GS4_ERROR_MEMORY);
+    CHECK(strstr(gs4_last_error(NULL), "4e9 bytes"));
+    for (a = 0; a < 3; a++) d.cells[a] = 1000;
+    d.max_particles = 1073741808;
+    CHECK(gs4_create(&d, &sim) == GS4_ERROR_MEMORY);
+    CHECK(strstr(gs4_last_error(NULL), "1.07374e9 particles need"));
+    d.max_particles = 0;
+    CHECK(gs4_create(&d, &sim) == GS4_OK);
+    sim->desc.max_particles = 0;
+    {
+        const gs4_material m = err_material();
+        CHECK(gs4_add_material(sim, &m) == 0);
+    }
+    ERR_REFUSED(sim, gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1, 1, 1)), &f),
+                GS4_ERROR_MEMORY, "about 8e9");
+    gs4_destroy(sim);
+    CHECK((double)(clock() - start) / CLOCKS_PER_SEC < 0.5);
+}
+
+/* gs4_advance that is refused half way says what it did, and what is left. */
+static void test_errors_half_way(void)
+{
+    err_turn turn = { 1e30, -1, 0, 1000 };
+    gs4_sim *sim = err_turning(0, 0, 0, &turn);
+    const double duration = 0.05;
+    gs4_stats s;
+    char said[40];
+    CHECK(gs4_advance(sim, (gs4_real)duration) == GS4_ERROR_UNSTABLE);
+    s = gs4_get_stats(sim);
+    sprintf(said, "took %d steps", (int)s.steps);
+    CHECK(s.steps > 2 && strstr(gs4_last_error(sim), said)
+          && strstr(gs4_last_error(sim), "s are left"));
+    CHECK_CLOSE(s.time + s.time_left, duration, 1e-6);
+    turn.last_good = INT_MAX;
+    CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)s.time_left), 0);
+    CHECK_CLOSE(gs4_get_stats(sim).time, duration, 1e-6);
+    CHECK(gs4_get_stats(sim).time_left == 0);
+    gs4_destroy(sim);
+}
+
+/* A callback that calls back. */
+typedef struct err_calls_back {
+    gs4_sim *sim;
+    int calls, refused;
+} err_calls_back;
+
+static gs4_real err_calling_viscosity(gs4_real temperature, gs4_real rate, void *user)
+{
+    err_calls_back *c = (err_calls_back *)user;
+    const gs4_material m = err_material();
+    (void)temperature;
+    (void)rate;
+    if (!c->sim || c->calls++) return (gs4_real)0.1;
+    c->refused += gs4_step(c->sim, (gs4_real)1e-4) == GS4_ERROR_ARGUMENT;
+    c->refused += strstr(gs4_last_error(c->sim), "callback") != NULL;
+    c->refused += gs4_advance(c->sim, (gs4_real)1e-4) == GS4_ERROR_ARGUMENT;
+    c->refused += gs4_add_material(c->sim, &m) == GS4_ERROR_ARGUMENT;
+    c->refused += gs4_load(c->sim, "x") == GS4_ERROR_ARGUMENT;
+    c->refused += gs4_edit_particles(c->sim, GS4_FIELD_VELOCITY).data == NULL;
+    gs4_destroy(c->sim);
+    return (gs4_real)0.1;
+}
+
+static void test_errors_callback_calls(void)
+{
+    const gs4_sim_desc d = err_desc();
+    gs4_material m = err_material();
+    err_calls_back c = { NULL, 0, 0 };
+    gs4_sim *sim = NULL;
+    m.viscosity_law = GS4_VISCOSITY_CALLBACK;
+    m.viscosity_fn = err_calling_viscosity;
+    m.viscosity_user = &c;
+    gs4_create(&d, &sim);
+    CHECK(gs4_add_material(sim, &m) == 0);
+    CHECK(err_add_block(sim) == 64);
+    c.sim = sim;
+    CHECK_RESULT(sim, gs4_step(sim, (gs4_real)1e-4), 0);
+    CHECK(c.calls > 1 && c.refused == 6);
+    c.sim = NULL;
+    CHECK_RESULT(sim, gs4_step(sim, (gs4_real)1e-4), 0);
+    gs4_destroy(sim);
+}
+
+/* Counts the lines of level 1 that hold a word. */
+typedef struct err_words {
+    const char *word;
+    int said, lines;
+} err_words;
+
+static void err_hear(int level, const char *message, void *user)
+{
+    err_words *w = (err_words *)user;
+    if (level != 1) return;
+    w->lines++;
+    w->said += strstr(message, w->word) != NULL;
+}
+
+typedef enum err_trap {
+    ERR_NO_TRAP,
+    ERR_CUT_OFF,
+    ERR_CUT_OFF_EMITTER,
+    ERR_BODY_OVER_MATERIAL,
+    ERR_MATERIAL_IN_BODY,
+    ERR_POINTS_IN_BODY,
+    ERR_BODY_OVER_EMITTER,
+    ERR_THIN_EMITTER,
+    ERR_STILL_EMITTER,
+    ERR_SHORT_STEPS,
+    ERR_COLD,
+    ERR_NO_DECAY,
+    ERR_MANY_SUBSTEPS,
+    ERR_TRAPS
+} err_trap;
+
+/* A scene without any trap, or with one; everything is done twice. */
+static void err_walk_into(err_trap trap, err_words *words)
+{
+    gs4_sim_desc d = err_desc();
+    gs4_material m = err_material();
+    gs4_fill f = scene_fill(at(0, 0, -0.1));
+    gs4_collider body;
+    gs4_emitter e;
+    gs4_sim *sim = NULL;
+    gs4_shape low = gs4_box(at(0.25, 0.25, 0.25), at(0.75, 0.75, 0.5)),
+              high = gs4_box(at(0.25, 0.25, 0.75), at(0.75, 0.75, 0.875));
+    const gs4_real xyz[3] = { (gs4_real)0.2, (gs4_real)0.2, (gs4_real)0.1 };
+    int twice;
+    d.log = err_hear;
+    d.log_user = words;
+    if (trap == ERR_NO_DECAY) d.flip_decay_time = (gs4_real)ERR_INFINITY;
+    if (trap == ERR_SHORT_STEPS) m.viscosity = (gs4_real)3e7;
+    m.heat_capacity = 1000;
+    m.solid = GS4_NEO_HOOKEAN;
+    m.shear_modulus = 1000;
+    m.can_melt = 1;
+    m.melting_temperature = 30;
+    f.temperature = trap == ERR_COLD ? 0 : 40;
+    if (trap == ERR_MANY_SUBSTEPS) {
+        m = scene_liquid(1000, 0.01, 10);
+        f.temperature = 0;
+        f.velocity = at(0, 0, -3);
+        f.angular_velocity = at(0, 5, 0);
+        m.liquid = GS4_POM_POM;
+        m.relaxation_time = (gs4_real)1e-4;
+        m.stretch_time = (gs4_real)1e-5;
+        low = gs4_box(at(0.25, 0.25, 0.25), at(0.375, 0.375, 0.375));
+        m.anisotropy = (gs4_real)0.9;
+        m.arms = 2;
+    }
+    memset(&body, 0, sizeof body);
+    memset(&e, 0, sizeof e);
+    body.shape = gs4_box(at(-1, -1, -1), at(2, 2, trap == ERR_BODY_OVER_MATERIAL ? 0.4 : 0.2));
+    if (trap == ERR_MATERIAL_IN_BODY) low = gs4_box(at(0.25, 0.25, 0.1), at(0.75, 0.75, 0.5));
+    if (trap == ERR_CUT_OFF) low = gs4_sphere(at(0, 0.5, 0.5), (gs4_real)0.2);
+    if (trap == ERR_CUT_OFF_EMITTER) high = gs4_box(at(0.25, 0.25, 0.75), at(0.75, 0.75, 1.1));
+    if (trap == ERR_THIN_EMITTER) high = gs4_box(at(0.25, 0.25, 0.75), at(0.75, 0.75, 0.78));
+    CHECK(gs4_create(&d, &sim) == GS4_OK);
+    CHECK_RESULT(sim, gs4_add_material(sim, &m), 0);
+    if (trap == ERR_BODY_OVER_MATERIAL) CHECK(gs4_add_particles(sim, low, &f) > 0);
+    for (twice = 0; twice < 2; twice++) CHECK(gs4_add_collider(sim, &body) >= 0);
+    if (trap == ERR_BODY_OVER_EMITTER) {
+        body.shape = gs4_sphere(at(0.5, 0.5, 0.8), (gs4_real)0.2);
+        CHECK(gs4_add_collider(sim, &body) >= 0);
+    }
+    if (trap != ERR_BODY_OVER_MATERIAL) CHECK(gs4_add_particles(sim, low, &f) > 0);
+    if (trap == ERR_POINTS_IN_BODY)
+        for (twice = 0; twice < 2; twice++)
+            CHECK(gs4_add_points(sim, xyz, 1, (gs4_real)1e-4, &f) == 1);
+    f.angular_velocity = at(0, 0, 0);
+    e.fill = f;
+    e.shape = high;
+    if (trap == ERR_STILL_EMITTER) e.travel = f.velocity;
+    for (twice = 0; twice < 2 && trap != ERR_MANY_SUBSTEPS; twice++)
+        CHECK(gs4_add_emitter(sim, &e) >= 0);
+    for (twice = 0; twice < 4; twice++)
+        CHECK_RESULT(sim, gs4_step(sim, (gs4_real)0.4 * gs4_stable_dt(sim)), 0);
+    gs4_destroy(sim);
+}
+
+/* Each says one line, once, and a scene without any says none. */
+static void test_errors_traps(void)
+{
+    static const char *const words[ERR_TRAPS] = { "",
+                                                  "cut off",
+                                                  "cut off",
+                                                  "inside of a collider",
+                                                  "inside of a collider",
+                                                  "inside of a collider",
+                                                  "covers",
+                                                  "thinner",
+                                                  "gives nothing",
+                                                  "a million steps",
+                                                  "temperature 0",
+                                                  "flip_decay_time",
+                                                  "substeps" };
+    int trap;
+    for (trap = 0; trap < ERR_TRAPS; trap++) {
+        err_words w = { NULL, 0, 0 };
+        w.word = words[trap];
+        err_walk_into((err_trap)trap, &w);
+        err_report(w.said == (trap != ERR_NO_TRAP) && w.lines == w.said, "trap", words[trap], trap,
+                   w.lines, "not said once and alone");
+    }
+}
+
 static void run_errors(void)
 {
+    RUN(test_errors_far_shapes);
+    RUN_ONCE(test_errors_melt_by_hand);
+    RUN(test_errors_too_much);
+    RUN_ONCE(test_errors_half_way);
+    RUN_ONCE(test_errors_callback_calls);
+    RUN(test_errors_traps);
     RUN(test_errors_limits);
     RUN(test_errors_stats);
     RUN(test_errors_growth);

@@ -867,8 +867,52 @@ static void test_poisson_krylov(void)
     CHECK(gs4i_conjugate_gradients(&k, 1e-10, 100) == GS4_ERROR_MEMORY);
 }
 
+/* Coefficients over twelve orders of magnitude and few iterations, whose residuals go up at first:
+ * what is left is never worse than the start, 0. */
+static void test_poisson_never_worse(void)
+{
+    enum {
+        SIDE = 6,
+        CELLS = SIDE * SIDE * SIDE,
+        FACES = SIDE * SIDE * (SIDE + 1)
+    };
+    int seed, i, a, worse = 0, ended_early = 0;
+    for (seed = 0; seed < 60; seed++) {
+        static gs4_real face[3][FACES], rhs[CELLS], x[CELLS];
+        static uint8_t kind[CELLS];
+        gs4_poisson_desc d;
+        gs4_poisson *p = NULL;
+        gs4_solve_stats stats;
+        memset(&d, 0, sizeof d);
+        memset(x, 0, sizeof x);
+        d.kind = kind;
+        d.cell_size = 1;
+        d.max_iterations = 1 + seed % 4;
+        d.tolerance = (gs4_real)1e-6;
+        for (a = 0; a < 3; a++) {
+            d.cells[a] = SIDE;
+            d.coefficient[a] = face[a];
+            for (i = 0; i < FACES; i++)
+                face[a][i] = (gs4_real)pow(
+                    10, (double)(gs4i_mix((uint64_t)(seed * 3000 + a * 1000 + i)) % 13) - 6);
+        }
+        for (i = 0; i < CELLS; i++) {
+            const uint64_t u = gs4i_mix((uint64_t)(seed * 1000 + i) << 20);
+            kind[i] = (uint8_t)(u % 10 ? GS4_CELL_LIQUID : GS4_CELL_AIR);
+            rhs[i] = (gs4_real)((double)(u >> 40) / 16777216 - 0.5);
+        }
+        CHECK(gs4_poisson_create(&d, &p) == GS4_OK);
+        ended_early += gs4_poisson_solve(p, rhs, x, &stats) == GS4_ERROR_NOT_CONVERGED;
+        worse += !(stats.residual <= 1 + 1e-9);
+        gs4_poisson_destroy(p);
+    }
+    CHECK(worse == 0 && ended_early > 10);
+    if (worse) printf("    worse than 0: %d of %d\n", worse, ended_early);
+}
+
 static void run_poisson(void)
 {
+    RUN(test_poisson_never_worse);
     RUN(test_poisson_krylov);
     RUN_ONCE(test_poisson_agrees_with_oracle);
     RUN_ONCE(test_poisson_iterations);

@@ -617,7 +617,7 @@ typedef struct gs4_sim_desc {
     int max_particles;         /* 0: grows as needed */
 
     /* More threads than 0 or 1 need GS4_PTHREADS or parallel_for; the results do not depend on
-     * them. Without an allocator malloc and free are used; without log and now it is silent. */
+     * them. Without an allocator calloc and free are used; without log and now it is silent. */
     int threads;
     gs4_parallel_for_fn parallel_for;
     void *parallel_user;
@@ -922,7 +922,8 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *solver); /* NULL is fine */
 #define GS4I_INLINE static inline
 #endif
 
-/* Every allocation of one simulation goes through here: 64-byte aligned, zeroed, counted. */
+/* Every allocation of one simulation goes through here: 64-byte aligned, zeroed, counted. What
+ * calloc zeroed is not touched again: large reservations take no memory before they are used. */
 typedef struct gs4i_memory {
     gs4_allocator hook;
     uint64_t bytes;
@@ -933,7 +934,7 @@ static void *gs4i_default_alloc(size_t bytes, size_t alignment, void *user)
     char *raw, *aligned;
     (void)user;
     if (bytes > SIZE_MAX - alignment - sizeof(void *)) return NULL;
-    raw = (char *)malloc(bytes + alignment + sizeof(void *));
+    raw = (char *)calloc(bytes + alignment + sizeof(void *), 1);
     if (!raw) return NULL;
     aligned = raw + sizeof(void *);
     aligned += (alignment - (size_t)((uintptr_t)aligned % alignment)) % alignment;
@@ -963,7 +964,7 @@ static void *gs4i_alloc(gs4i_memory *m, size_t count, size_t size)
     if (size && count > (SIZE_MAX / 2) / size) return NULL;
     p = m->hook.alloc_fn(count * size, 64, m->hook.user);
     if (!p) return NULL;
-    memset(p, 0, count * size);
+    if (m->hook.alloc_fn != gs4i_default_alloc) memset(p, 0, count * size);
     m->bytes += (uint64_t)count * size;
     return p;
 }
@@ -13463,6 +13464,25 @@ static int gs4i_lattice_is_inside(const gs4i_lattice *l, const double at[3])
            < 0;
 }
 
+/* About how many points of a lattice are in its shape: of 32^3 spread over it; or all, if they are
+ * no more than `few`. */
+static double gs4i_estimate_points(const gs4i_lattice *l, double few)
+{
+    double at[3], inside = 0, all = 1;
+    int i, a;
+    for (a = 0; a < 3; a++) all *= (double)(l->to[a] - l->from[a]);
+    if (all <= few) return all;
+    for (i = 0; i < 32 * 32 * 32; i++) {
+        for (a = 0; a < 3; a++)
+            at[a] = l->low[a]
+                    + ((double)l->from[a]
+                       + ((i >> 5 * a & 31) + 0.5) / 32 * (double)(l->to[a] - l->from[a]))
+                          * (double)l->fill->spacing;
+        inside += gs4i_lattice_is_inside(l, at);
+    }
+    return all * inside / (32 * 32 * 32);
+}
+
 /* Of a particle of a filling, kg: a lattice cell of material. */
 static gs4_real gs4i_mass_of(const gs4_sim *sim, const gs4_fill *f)
 {
@@ -13588,25 +13608,6 @@ static int gs4i_make_collider(gs4_sim *sim, gs4i_collider *b, const gs4_collider
     return is->shape.kind == GS4_SHAPE_MESH
                ? gs4i_field_create(&sim->error, &sim->memory, b, &sim->grid, spacing)
                : GS4_OK;
-}
-
-/* About how many points of a lattice are in its shape: of 32^3 spread over it; or all, if they are
- * no more than `few`. */
-static double gs4i_estimate_points(const gs4i_lattice *l, double few)
-{
-    double at[3], inside = 0, all = 1;
-    int i, a;
-    for (a = 0; a < 3; a++) all *= (double)(l->to[a] - l->from[a]);
-    if (all <= few) return all;
-    for (i = 0; i < 32 * 32 * 32; i++) {
-        for (a = 0; a < 3; a++)
-            at[a] = l->low[a]
-                    + ((double)l->from[a]
-                       + ((i >> 5 * a & 31) + 0.5) / 32 * (double)(l->to[a] - l->from[a]))
-                          * (double)l->fill->spacing;
-        inside += gs4i_lattice_is_inside(l, at);
-    }
-    return all * inside / (32 * 32 * 32);
 }
 
 /* All points of a filling, checked for overlap, into a list that the caller frees. How many, or
@@ -13827,17 +13828,24 @@ static int gs4i_prepare_emitters(gs4_sim *sim, double dt)
     int i, n = 0, wanted;
     for (i = 0; i < sim->emitter_count; i++) {
         const gs4i_emitter *e = &sim->emitters[i];
-        double offset[3];
+        double offset[3], about;
         gs4_real x[3];
         gs4i_lattice l;
         sim->boundary.colliders[e->collider].is_off = !gs4i_emitter_is_on(e, sim->time);
         if (!gs4i_emitter_is_on(e, sim->time + dt)) continue;
+        /* with max_particles there is all the room there will be; emitters pause when it is full */
+        if (sim->desc.max_particles) continue;
         gs4i_offset_after(e, dt, offset);
-        if (gs4i_emission_is_due(e, offset) && gs4i_emitter_lattice(sim, e, offset, dt, &l))
-            while (gs4i_next_emitted(&sim->grid, e, &l, x)) n++;
+        if (!gs4i_emission_is_due(e, offset) || !gs4i_emitter_lattice(sim, e, offset, dt, &l))
+            continue;
+        about = e->has_emitted ? 0 : gs4i_estimate_points(&l, 1.2 * GS4I_MAX_PARTICLES);
+        if (about > 1.2 * GS4I_MAX_PARTICLES)
+            return gs4i_fail_value(&sim->error, GS4_ERROR_MEMORY, "an emitter holds about ", about,
+                                   " particles; there may be 1073741808; a larger fill.spacing or "
+                                   "max_particles would do");
+        while (gs4i_next_emitted(&sim->grid, e, &l, x)) n++;
     }
-    /* with max_particles there is all the room there will be; emitters pause when it is full */
-    if (n == 0 || sim->desc.max_particles) return GS4_OK;
+    if (n == 0) return GS4_OK;
     wanted = sim->particles.count + n;
     if (wanted <= sim->particles.capacity) return GS4_OK;
     if (wanted > GS4I_MAX_PARTICLES)
@@ -15974,7 +15982,7 @@ static int gs4i_init(gs4_sim *sim)
     return GS4_OK;
 }
 
-/* The hooks, or malloc and free. */
+/* The hooks, or calloc and free. */
 static gs4i_memory gs4i_memory_with(gs4_allocator hook)
 {
     gs4i_memory memory;

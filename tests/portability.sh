@@ -19,7 +19,7 @@ few_tests='free_flight files_continue errors_desc errors_fill solid_stress poiss
 # Words that stood for two things, or that the field does not use: no identifier or comment of gs4mpm.h has one.
 retired='ghost rehears calm strayed hidden fading unseen turning kick frozen warmth afresh unsorted unturned mouth nozzle obstacle'
 # What the library may ask of libc; all of libm is allowed, and with GS4_PTHREADS what is named here.
-libc='malloc|free|mem(cpy|move|set|cmp)|str(len|cmp|chr)|f(open|close|read|write|flush|error)|rename|remove|stat|readlink|__assert_fail'
+libc='calloc|free|mem(cpy|move|set|cmp)|str(len|cmp|chr)|f(open|close|read|write|flush|error)|rename|remove|stat|readlink|__assert_fail'
 pthreads='pthread_((mutex|cond)_[a-z]+|create|join)'
 
 strict='-Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion -Wdouble-promotion -Wcast-qual -Wundef -Werror'

@@ -1957,6 +1957,14 @@ static void test_errors_too_much(void)
     }
     ERR_REFUSED(sim, gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1, 1, 1)), &f),
                 GS4_ERROR_MEMORY, "about 8e9");
+    {
+        gs4_emitter e;
+        memset(&e, 0, sizeof e);
+        e.fill = scene_fill(at(0, 0, -1));
+        e.shape = gs4_box(at(0, 0, 0), at(1, 1, 1));
+        CHECK(gs4_add_emitter(sim, &e) == 0);
+        ERR_REFUSED(sim, gs4_step(sim, (gs4_real)1e-7), GS4_ERROR_MEMORY, "about 8.0");
+    }
     gs4_destroy(sim);
     CHECK((double)(clock() - start) / CLOCKS_PER_SEC < 0.5);
 }

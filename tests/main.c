@@ -51,6 +51,7 @@ int main(int count, char **values)
     RUN_FULL(test_heat_surface);
     RUN(test_heat_seam);
     RUN_ONCE(test_heat_on_each_wall);
+    RUN_ONCE(test_heat_one_wall);
     RUN_ONCE(test_heat_drifts);
     RUN_ONCE(test_heat_around);
     RUN_ONCE(test_heat_walls);

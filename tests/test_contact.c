@@ -617,6 +617,40 @@ static void test_contact_carries(void)
     }
 }
 
+/* A sticky body goes off at some speed and a block of liquid on it with the same: nothing happens
+ * between them, wherever both are in their blocks of nodes. */
+static void test_contact_glides(void)
+{
+    int n, i, c;
+    contact_seed = 31;
+    for (n = 0; n < 14; n++) {
+        const contact_frame f = n < 12 ? contact_face(n / 2, n % 2, 0.7) : contact_askew(-0.1);
+        const gs4_material m = scene_liquid(1000, 50, 10);
+        const gs4_sim_desc d = contact_desc(n % 2, GS4_WALL_SLIP);
+        const gs4_vec3 V = contact_vector(&f, 0.1, -2, -0.2);
+        const double v[3] = { (double)V.x, (double)V.y, (double)V.z };
+        gs4_sim *sim = physics_create(&d, &m);
+        double off = 0, start;
+        gs4_view u, J;
+        const int id = contact_body(sim, &f, n % 5 == 3 ? 0 : n % 5, 0.5, GS4_WALL_STICK, 0);
+        CHECK_RESULT(sim, gs4_move_collider(sim, id, V, at(0, 0, 0)), GS4_OK);
+        contact_block(sim, &f, 0, 0.4, 0.3, V);
+        start = gs4_get_stats(sim).time;
+        CHECK(physics_run(sim, start + (n < 12 ? 0.15 : 0.1)) == 0);
+        u = gs4_particles(sim, GS4_FIELD_VELOCITY);
+        J = gs4_particles(sim, GS4_FIELD_VOLUME_RATIO);
+        for (i = 0; i < u.count; i++) {
+            off = fmax(off, fabs((double)J.data[(size_t)i * (size_t)J.stride] - 1));
+            for (c = 0; c < 3; c++)
+                off = fmax(off,
+                           fabs((double)u.data[(size_t)i * (size_t)u.stride + (size_t)c] - v[c]));
+        }
+        if (test_filter[0]) printf("glides, case %d: off by %.1e\n", n, off);
+        CHECK(off < (CONTACT_DOUBLE ? 1e-12 : 1e-5));
+        gs4_destroy(sim);
+    }
+}
+
 /* World point x after `time` with a body that goes with V and turns with w about `pivot`. */
 static void contact_pose(const double pivot[3], const double V[3], const double w[3], double time,
                          const double x[3], double out[3])
@@ -1256,6 +1290,7 @@ static void run_contact(void)
     RUN_ONCE(test_contact_sticky_wall);
     RUN_ONCE(test_contact_leaves);
     RUN_ONCE(test_contact_carries);
+    RUN_ONCE(test_contact_glides);
     RUN_ONCE(test_contact_rides);
     RUN_ONCE(test_contact_sweeps);
     RUN_ONCE(test_contact_spins);

@@ -1188,6 +1188,44 @@ static void test_files_forged(void)
     }
 }
 
+/* Blocks in another order, or twice, under a right checksum: refused, as their particles and nodes
+ * would be those of others. */
+static void test_files_forged_order(void)
+{
+    const gs4_sim_desc d = files_desc(0);
+    const gs4_material m = scene_liquid(1000, 1, 10);
+    const gs4_fill f = scene_fill(at(0, 0, 0));
+    size_t at_byte[64], size[64], bytes = 0;
+    gs4_sim *sim[2];
+    unsigned char *data;
+    int k;
+    for (k = 0; k < 2; k++) {
+        sim[k] = physics_create(&d, &m);
+        CHECK(gs4_add_particles(sim[k], gs4_box(at(0.1, 0.1, 0.1), at(0.9, 0.9, 0.9)), &f) > 0);
+        CHECK_RESULT(sim[k], files_steps(sim[k], 3 + k), 0);
+    }
+    CHECK_RESULT(sim[0], gs4_save(sim[0], files_path("o.sav")), 0);
+    data = files_read(files_path("o.sav"), &bytes);
+    CHECK(data && files_pieces(sim[0], data, at_byte, size) == 3 + GS4I_STATE_ARRAYS + 5);
+    for (k = 0; data && k < 3; k++) { /* occupied blocks, their first particles, blocks */
+        const int piece = 3 + GS4I_STATE_ARRAYS + k;
+        const size_t where = at_byte[piece] + (k == 1 ? 4 : 0);
+        uint32_t two[2], swapped[2];
+        CHECK(size[piece] >= 12);
+        memcpy(two, data + where, sizeof two);
+        swapped[0] = two[1];
+        swapped[1] = two[0];
+        CHECK(two[0] < two[1]);
+        files_forge(sim[1], data, bytes, where, swapped, sizeof swapped, "order");
+        swapped[0] = two[0];
+        if (k != 1) files_forge(sim[1], data, bytes, where, swapped, sizeof swapped, "twice");
+    }
+    free(data);
+    gs4_destroy(sim[0]);
+    gs4_destroy(sim[1]);
+    remove(files_path("o.sav"));
+}
+
 /* Any number of a checkpoint is a bad one, under a right checksum: refused, or it goes on with
  * finite numbers. What materials have become does not come from the file. */
 static void test_files_forged_anywhere(void)
@@ -1578,6 +1616,7 @@ static void run_files(void)
     RUN(test_files_bad_edit);
     RUN(test_files_damaged);
     RUN_ONCE(test_files_forged);
+    RUN_ONCE(test_files_forged_order);
     RUN_ONCE(test_files_forged_anywhere);
     RUN(test_files_endless);
     RUN(test_files_other_desc);

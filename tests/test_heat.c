@@ -375,6 +375,50 @@ static void test_heat_on_each_wall(void)
         }
 }
 
+/* A bar of 16 cells with one isothermal wall, any of six, at 1: one that is at 1 stays there to
+ * rounding, and of one at 2 the excess goes as the sum over odd k of
+ * 8/(pi k)^2 exp(-(pi k/2)^2 t). */
+static void test_heat_one_wall(void)
+{
+    const double pi = acos(-1.0), time = 0.1;
+    double expected = 0, first = 0;
+    int w, k, c, i;
+    for (k = 1; k < 40; k += 2)
+        expected += 8 / (pi * pi * k * k) * exp(-pi * pi * k * k / 4 * time);
+    for (w = 0; w < 6; w++)
+        for (k = 1; k <= 2; k++) {
+            gs4_sim_desc d = scene_cube(16);
+            gs4_material m = scene_liquid(1, 0, 1e-3);
+            gs4_fill f = scene_fill(at(0, 0, 0));
+            gs4_sim *sim;
+            gs4_stats s;
+            double left;
+            for (c = 0; c < 3; c++) d.cells[c] = c == w / 2 ? 16 : 4;
+            d.wall_is_isothermal[w] = 1;
+            d.wall_temperature[w] = 1;
+            m.heat_capacity = m.conductivity = 1;
+            f.temperature = (gs4_real)k;
+            sim = physics_create(&d, &m);
+            CHECK(gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1, 1, 1)), &f) > 0);
+            for (i = 0; i < 20; i++)
+                CHECK_RESULT(sim, gs4_step(sim, (gs4_real)(time / 20)), GS4_OK);
+            s = gs4_get_stats(sim);
+            left = s.thermal_energy / s.mass - 1;
+            if (test_filter[0])
+                printf("wall %d, from %d: %.6f to %.6f, excess %.6f, exact %.6f\n", w, k,
+                       s.min_temperature, s.max_temperature, left, k == 2 ? expected : 0);
+            if (k == 1) {
+                CHECK_CLOSE(s.min_temperature, 1, 2e-6);
+                CHECK_CLOSE(s.max_temperature, 1, 2e-6);
+            } else {
+                if (w == 0) first = left;
+                CHECK_CLOSE(left / expected, 1, 0.001);
+                CHECK_CLOSE(left, first, 1e-5);
+            }
+            gs4_destroy(sim);
+        }
+}
+
 /* What is left of the heat of a slab of eight cells in air at 0 that goes `cells` cells towards end
  * `side` of an axis. Another one lies on the other end and has nothing to do with it. */
 static double heat_drift(int axis, int side, double cells)

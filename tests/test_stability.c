@@ -409,7 +409,7 @@ static gs4_shape stability_shape(int i)
     static const gs4_real vertices[12] = { (gs4_real)0.5, (gs4_real)0.5, (gs4_real)0.5,
                                            (gs4_real)0.8, (gs4_real)0.5, (gs4_real)0.5,
                                            (gs4_real)0.5, (gs4_real)0.9, (gs4_real)0.5,
-                                           (gs4_real)0.5, (gs4_real)0.5, (gs4_real)0.6 };
+                                           (gs4_real)0.5, (gs4_real)0.5, (gs4_real)0.9 };
     static const int triangles[12] = { 0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3 };
     switch (i) {
     case 0: return gs4_box(at(0.2, 0.1, 0.5), at(0.6, 0.3, 0.55));

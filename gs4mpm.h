@@ -148,8 +148,8 @@
  *     correct    dr = (R - r) / alpha_m;   y += dt r + gamma dt dr;   r += dr
  *
  * The rate belongs to t + (1/2 - gamma) dt. The first step, and the first after an edit, has
- * alpha_m = gamma = 1, alpha_f = 1/2 and no rates. Where R depends on y~ itself, linearly, (4) is
- * solved for it:
+ * alpha_m = gamma = 1, alpha_f = 1/2 and no rates; alpha_f of heat is 1 - h^2/(D dt), if that is
+ * more, D = k/(rho c). Where R depends on y~ itself, linearly, (4) is solved for it:
  *     (y~ - y**) / s = R(y~),   y** = y + (alpha_f dt - s) r,   s = alpha_f gamma dt / alpha_m
  *
  * THE STEP, as in gs4i_make_step:
@@ -246,9 +246,9 @@
  *     their first amplitude at 32 cells a wave (tests/test_heat.c); sound within 1.5 % at 32 cells
  *     a wave; a melting front within 0.3 cells; heat in an insulated box conserved to the tolerance
  *     of the solver; temperatures beyond those given by up to 0.1 % of a jump where D dt/h^2 is at
- *     most 1/2, D = k/(rho c) (a longer first step overshoots, at worst by the jump); particles in
- *     the first two cells at an isothermal wall off by up to 1 % of a jump from h^2/D after it on,
- *     0.2 % from 5 h^2/D on;
+ *     most 5, D = k/(rho c), above that by up to 5 % (rho_inf = 1: 11 %) after a first step;
+ *     particles in the first two cells at an isothermal wall off by up to 1 % of a jump from h^2/D
+ *     after it on, 0.2 % from 5 h^2/D on;
  *     with sharp_gradients elastic waves and sound within 0.1 % at 32 cells a wave, order in space
  *     2.5; the pressure of a column at rest is off by up to 0.045 rho g h in the cells at its
  *     surface, 0.035 above its floor, and 0.02 between (else 0.02, 0.015 and 0.005);
@@ -8014,7 +8014,7 @@ static void gs4i_set_spin(const gs4i_particles *p, size_t i, gs4_vec3 w)
  * and leaves alone what the grid does see, along an axis to O(h^6). Beside a jump temperatures
  * overshoot by 0.03 % of it; by 0.6 % without the last term. The rate is m = GS4I_MIXING k/(rho c
  * h^2); of the non-local part of conduction m / (1 + m t_q), at most 1/t_q. No rate is above
- * 1/(2 dt): (4) is stable to four times that, but faster ones overshoot after a first step.
+ * 1/(2 dt): (4) is stable to four times that.
  *
  * Isothermal walls: R is odd about them. At h/4 a particle gathers 0.41 of the rate of its node,
  * at the wall itself none. It would hardly follow, and its neighbours would make up for it: by 4
@@ -8233,7 +8233,9 @@ static void gs4i_give_heat(gs4i_heat_work *w, gs4i_gradient L, const gs4i_wide *
 
 /* By how much mixing is faster than from[] says, near isothermal walls: there from[3] is the part
  * of the rate from[1] that comes from mirror nodes. With y = sqrt(m t_q) the non-local part of
- * conduction has m / (1 + y^2) in from[1], and m / (1 + y) here. */
+ * conduction has m / (1 + y^2) in from[1], and m / (1 + y) here. At most 1/(2 dt + 2 before), with
+ * (0, 0) 3/8 of 1/dt: from there on (4) has complex roots, and much is to mix here. 3/4 overshot
+ * by 14 % of the jump after a first step, 1/2 by 0.2 %. */
 static void gs4i_mixing_near_walls(const gs4i_heat_work *w, gs4i_lanes from[4], gs4i_lanes factor)
 {
     const gs4i_heat_constants *l = &w->constants;
@@ -8241,7 +8243,8 @@ static void gs4i_mixing_near_walls(const gs4i_heat_work *w, gs4i_lanes from[4], 
     int b;
     GS4I_BATCH_LOOP(b) {
         const gs4i_wide zero = from[3][b] - from[3][b], one = zero + GS4I_C(1),
-                        most = zero + GS4I_C(0.5) / w->integrator->dt, tiny = zero + GS4I_TINY,
+                        most = zero + GS4I_C(0.5) / (w->integrator->dt + w->integrator->before),
+                        tiny = zero + GS4I_TINY,
                         absurd = zero + GS4I_C(1e9) /* its square is a float */,
                         local = l->fourier[b];
         gs4i_wide y = per_reach * l->reach[b], rate, own;
@@ -14157,21 +14160,36 @@ static gs4i_integrator gs4i_make_integrator(const gs4_sim *sim, gs4_real dt)
     return k;
 }
 
+/* k_eff dt / (rho c h^2) of the best conductor: cells^2 that heat goes in a step. */
+static gs4_real gs4i_heat_number(const gs4_sim *sim, const gs4i_integrator *k)
+{
+    const gs4_real half = GS4I_C(0.5) * k->dt;
+    gs4_real most = 0;
+    int i;
+    for (i = 0; i < sim->material_count; i++) {
+        const gs4i_material_constants *mat = &sim->constants[i];
+        const gs4_real local = (mat->fourier * mat->flux_time + half) / (mat->flux_time + half);
+        if (mat->conductivity > 0)
+            most = gs4i_max(most, local * (mat->conductivity / mat->capacity) * mat->inv_density
+                                      * k->dt * k->inv_area);
+    }
+    return most;
+}
+
 /* The same for heat, which has steps far beyond its own limit: there a rate is what a step as
  * long as the last one has left to do, and where dt has grown by more than twice, rates start
- * anew. */
+ * anew. Without rates alpha_f = 1/2 would answer a wall with twice its temperature, so it goes to
+ * 1, backward Euler, as heat goes further in the step. */
 static gs4i_integrator gs4i_make_heat_integrator(const gs4_sim *sim)
 {
     gs4i_integrator k = sim->integrator;
-    const gs4_real grown = sim->last_dt > 0 && sim->last_dt < (double)k.dt
-                               ? GS4I_C(sim->last_dt / (double)k.dt)
-                               : GS4I_C(1);
-    if (sim->particles.with_rates && grown < GS4I_C(0.5)) {
-        gs4i_family(&k, 0, 0, 1);
-        k.prediction.ahead = k.before = 0;
-        k.s = k.alpha_f * k.gamma * k.dt / k.alpha_m;
-        k.inv_alpha_m = 1 / k.alpha_m;
-    }
+    const int grown = sim->last_dt > 0 && sim->last_dt / (double)k.dt < 0.5;
+    if (!sim->particles.with_rates || !(k.restart || grown)) return k;
+    if (!k.restart) k.prediction.ahead = k.before = 0;
+    gs4i_family(&k, 0, 0, 1);
+    k.alpha_f = gs4i_max(k.alpha_f, 1 - 1 / gs4i_max(gs4i_heat_number(sim, &k), GS4I_C(1)));
+    k.s = k.alpha_f * k.gamma * k.dt / k.alpha_m;
+    k.inv_alpha_m = 1 / k.alpha_m;
     return k;
 }
 

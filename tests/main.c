@@ -56,6 +56,7 @@ int main(int count, char **values)
     RUN_ONCE(test_heat_around);
     RUN_ONCE(test_heat_walls);
     RUN(test_heat_bounds);
+    RUN_ONCE(test_heat_long_steps);
     RUN_ONCE(test_heat_beside_walls);
     RUN_ONCE(test_heat_waves_at_walls);
     RUN_ONCE(test_heat_stefan);

@@ -9750,8 +9750,6 @@ static int gs4i_field_create(gs4i_error *e, gs4i_memory *m, gs4i_collider *b, co
     const double half = 0.5 * (double)g->h,
                  extent = (double)gs4i_max(size.x, gs4i_max(size.y, size.z));
     double bytes, most;
-    GS4I_TRY(gs4i_require_value(e, extent < 1e9 * half, "shape: the mesh extends over ", extent,
-                                " m; above 5e8 cells there is no telling where it is"));
     spacing = fmax(fmin(spacing, half), 1e-9 * extent);
     for (;;) {
         gs4i_field_lay(&b->field, s, spacing);
@@ -15508,10 +15506,12 @@ static int gs4i_check_plane(gs4i_error *e, gs4_shape *s)
 }
 
 /* Distances from shapes far out are rounded there: to a tenth of a cell at most. Of functions only
- * the bounds are far, which lattices begin at. */
+ * the bounds are far, which lattices begin at; of meshes, 1e9 samples half a cell apart. */
 static int gs4i_check_reach(gs4i_error *e, double h, const gs4_shape *s)
 {
-    const double most = s->kind == GS4_SHAPE_SDF ? 1e9 * h : 0.1 * h / (double)GS4I_EPSILON;
+    const double most = s->kind == GS4_SHAPE_SDF    ? 1e9 * h
+                        : s->kind == GS4_SHAPE_MESH ? 2.5e8 * h
+                                                    : 0.1 * h / (double)GS4I_EPSILON;
     gs4_vec3 low = s->a, high = s->a;
     double from[3], to[3], reach = 0;
     int a;

@@ -404,6 +404,36 @@ static void test_mesh_soup(void)
     mesh_end(&soup);
 }
 
+/* Triangles whose corners lie on a line are as far as the line from end to end. */
+static void test_mesh_needles(void)
+{
+    int i, a;
+    for (i = 0; i < 2000; i++) {
+        static const int corners[3] = { 0, 1, 2 };
+        const double middle = (1 + i % 7) / 8.0;
+        double from[3], way[3], p[3], along = 0, length2 = 0, square = 0;
+        gs4i_facet facet;
+        gs4_real v[9];
+        gs4_shape s;
+        for (a = 0; a < 3; a++) {
+            /* multiples of 1/8 of 1/1024: exactly on a line */
+            from[a] = floor(100 * 1024 * mesh_random()) / 1024;
+            way[a] = floor(100 * 1024 * mesh_random()) / 1024 - from[a];
+            v[i % 3 * 3 + a] = (gs4_real)from[a];
+            v[(i + 1) % 3 * 3 + a] = (gs4_real)(from[a] + middle * way[a]);
+            v[(i + 2) % 3 * 3 + a] = (gs4_real)(from[a] + way[a]);
+            p[a] = from[a] + mesh_random() * way[a] + mesh_random() - 0.5;
+            along += (p[a] - from[a]) * way[a];
+            length2 += way[a] * way[a];
+        }
+        along = fmax(0, fmin(along / length2, 1));
+        for (a = 0; a < 3; a++) square += pow(from[a] + along * way[a] - p[a], 2);
+        s = gs4_mesh(v, 3, corners, 1);
+        gs4i_make_facet(&s, 0, 1, &facet);
+        CHECK_CLOSE(sqrt(gs4i_facet_distance2(&facet, p)), sqrt(square), 2e-5);
+    }
+}
+
 static void mesh_refused(gs4_sim *sim, const mesh_parts *m, const char *a, const char *b)
 {
     gs4_collider c;
@@ -440,6 +470,14 @@ static void test_mesh_refused(void)
         mesh_triangle(&m, 1, 3 - part, 2 + part);
     }
     mesh_refused(sim, &m, "no volume", "");
+    /* nor do they far away, where places are rounded */
+    for (part = 0; part < 12; part++) m.v[part] = (gs4_real)(1e6 + 5 * mesh_random());
+    m.triangles = 0;
+    mesh_triangle(&m, 0, 1, 2);
+    mesh_triangle(&m, 1, 3, 2);
+    mesh_triangle(&m, 1, 0, 2);
+    mesh_triangle(&m, 2, 3, 1);
+    mesh_refused(sim, &m, "no volume", "");
     /* a part alone inside out, and one that another covers in part */
     for (part = 0; part < 2; part++) {
         m.vertices = m.triangles = 0;
@@ -453,7 +491,7 @@ static void test_mesh_refused(void)
     mesh_refused(sim, &m, "thick", "0.3 cells");
     m.vertices = m.triangles = 0;
     mesh_box(&m, at(-1e9, -1e9, -1e9), at(1e9, 0.5, 1e9), 0);
-    mesh_refused(sim, &m, "2e9", "5e8 cells");
+    mesh_refused(sim, &m, "reaches to the coordinate 1e9", "so far out");
     CHECK(sim->boundary.collider_count == 0);
     gs4_destroy(sim);
     mesh_end(&m);
@@ -558,6 +596,7 @@ static void run_mesh(void)
     RUN(test_mesh_far);
     RUN_ONCE(test_mesh_fan);
     RUN(test_mesh_soup);
+    RUN(test_mesh_needles);
     RUN(test_mesh_refused);
     RUN_ONCE(test_mesh_memory);
     RUN(test_mesh_too_much);

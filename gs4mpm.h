@@ -15505,16 +15505,30 @@ static int gs4i_check_plane(gs4i_error *e, gs4_shape *s)
     return GS4_OK;
 }
 
-/* Distances from shapes far out are rounded there: to a tenth of a cell at most. Of functions only
- * the bounds are far, which lattices begin at; of meshes, 1e9 samples half a cell apart. */
-static int gs4i_check_reach(gs4i_error *e, double h, const gs4_shape *s)
+/* A box without what of it is farther than `most` (m), which no grid reaches. */
+static void gs4i_cut_box(gs4_shape *s, gs4_real most)
+{
+    s->a = gs4i_vec3(gs4i_max(s->a.x, -most), gs4i_max(s->a.y, -most), gs4i_max(s->a.z, -most));
+    s->b = gs4i_vec3(gs4i_min(s->b.x, most), gs4i_min(s->b.y, most), gs4i_min(s->b.z, most));
+}
+
+/* Distances from shapes far out are rounded there: to a tenth of a cell at most. Boxes are cut off
+ * at that, five times as far as grids reach. Of functions only the bounds are far, which lattices
+ * begin at; of meshes, 1e9 samples half a cell apart. */
+static int gs4i_check_reach(gs4i_error *e, double h, gs4_shape *s)
 {
     const double most = s->kind == GS4_SHAPE_SDF    ? 1e9 * h
                         : s->kind == GS4_SHAPE_MESH ? 2.5e8 * h
                                                     : 0.1 * h / (double)GS4I_EPSILON;
     gs4_vec3 low = s->a, high = s->a;
+    gs4_shape cut = *s;
     double from[3], to[3], reach = 0;
     int a;
+    gs4i_cut_box(&cut, GS4I_C(most));
+    if (s->kind == GS4_SHAPE_BOX && cut.a.x < cut.b.x && cut.a.y < cut.b.y && cut.a.z < cut.b.z) {
+        *s = cut;
+        return GS4_OK;
+    }
     gs4i_shape_bounds(s, &low, &high);
     gs4i_to_double(low, from);
     gs4i_to_double(high, to);
@@ -15522,7 +15536,7 @@ static int gs4i_check_reach(gs4i_error *e, double h, const gs4_shape *s)
     return gs4i_require_value(
         e, reach <= most, "shape reaches to the coordinate ", reach,
         ", so far out that distances could not tell a tenth of a cell; cut it off near the grid, "
-        "use gs4_plane, or define GS4_DOUBLE");
+        "use gs4_plane or gs4_box, or define GS4_DOUBLE");
 }
 
 static int gs4i_check_form(gs4i_error *e, gs4i_memory *memory, gs4_shape *s)

@@ -34,7 +34,7 @@ static void heat_mode(const heat_bar *b, double *a, double *flux)
     m.flux_relaxation_time = (gs4_real)b->tau;
     m.fourier_fraction = (gs4_real)b->F;
     sim = physics_create(&d, &m);
-    CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(length, 1e6, 1e6)), &f),
+    CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(length, 9, 9)), &f),
                  GS4_OK);
     x = gs4_particles(sim, GS4_FIELD_POSITION);
     T = gs4_edit_particles(sim, GS4_FIELD_TEMPERATURE);
@@ -213,7 +213,7 @@ static void test_heat_pulse(void)
     m.heat_capacity = 1;
     m.conductivity = 1;
     sim = physics_create(&d, &m);
-    CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(-2, 0, 0), at(2, 1e6, 1e6)), &f), GS4_OK);
+    CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(-2, 0, 0), at(2, 9, 9)), &f), GS4_OK);
     x = gs4_particles(sim, GS4_FIELD_POSITION);
     T = gs4_edit_particles(sim, GS4_FIELD_TEMPERATURE);
     for (i = 0; i < T.count; i++) {

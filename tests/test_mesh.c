@@ -256,7 +256,8 @@ static void test_mesh_parts(void)
 static void test_mesh_table(void)
 {
     double half;
-    for (half = 5; half < 1e7; half *= 100) {
+    /* in float no shape reaches farther, whose distances are too coarse */
+    for (half = 5; half < (sizeof(gs4_real) == 8 ? 1e7 : 1e3); half *= 100) {
         const gs4_shape box = gs4_box(at(-half, 0.1, -half), at(half, 0.4, half));
         gs4_sim *sim = mesh_sim(0);
         mesh_parts m = mesh_begin(8, 12);

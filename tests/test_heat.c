@@ -34,8 +34,7 @@ static void heat_mode(const heat_bar *b, double *a, double *flux)
     m.flux_relaxation_time = (gs4_real)b->tau;
     m.fourier_fraction = (gs4_real)b->F;
     sim = physics_create(&d, &m);
-    CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(length, 9, 9)), &f),
-                 GS4_OK);
+    CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(length, 9, 9)), &f), GS4_OK);
     x = gs4_particles(sim, GS4_FIELD_POSITION);
     T = gs4_edit_particles(sim, GS4_FIELD_TEMPERATURE);
     for (i = 0; i < T.count; i++)

@@ -84,6 +84,7 @@
  *     collider        a shape that moves and turns and acts on nodes and particles
  *     image particle  reflection of a particle behind the surface of a sticky collider
  *     emitter         a shape that is kept full of flowing material
+ *     row             a line of places in an emitter, along its flow
  *     jump            velocity that contact gives a node at once; never part of a rate
  *     remembered acceleration (ag)    what a node keeps of acc from step to step
  *     sub-grid velocity    V - v~: what the grid does not see of a particle's velocity
@@ -348,10 +349,12 @@ typedef double gs4_real;
 #define gs4_add_points gs4_add_points_f64
 #define gs4_advance gs4_advance_f64
 #define gs4_box gs4_box_f64
+#define gs4_collider_pose gs4_collider_pose_f64
 #define gs4_create gs4_create_f64
 #define gs4_cylinder gs4_cylinder_f64
 #define gs4_destroy gs4_destroy_f64
 #define gs4_edit_particles gs4_edit_particles_f64
+#define gs4_emitter_pose gs4_emitter_pose_f64
 #define gs4_get_desc gs4_get_desc_f64
 #define gs4_get_stats gs4_get_stats_f64
 #define gs4_last_error gs4_last_error_f64
@@ -359,7 +362,9 @@ typedef double gs4_real;
 #define gs4_material_preset gs4_material_preset_f64
 #define gs4_mesh gs4_mesh_f64
 #define gs4_move_collider gs4_move_collider_f64
+#define gs4_move_collider_to gs4_move_collider_to_f64
 #define gs4_move_emitter gs4_move_emitter_f64
+#define gs4_move_emitter_to gs4_move_emitter_to_f64
 #define gs4_particle_ids gs4_particle_ids_f64
 #define gs4_particle_materials gs4_particle_materials_f64
 #define gs4_particles gs4_particles_f64
@@ -369,6 +374,8 @@ typedef double gs4_real;
 #define gs4_poisson_create gs4_poisson_create_f64
 #define gs4_poisson_destroy gs4_poisson_destroy_f64
 #define gs4_poisson_solve gs4_poisson_solve_f64
+#define gs4_put_collider gs4_put_collider_f64
+#define gs4_put_emitter gs4_put_emitter_f64
 #define gs4_real_size gs4_real_size_f64
 #define gs4_result_string gs4_result_string_f64
 #define gs4_save gs4_save_f64
@@ -688,18 +695,37 @@ GS4_API int gs4_add_collider(gs4_sim *sim, const gs4_collider *collider);
 GS4_API int gs4_move_collider(gs4_sim *sim, int collider, gs4_vec3 velocity,
                               gs4_vec3 angular_velocity);
 
-/* A source of material: its shape is full at `start` and is filled again as
- * material leaves it with fill.velocity, which is of the world. */
+/* A source of material: its shape is full at `start`, and is filled again as material
+ * flows out of it with fill.velocity, relative to it. It gives |fill.velocity| times the area that
+ * its shape has across the flow, whatever it travels. What is in it travels with it. */
 typedef struct gs4_emitter {
     gs4_shape shape;
-    gs4_fill fill;
-    gs4_vec3 travel;      /* velocity of the emitter itself, m/s */
+    gs4_fill fill;        /* the spacing becomes what fits the shape evenly */
+    gs4_vec3 travel;      /* velocity of the emitter itself from `start` on, m/s */
     gs4_real start, stop; /* s; stop 0: never */
+    gs4_vec3 pivot;       /* of its pose, m; where it is at first */
 } gs4_emitter;
 
-/* The id of the new emitter; later changes of its velocity. */
+/* The id of the new emitter; later changes of its velocity, without a turn. */
 GS4_API int gs4_add_emitter(gs4_sim *sim, const gs4_emitter *emitter);
 GS4_API int gs4_move_emitter(gs4_sim *sim, int emitter, gs4_vec3 travel);
+
+/* Where a collider or an emitter is: point p of its shape, as described, is at
+ * position + R (p - pivot), R the turn that the quaternion is for. An emitter's flow turns too. */
+typedef struct gs4_pose {
+    gs4_vec3 position;      /* of the pivot, m */
+    gs4_real quaternion[4]; /* w x y z, of any length; all 0 is none: 1 0 0 0 */
+} gs4_pose;
+
+/* Where it is now. Put it there at once: its velocities stay. Move it so that it is there after
+ * `duration` (s), at constant velocities, the short way round; they stay until changed. */
+GS4_API int gs4_collider_pose(gs4_sim *sim, int collider, gs4_pose *pose);
+GS4_API int gs4_emitter_pose(gs4_sim *sim, int emitter, gs4_pose *pose);
+GS4_API int gs4_put_collider(gs4_sim *sim, int collider, const gs4_pose *pose);
+GS4_API int gs4_put_emitter(gs4_sim *sim, int emitter, const gs4_pose *pose);
+GS4_API int gs4_move_collider_to(gs4_sim *sim, int collider, const gs4_pose *pose,
+                                 gs4_real duration);
+GS4_API int gs4_move_emitter_to(gs4_sim *sim, int emitter, const gs4_pose *pose, gs4_real duration);
 
 /* One step of exactly dt (s), at most gs4_stable_dt; or as many as it takes to end after exactly
  * `duration` (s). A step that is refused has not been done. The steps that gs4_advance took before
@@ -1409,13 +1435,13 @@ static void gs4i_to_double(gs4_vec3 a, double out[3])
 }
 
 /* Signed distances. Box: exact outside and inside. Cylinder: capped, exact. */
+/* By its faces, so that one that is near is exact however far the others are. */
 static gs4_real gs4i_box_distance(const gs4_shape *s, gs4_vec3 p)
 {
-    gs4_vec3 c = gs4i_scale(gs4i_add(s->a, s->b), GS4I_C(0.5)),
-             e = gs4i_scale(gs4i_sub(s->b, s->a), GS4I_C(0.5));
-    gs4_vec3 q =
-        gs4i_vec3(gs4i_abs(p.x - c.x) - e.x, gs4i_abs(p.y - c.y) - e.y, gs4i_abs(p.z - c.z) - e.z);
-    gs4_vec3 out = gs4i_vec3(gs4i_max(q.x, 0), gs4i_max(q.y, 0), gs4i_max(q.z, 0));
+    const gs4_vec3 q = gs4i_vec3(gs4i_max(s->a.x - p.x, p.x - s->b.x),
+                                 gs4i_max(s->a.y - p.y, p.y - s->b.y),
+                                 gs4i_max(s->a.z - p.z, p.z - s->b.z)),
+                   out = gs4i_vec3(gs4i_max(q.x, 0), gs4i_max(q.y, 0), gs4i_max(q.z, 0));
     return gs4i_length(out) + gs4i_min(gs4i_max(q.x, gs4i_max(q.y, q.z)), 0);
 }
 
@@ -1453,18 +1479,17 @@ static int gs4i_shape_is_flat(const gs4_shape *s, gs4_vec3 p, gs4_real reach, gs
                               gs4_vec3 *normal)
 {
     if (s->kind == GS4_SHAPE_BOX) {
-        const gs4_vec3 r = gs4i_sub(p, gs4i_scale(gs4i_add(s->a, s->b), GS4I_C(0.5)));
-        const gs4_real at[3] = { r.x, r.y, r.z },
-                       size[3] = { s->b.x - s->a.x, s->b.y - s->a.y, s->b.z - s->a.z };
+        const gs4_real low[3] = { s->a.x - p.x, s->a.y - p.y, s->a.z - p.z },
+                       high[3] = { p.x - s->b.x, p.y - s->b.y, p.z - s->b.z };
         gs4_real n[3] = { 0, 0, 0 };
         int a, face = 0;
         for (a = 1; a < 3; a++)
-            if (gs4i_abs(at[a]) - size[a] / 2 > gs4i_abs(at[face]) - size[face] / 2) face = a;
+            if (gs4i_max(low[a], high[a]) > gs4i_max(low[face], high[face])) face = a;
         for (a = 0; a < 3; a++)
-            if (a != face && gs4i_abs(at[a]) + reach + deep > size[a] / 2) return 0;
-        n[face] = at[face] < 0 ? GS4I_C(-1) : GS4I_C(1);
+            if (a != face && gs4i_max(low[a], high[a]) > -(reach + deep)) return 0;
+        n[face] = low[face] > high[face] ? GS4I_C(-1) : GS4I_C(1);
         *normal = gs4i_vec3(n[0], n[1], n[2]);
-        return size[face] > 2 * deep;
+        return low[face] + high[face] < -2 * deep;
     }
     if (s->kind == GS4_SHAPE_CYLINDER) {
         const gs4_vec3 axis = gs4i_sub(s->b, s->a),
@@ -8755,7 +8780,8 @@ typedef struct gs4i_collider {
     double at[3], turn[4];
     gs4_real axes[9]; /* R, row-major */
     gs4i_field field; /* for a mesh */
-    /* of an emitter: holds what is inside at the velocity `flow`; not in use now */
+    /* of an emitter: what is inside flows with the velocity `flow` in coordinates of the shape,
+     * beside its own; not in use now */
     int is_emitter, is_off;
     gs4_vec3 flow;
     int *bad_distance; /* of the simulation: set where the shape's function gives no number */
@@ -8836,12 +8862,20 @@ static void gs4i_collider_move(gs4i_collider *b, double dt)
     gs4i_collider_orient(b);
 }
 
-/* World velocity of the body at p. */
+/* A direction of the shape in the world. */
+static gs4_vec3 gs4i_turned(const gs4i_collider *b, gs4_vec3 d)
+{
+    const gs4_real *r = b->axes;
+    return gs4i_vec3(r[0] * d.x + r[1] * d.y + r[2] * d.z, r[3] * d.x + r[4] * d.y + r[5] * d.z,
+                     r[6] * d.x + r[7] * d.y + r[8] * d.z);
+}
+
+/* World velocity of the body at p; in an emitter, of what flows in it. */
 static gs4_vec3 gs4i_collider_velocity(const gs4i_collider *b, gs4_vec3 p)
 {
     gs4_vec3 r = gs4i_sub(p, gs4i_vec3(GS4I_C(b->at[0]), GS4I_C(b->at[1]), GS4I_C(b->at[2])));
-    if (b->is_emitter) return b->flow;
-    return gs4i_add(b->is.velocity, gs4i_cross(b->is.angular_velocity, r));
+    gs4_vec3 own = gs4i_add(b->is.velocity, gs4i_cross(b->is.angular_velocity, r));
+    return b->is_emitter ? gs4i_add(own, gs4i_turned(b, b->flow)) : own;
 }
 
 /* Greatest |v + w x (p - pivot)| for p in the box low .. high: at one of its corners. */
@@ -8994,6 +9028,18 @@ static gs4_vec3 gs4i_to_collider(const gs4i_collider *b, gs4_vec3 p)
     return gs4i_add(gs4i_turn_back(b, gs4i_sub(p, at)), b->is.pivot);
 }
 
+/* Point p of the shape in the world. */
+static void gs4i_from_collider(const gs4i_collider *b, const double p[3], gs4_real x[3])
+{
+    double d[3], pivot[3];
+    int a;
+    gs4i_to_double(b->is.pivot, pivot);
+    for (a = 0; a < 3; a++) d[a] = p[a] - pivot[a];
+    for (a = 0; a < 3; a++)
+        x[a] = GS4I_C((double)b->axes[3 * a] * d[0] + (double)b->axes[3 * a + 1] * d[1]
+                      + (double)b->axes[3 * a + 2] * d[2] + b->at[a]);
+}
+
 /* Signed distance (m) from the body's surface to the world point p. */
 static gs4_real gs4i_collider_distance(const gs4i_collider *b, gs4_vec3 p)
 {
@@ -9004,11 +9050,9 @@ static gs4_real gs4i_collider_distance(const gs4i_collider *b, gs4_vec3 p)
 static int gs4i_collider_is_flat(const gs4i_collider *b, gs4_vec3 p, gs4_real reach, gs4_real deep,
                                  gs4_vec3 *normal)
 {
-    const gs4_real *r = b->axes;
     gs4_vec3 n;
     if (!gs4i_shape_is_flat(&b->is.shape, gs4i_to_collider(b, p), reach, deep, &n)) return 0;
-    *normal = gs4i_vec3(r[0] * n.x + r[1] * n.y + r[2] * n.z, r[3] * n.x + r[4] * n.y + r[5] * n.z,
-                        r[6] * n.x + r[7] * n.y + r[8] * n.z);
+    *normal = gs4i_turned(b, n);
     return 1;
 }
 
@@ -10177,11 +10221,25 @@ static int gs4i_collider_hold(const gs4i_collider *b, gs4_vec3 p, gs4_real h,
     return 1;
 }
 
+/* The emitter that is at x, the last one there; or NULL. */
+static const gs4i_collider *gs4i_emitter_at(const gs4i_boundary *b, gs4_vec3 x)
+{
+    const gs4i_collider *emitter = NULL;
+    int i;
+    for (i = 0; i < b->collider_count; i++) {
+        const gs4i_collider *collider = &b->colliders[i];
+        if (collider->is_emitter && !collider->is_off && gs4i_collider_distance(collider, x) < 0)
+            emitter = collider;
+    }
+    return emitter;
+}
+
 /* Put a particle that ended inside a body, or behind a closed wall, back on its surface; the
- * part of its velocity that leads further in is lost. */
+ * part of its velocity that leads further in is lost. In an emitter, as one that is modelled as a
+ * solid body, there are no bodies. */
 static void gs4i_put_back(const gs4i_boundary *b, const gs4i_grid *g, gs4_real x[3], gs4_real v[3])
 {
-    int i, a, pass, moved = 1;
+    int i, a, pass, moved = !gs4i_emitter_at(b, gs4i_vec3(x[0], x[1], x[2]));
     for (pass = 0; pass < 2 && moved; pass++) /* two bodies may meet */
         for (moved = 0, i = 0; i < b->collider_count; i++) {
             const gs4i_collider *collider = &b->colliders[i];
@@ -10230,18 +10288,13 @@ static void gs4i_put_back(const gs4i_boundary *b, const gs4i_grid *g, gs4_real x
 static const gs4i_collider *gs4i_hold_in_emitter(const gs4i_boundary *b, const gs4_real x[3],
                                                  gs4_real v[4])
 {
-    const gs4i_collider *emitter = NULL;
-    int i;
-    for (i = 0; i < b->collider_count; i++) {
-        const gs4i_collider *collider = &b->colliders[i];
-        if (collider->is_emitter && !collider->is_off
-            && gs4i_collider_distance(collider, gs4i_vec3(x[0], x[1], x[2])) < 0)
-            emitter = collider;
-    }
+    const gs4_vec3 p = gs4i_vec3(x[0], x[1], x[2]);
+    const gs4i_collider *emitter = gs4i_emitter_at(b, p);
     if (emitter) {
-        v[0] = emitter->flow.x;
-        v[1] = emitter->flow.y;
-        v[2] = emitter->flow.z;
+        const gs4_vec3 own = gs4i_collider_velocity(emitter, p);
+        v[0] = own.x;
+        v[1] = own.y;
+        v[2] = own.z;
         v[3] = 1;
     }
     return emitter;
@@ -10249,11 +10302,18 @@ static const gs4i_collider *gs4i_hold_in_emitter(const gs4i_boundary *b, const g
 
 /* ==== [[state]] what a simulation is ========================================================== */
 
+/* What an emitter gives flows through its shape in rows. In coordinates of the shape place n is at
+ * sum over k of (low_k + (n_k + 1/2) spacing_k) axis_k + (flowed + phase of the row) axis_0, where
+ * axis_0 is along the flow. At first 0 <= n_k < places_k. */
 typedef struct gs4i_emitter {
     gs4_emitter is;
     int collider; /* that holds the particles in it */
-    /* m that the lattice has flowed through it; the same at the last emission, if there was one */
-    double offset[3], emitted_offset[3];
+    double axis[3][3], low[3], spacing[3];
+    int places[3];
+    gs4_real mass;          /* kg of a particle, so that all rows give speed times area */
+    double window;          /* m, the least of its extent along the flow and spacing_0 */
+    double flowed, emitted; /* m; the same at the last emission, if there was one */
+    double active;          /* s of this step in which it is on */
     int has_emitted;
 } gs4i_emitter;
 
@@ -10351,7 +10411,8 @@ typedef enum gs4i_warning {
     GS4I_WARN_COLD = 64,
     GS4I_WARN_SUBSTEPS = 128,
     GS4I_WARN_DISTANCE = 256,
-    GS4I_WARN_FULL = 512
+    GS4I_WARN_FULL = 512,
+    GS4I_WARN_EMITTER_OUTSIDE = 1024
 } gs4i_warning;
 
 static int gs4i_will_warn(const gs4_sim *sim, gs4i_warning which)
@@ -13437,43 +13498,35 @@ static int gs4i_add_points(gs4_sim *sim, const gs4_real *xyz, int64_t count, gs4
 
 /* --- points of a lattice in a shape ----------------------------------------------------------- */
 
-/* Point n of a lattice is at low + (n + 1/2 + jitter) spacing + offset, in coordinates of the
- * shape. `moved` is how far that is from where it was described, m. The lattices of all fillings
- * are aligned with the cells; that of an emitter begins at its shape and flows through it. */
+/* Point n of a lattice is at low + (n + 1/2) spacing, and jitter displaces it. All lattices are
+ * aligned with the cells. */
 typedef struct gs4i_lattice {
     const gs4i_collider *shape;
     const gs4_fill *fill;
-    double low[3], offset[3], moved[3];
+    double low[3];
     int64_t from[3], to[3], n[3]; /* from <= n < to; the present point */
-    uint64_t key[3];              /* n . key is what its jitter is drawn by */
 } gs4i_lattice;
 
-/* Uniform in [-1/2, 1/2): what jitter displaces the point by along an axis, in spacings. */
-static gs4_real gs4i_lattice_noise(const gs4i_lattice *l, int axis)
+/* Uniform in [-1/2, 1/2): what jitter displaces point n by along an axis, in spacings. */
+static gs4_real gs4i_lattice_noise(const gs4_fill *f, const int64_t n[3], int axis)
 {
-    const uint64_t number = (uint64_t)l->n[0] * l->key[0] + (uint64_t)l->n[1] * l->key[1]
-                            + (uint64_t)l->n[2] * l->key[2];
-    const uint64_t u =
-        gs4i_mix(gs4i_mix((uint64_t)l->fill->random_seed << 32 ^ number) + (uint64_t)axis);
+    const uint64_t number = (uint64_t)n[0] + ((uint64_t)n[1] << 21) + ((uint64_t)n[2] << 42);
+    const uint64_t u = gs4i_mix(gs4i_mix((uint64_t)f->random_seed << 32 ^ number) + (uint64_t)axis);
     return GS4I_C((double)(u >> 40) / 16777216.0 - 0.5);
 }
 
-/* Points in the box low..high of the shape, where it meets the domain, and `margin` more at each
- * end. 0: they do not meet. */
+/* Points in the box low..high where it meets the domain. 0: they do not meet. */
 static int gs4i_lattice_span(gs4i_lattice *l, const gs4i_grid *g, const double low[3],
-                             const double high[3], int margin)
+                             const double high[3])
 {
     const double spacing = (double)l->fill->spacing;
-    double origin[3];
     int a;
-    gs4i_to_double(g->origin, origin);
     for (a = 0; a < 3; a++) {
-        const double size = g->cells[a] * (double)g->h,
-                     begin = fmax(low[a], origin[a] - l->moved[a]),
-                     end = fmin(high[a], origin[a] + size - l->moved[a]);
+        const double size = g->cells[a] * (double)g->h, begin = fmax(low[a], l->low[a]),
+                     end = fmin(high[a], l->low[a] + size);
         if (begin >= end) return 0;
-        l->from[a] = (int64_t)floor((begin - l->low[a] - l->offset[a]) / spacing) - margin;
-        l->to[a] = (int64_t)ceil((end - l->low[a] - l->offset[a]) / spacing) + margin;
+        l->from[a] = (int64_t)floor((begin - l->low[a]) / spacing);
+        l->to[a] = (int64_t)ceil((end - l->low[a]) / spacing);
         l->n[a] = a == 0 ? l->from[a] - 1 : l->from[a];
     }
     return 1;
@@ -13490,47 +13543,16 @@ static int gs4i_lattice_next(gs4i_lattice *l)
     return 0;
 }
 
-/* Where the present point is, displaced by `jitter`. */
-static void gs4i_lattice_point(const gs4i_lattice *l, gs4_real jitter, const double offset[3],
-                               double at[3])
-{
-    int a;
-    for (a = 0; a < 3; a++) {
-        const gs4_real displaced = jitter > 0 ? jitter * gs4i_lattice_noise(l, a) : GS4I_C(0);
-        at[a] = l->low[a] + ((double)l->n[a] + 0.5 + (double)displaced) * (double)l->fill->spacing
-                + offset[a];
-    }
-}
-
-static int gs4i_lattice_is_inside(const gs4i_lattice *l, const double at[3])
-{
-    return gs4i_shape_or_field(l->shape, gs4i_vec3(GS4I_C(at[0]), GS4I_C(at[1]), GS4I_C(at[2])))
-           < 0;
-}
-
-/* About how many points of a lattice are in its shape: of 32^3 spread over it; or all, if they are
- * no more than `few`. */
-static double gs4i_estimate_points(const gs4i_lattice *l, double few)
-{
-    double at[3], inside = 0, all = 1;
-    int i, a;
-    for (a = 0; a < 3; a++) all *= (double)(l->to[a] - l->from[a]);
-    if (all <= few) return all;
-    for (i = 0; i < 32 * 32 * 32; i++) {
-        for (a = 0; a < 3; a++)
-            at[a] = l->low[a]
-                    + ((double)l->from[a]
-                       + ((i >> 5 * a & 31) + 0.5) / 32 * (double)(l->to[a] - l->from[a]))
-                          * (double)l->fill->spacing;
-        inside += gs4i_lattice_is_inside(l, at);
-    }
-    return all * inside / (32 * 32 * 32);
-}
-
 /* Of a particle of a filling, kg: a lattice cell of material. */
 static gs4_real gs4i_mass_of(const gs4_sim *sim, const gs4_fill *f)
 {
     return sim->constants[f->material].density * f->spacing * f->spacing * f->spacing;
+}
+
+/* Is the point `at` of the shape inside? */
+static int gs4i_is_inside(const gs4i_collider *shape, const double at[3])
+{
+    return gs4i_shape_or_field(shape, gs4i_vec3(GS4I_C(at[0]), GS4I_C(at[1]), GS4I_C(at[2]))) < 0;
 }
 
 /* Does the box of a shape meet the domain? */
@@ -13558,11 +13580,12 @@ static int gs4i_next_filled(const gs4i_grid *g, gs4i_lattice *l, gs4_real x[3])
     while (gs4i_lattice_next(l)) {
         double at[3];
         int a;
-        gs4i_lattice_point(l, 0, l->offset, at);
-        if (!gs4i_lattice_is_inside(l, at)) continue;
+        for (a = 0; a < 3; a++)
+            at[a] = l->low[a] + ((double)l->n[a] + 0.5) * (double)l->fill->spacing;
+        if (!gs4i_is_inside(l->shape, at)) continue;
         for (a = 0; a < 3; a++) {
             x[a] = GS4I_C(at[a]);
-            if (amount > 0) x[a] += amount * gs4i_lattice_noise(l, a);
+            if (amount > 0) x[a] += amount * gs4i_lattice_noise(l->fill, l->n, a);
         }
         if (gs4i_is_in_domain(g, x)) return 1;
     }
@@ -13583,11 +13606,9 @@ static int gs4i_fill_lattice(const gs4i_grid *g, const gs4i_collider *shape, con
     gs4i_shape_bounds(&shape->is.shape, &low, &high);
     gs4i_to_double(low, from);
     gs4i_to_double(high, to);
-    for (a = 0; a < 3; a++) {
+    for (a = 0; a < 3; a++)
         if (shape->is.shape.kind == GS4_SHAPE_PLANE) to[a] += g->cells[a] * (double)g->h;
-        l->key[a] = (uint64_t)1 << 21 * a;
-    }
-    return gs4i_lattice_span(l, g, from, to, 0);
+    return gs4i_lattice_span(l, g, from, to);
 }
 
 /* Is there material already where `count` new particles would go? A cell that they fill by a
@@ -13652,6 +13673,25 @@ static int gs4i_make_collider(gs4_sim *sim, gs4i_collider *b, const gs4_collider
     return is->shape.kind == GS4_SHAPE_MESH
                ? gs4i_field_create(&sim->error, &sim->memory, b, &sim->grid, spacing)
                : GS4_OK;
+}
+
+/* About how many points of a lattice are in its shape: of 32^3 spread over it; or all, if they are
+ * no more than `few`. */
+static double gs4i_estimate_points(const gs4i_lattice *l, double few)
+{
+    double at[3], inside = 0, all = 1;
+    int i, a;
+    for (a = 0; a < 3; a++) all *= (double)(l->to[a] - l->from[a]);
+    if (all <= few) return all;
+    for (i = 0; i < 32 * 32 * 32; i++) {
+        for (a = 0; a < 3; a++)
+            at[a] = l->low[a]
+                    + ((double)l->from[a]
+                       + ((i >> 5 * a & 31) + 0.5) / 32 * (double)(l->to[a] - l->from[a]))
+                          * (double)l->fill->spacing;
+        inside += gs4i_is_inside(l->shape, at);
+    }
+    return all * inside / (32 * 32 * 32);
 }
 
 /* All points of a filling, checked for overlap, into a list that the caller frees. How many, or
@@ -13745,33 +13785,220 @@ static int gs4i_add_collider(gs4_sim *sim, const gs4_collider *c, double spacing
     return b->collider_count++;
 }
 
+/* --- emitters --------------------------------------------------------------------------------- */
+
+enum {
+    GS4I_EMITTER_LINES = 128,     /* a side, by which the area of an emitter is found to 1 % */
+    GS4I_EMITTER_ROWS = 1 << 16,  /* more are not counted: so many have their area to 1 % */
+    GS4I_EMITTER_PLACES = 1 << 30 /* along each axis */
+};
+
+/* Axis 0 along the flow, axis 1 in the plane of it and the direction that it has least of. */
+static void gs4i_emitter_axes(gs4_vec3 flow, double axis[3][3])
+{
+    double f[3], length = 0, along = 0;
+    int a, least = 0;
+    memset(axis, 0, 9 * sizeof **axis);
+    gs4i_to_double(flow, f);
+    for (a = 0; a < 3; a++) {
+        axis[a][a] = 1;
+        length = fmax(length, fabs(f[a]));
+    }
+    if (!(length > 0)) return;
+    for (a = 0; a < 3; a++) f[a] /= length; /* no square of it underflows */
+    length = sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
+    for (a = 0; a < 3; a++) {
+        axis[0][a] = f[a] / length;
+        if (fabs(f[a]) < fabs(f[least])) least = a;
+    }
+    for (a = 0; a < 3; a++) {
+        axis[1][a] = (a == least) - axis[0][least] * axis[0][a];
+        along += axis[1][a] * axis[1][a];
+    }
+    for (a = 0; a < 3; a++) axis[1][a] /= sqrt(along);
+    for (a = 0; a < 3; a++)
+        axis[2][a] = axis[0][(a + 1) % 3] * axis[1][(a + 2) % 3]
+                     - axis[0][(a + 2) % 3] * axis[1][(a + 1) % 3];
+}
+
+/* Point of the shape with coordinates c along the axes. */
+static void gs4i_emitter_point(const gs4i_emitter *e, const double c[3], double at[3])
+{
+    int a;
+    for (a = 0; a < 3; a++)
+        at[a] = c[0] * e->axis[0][a] + c[1] * e->axis[1][a] + c[2] * e->axis[2][a];
+}
+
+/* Does the line along the flow, at c[1] and c[2] across it, meet the shape between low and high?
+ * It goes by the distance, and by 1/128 of the way at least. */
+static int gs4i_line_meets(const gs4i_emitter *e, const gs4i_collider *shape, double c[3],
+                           double low, double high)
+{
+    double at[3];
+    for (c[0] = low; c[0] < high;) {
+        double d;
+        gs4i_emitter_point(e, c, at);
+        d = (double)gs4i_shape_or_field(shape,
+                                        gs4i_vec3(GS4I_C(at[0]), GS4I_C(at[1]), GS4I_C(at[2])));
+        if (d < 0) return 1;
+        c[0] += fmax((high - low) / GS4I_EMITTER_LINES, d);
+    }
+    return 0;
+}
+
+/* Lines through the box low..high: the area (m^2) of those that meet the shape. Shrinks the box
+ * to them across the flow, and to where the first of them does. */
+static double gs4i_emitter_area(const gs4i_emitter *e, const gs4i_collider *shape, double low[3],
+                                double high[3])
+{
+    const double step[3] = { 0, (high[1] - low[1]) / GS4I_EMITTER_LINES,
+                             (high[2] - low[2]) / GS4I_EMITTER_LINES };
+    int first[3] = { 0, GS4I_EMITTER_LINES, GS4I_EMITTER_LINES }, last[3] = { 0, -1, -1 }, n[3], a;
+    double c[3], met = 0, inlet = high[0];
+    for (n[1] = 0; n[1] < GS4I_EMITTER_LINES; n[1]++)
+        for (n[2] = 0; n[2] < GS4I_EMITTER_LINES; n[2]++) {
+            for (a = 1; a < 3; a++) c[a] = low[a] + (n[a] + 0.5) * step[a];
+            if (!gs4i_line_meets(e, shape, c, low[0], high[0])) continue;
+            met++;
+            inlet = fmin(inlet, c[0] - (high[0] - low[0]) / GS4I_EMITTER_LINES);
+            for (a = 1; a < 3; a++) {
+                if (n[a] < first[a]) first[a] = n[a];
+                if (n[a] > last[a]) last[a] = n[a];
+            }
+        }
+    for (a = 1; a < 3 && met > 0; a++) {
+        high[a] = low[a] + (last[a] + 1) * step[a];
+        low[a] += first[a] * step[a];
+    }
+    low[0] = fmax(low[0], inlet);
+    return met * step[1] * step[2];
+}
+
+/* Rows in the box low..high, by about fill.spacing or a `finer` part of that. How many of them
+ * meet the shape, whose area is given; -1: too many. */
+static double gs4i_count_rows(gs4i_emitter *e, const gs4i_collider *shape, const double low[3],
+                              const double high[3], double area, int finer)
+{
+    double c[3], rows = 0;
+    int a, i, j;
+    for (a = 1; a < 3; a++) {
+        const double n =
+            finer * fmax(1, floor((high[a] - low[a]) / (double)e->is.fill.spacing + 0.5));
+        if (!(n <= GS4I_EMITTER_PLACES)) return -1;
+        e->places[a] = (int)n;
+        e->spacing[a] = (high[a] - low[a]) / n;
+        e->low[a] = low[a];
+    }
+    if ((double)e->places[1] * e->places[2] > GS4I_EMITTER_ROWS)
+        return area / (e->spacing[1] * e->spacing[2]);
+    for (i = 0; i < e->places[1]; i++)
+        for (j = 0; j < e->places[2]; j++) {
+            c[1] = low[1] + (i + 0.5) * e->spacing[1];
+            c[2] = low[2] + (j + 0.5) * e->spacing[2];
+            rows += gs4i_line_meets(e, shape, c, low[0], high[0]);
+        }
+    return rows;
+}
+
+/* Rows between low and high, each of which stands for `area`: particles have their usual mass, and
+ * the spacing along rows makes up for what rows do not fill. Where that would be far from what
+ * fill.spacing says, as in an emitter of a cell or less, it is their mass that does. */
+static int gs4i_space_rows(gs4_sim *sim, gs4i_emitter *e, double area, double low, double high)
+{
+    const double density = (double)sim->constants[e->is.fill.material].density,
+                 usual = (double)e->is.fill.spacing;
+    double spacing = usual * usual * usual / area, volume = usual * usual * usual;
+    if (!(spacing > 0.7 * usual && spacing < 1.4 * usual)) {
+        spacing = fmin(usual, fmin(e->spacing[1], e->spacing[2]));
+        volume = area * spacing;
+    }
+    e->mass = GS4I_C(density * volume);
+    e->low[0] = low;
+    e->spacing[0] = spacing;
+    e->window = fmin(high - low, spacing);
+    GS4I_TRY(gs4i_require(&sim->error, area > 0 && (high - low) / spacing < GS4I_EMITTER_PLACES,
+                          "shape is more than 2^30 particles wide"));
+    e->places[0] = (int)ceil((high - low) / spacing);
+    return gs4i_require(&sim->error, e->window > 0.01 * spacing,
+                        "shape is thinner along the flow than a hundredth of fill.spacing");
+}
+
+/* The box around the shape, along the axes of the emitter; of a shape that is far larger than the
+ * domain, what is within 2^20 cells of that. */
+static void gs4i_emitter_bounds(const gs4i_emitter *e, const gs4i_grid *g, double low[3],
+                                double high[3])
+{
+    const double reach = (double)g->h * (1 << 20);
+    double from[3], to[3], origin[3];
+    gs4_vec3 a, b;
+    int k, i;
+    gs4i_shape_bounds(&e->is.shape, &a, &b);
+    gs4i_to_double(a, from);
+    gs4i_to_double(b, to);
+    gs4i_to_double(g->origin, origin);
+    for (k = 0; k < 3; k++) {
+        from[k] = fmax(from[k], origin[k] - reach);
+        to[k] = fmin(to[k], origin[k] + g->cells[k] * (double)g->h + reach);
+    }
+    for (k = 0; k < 3; k++) {
+        double middle = 0, half = 0;
+        for (i = 0; i < 3; i++) {
+            middle += e->axis[k][i] * 0.5 * (from[i] + to[i]);
+            half += fabs(e->axis[k][i]) * 0.5 * (to[i] - from[i]);
+        }
+        low[k] = middle - half;
+        high[k] = middle + half;
+    }
+}
+
+/* Axes and rows of an emitter, and the mass of its particles. */
+static int gs4i_lay_rows(gs4_sim *sim, gs4i_emitter *e)
+{
+    const gs4i_collider *shape = &sim->boundary.colliders[e->collider];
+    double low[3], high[3], area, rows;
+    int finer;
+    gs4i_emitter_axes(e->is.fill.velocity, e->axis);
+    gs4i_emitter_bounds(e, &sim->grid, low, high);
+    sim->bad_distance = 0;
+    area = gs4i_emitter_area(e, shape, low, high);
+    GS4I_TRY(gs4i_check_distances(sim));
+    GS4I_TRY(gs4i_require(&sim->error, area > 0,
+                          "shape: no line along the flow meets it; it is inside out, or thinner "
+                          "than a hundredth of the box around it"));
+    for (finer = 1, rows = 0; finer <= 16 && rows == 0; finer *= 2)
+        rows = gs4i_count_rows(e, shape, low, high, area, finer);
+    GS4I_TRY(gs4i_require(&sim->error, rows != 0, "shape is too thin to hold a row of particles"));
+    return gs4i_space_rows(sim, e, area / rows, low[0], high[0]);
+}
+
 /* What an emitter is likely not meant to be. */
 static void gs4i_warn_of_emitter(gs4_sim *sim, const gs4_emitter *e)
 {
-    const gs4_vec3 flow = gs4i_sub(e->fill.velocity, e->travel);
+    const gs4_vec3 flow = e->fill.velocity;
     gs4_vec3 low = e->shape.a, high = e->shape.b, size;
     gs4i_shape_bounds(&e->shape, &low, &high);
     size = gs4i_sub(high, low);
     if (gs4i_min(size.x, gs4i_min(size.y, size.z)) < e->fill.spacing)
         gs4i_warn(sim, GS4I_WARN_THIN_EMITTER,
-                  "an emitter is thinner than fill.spacing: rows of particles may miss it");
+                  "an emitter is thinner than fill.spacing: its particles are lighter than others");
     if (flow.x == 0 && flow.y == 0 && flow.z == 0)
         gs4i_warn(sim, GS4I_WARN_STILL_EMITTER,
-                  "an emitter has the velocity of its material, fill.velocity: it is filled once "
+                  "an emitter has no fill.velocity, which is relative to it: it is filled once "
                   "and then gives nothing");
     gs4i_warn_of_filling(sim, &e->shape, &e->fill);
+    if (sim->warned & GS4I_WARN_CUT_OFF) sim->warned |= GS4I_WARN_EMITTER_OUTSIDE; /* is said */
 }
 
-/* An emitter is a collider too, which holds what is inside at the velocity of its filling. */
+/* An emitter is a collider too, which holds what is inside at the velocity of its flow. */
 static int gs4i_add_emitter(gs4_sim *sim, const gs4_emitter *is)
 {
     gs4_collider held;
-    gs4i_collider *collider;
     gs4i_emitter *emitters, *e;
-    int id;
+    int id, result;
     memset(&held, 0, sizeof held);
     held.shape = is->shape;
     held.velocity = is->travel;
+    held.pivot = is->pivot;
     held.temperature = is->fill.temperature;
     emitters = (gs4i_emitter *)gs4i_grow(&sim->memory, sim->emitters, sim->emitter_count,
                                          &sim->emitter_capacity, sizeof *emitters);
@@ -13779,90 +14006,211 @@ static int gs4i_add_emitter(gs4_sim *sim, const gs4_emitter *is)
     sim->emitters = emitters;
     id = gs4i_add_collider(sim, &held, (double)is->fill.spacing);
     if (id < 0) return id;
-    collider = &sim->boundary.colliders[id];
-    collider->is_emitter = 1;
-    collider->is_off = 1;
-    collider->flow = is->fill.velocity;
     e = &sim->emitters[sim->emitter_count];
     memset(e, 0, sizeof *e);
     e->is = *is;
     e->collider = id;
-    gs4i_note_speed(sim, gs4i_length(is->fill.velocity));
+    result = gs4i_lay_rows(sim, e);
+    if (result < 0) {
+        gs4i_field_free(&sim->memory, &sim->boundary.colliders[id].field);
+        sim->boundary.collider_count--;
+        return result;
+    }
+    sim->boundary.colliders[id].is_emitter = 1;
+    sim->boundary.colliders[id].is_off = 1;
+    sim->boundary.colliders[id].flow = is->fill.velocity;
+    gs4i_note_speed(sim, gs4i_length(is->fill.velocity) + gs4i_length(is->travel));
     gs4i_warn_of_emitter(sim, is);
     return sim->emitter_count++;
 }
-
-/* --- emitters at work ------------------------------------------------------------------------- */
 
 static int gs4i_emitter_is_on(const gs4i_emitter *e, double time)
 {
     return time >= (double)e->is.start && (e->is.stop <= 0 || time < (double)e->is.stop);
 }
 
-/* How far the lattice has flowed through the emitter after dt, m; it is full at the first time. */
-static void gs4i_offset_after(const gs4i_emitter *e, double dt, double offset[3])
+/* For how long of the time from `from` on, dt long, it is on, s. */
+static double gs4i_emitter_active(const gs4i_emitter *e, double from, double dt)
 {
-    double flow[3], travel[3];
-    int a;
-    gs4i_to_double(e->is.fill.velocity, flow);
-    gs4i_to_double(e->is.travel, travel);
-    for (a = 0; a < 3; a++)
-        offset[a] = e->has_emitted ? e->offset[a] + (flow[a] - travel[a]) * dt : 0;
+    const double stop = e->is.stop > 0 ? fmin(from + dt, (double)e->is.stop) : from + dt;
+    return fmax(0, stop - fmax(from, (double)e->is.start));
 }
 
-/* Emission is due when the lattice has flowed by a fifth of its spacing, or for the first time. */
-static int gs4i_emission_is_due(const gs4i_emitter *e, const double offset[3])
+/* Emission is due when material has flowed by a twentieth of its spacing, or for the first time. */
+static int gs4i_emission_is_due(const gs4i_emitter *e, double flowed)
 {
-    const double s = (double)e->is.fill.spacing;
-    double d2 = 0;
-    int a;
-    for (a = 0; a < 3; a++)
-        d2 += (offset[a] - e->emitted_offset[a]) * (offset[a] - e->emitted_offset[a]);
-    return !e->has_emitted || d2 > 0.04 * s * s;
+    return e->active > 0 && (!e->has_emitted || flowed - e->emitted > 0.05 * e->spacing[0]);
 }
 
-/* The lattice at this offset, where the emitter will be in the time `ahead`. 0: it is out of the
- * domain. Numbers may be negative, hence other keys than those of fillings. */
-static int gs4i_emitter_lattice(const gs4_sim *sim, const gs4i_emitter *e, const double offset[3],
-                                double ahead, gs4i_lattice *l)
+/* How far material has flowed when this step ends, m. */
+static double gs4i_flowed_after(const gs4i_emitter *e)
 {
-    static const uint64_t key[3] = { 0x9e3779b1u, (uint64_t)31 << 21, (uint64_t)17 << 42 };
-    const gs4i_collider *shape = &sim->boundary.colliders[e->collider];
-    double pivot[3], travel[3], high[3];
-    gs4_vec3 from, to;
-    int a;
-    memset(l, 0, sizeof *l);
-    l->shape = shape;
-    l->fill = &e->is.fill;
-    gs4i_to_double(shape->is.pivot, pivot);
-    gs4i_to_double(shape->is.velocity, travel);
-    gs4i_shape_bounds(&e->is.shape, &from, &to);
-    gs4i_to_double(from, l->low);
-    gs4i_to_double(to, high);
-    for (a = 0; a < 3; a++) {
-        l->offset[a] = offset[a];
-        l->moved[a] = shape->at[a] + travel[a] * ahead - pivot[a];
-        l->key[a] = key[a];
+    return e->flowed + (double)gs4i_length(e->is.fill.velocity) * e->active;
+}
+
+/* The body of an emitter in a time dt: it moves from its start on. */
+static void gs4i_move_emitter(const gs4i_emitter *e, gs4i_collider *body, double time, double dt)
+{
+    const double since = time + dt - (double)e->is.start;
+    if (since > 0) gs4i_collider_move(body, fmin(dt, since));
+}
+
+static void gs4i_move_bodies(gs4_sim *sim, double dt)
+{
+    int i;
+    for (i = 0; i < sim->boundary.collider_count; i++)
+        if (!sim->boundary.colliders[i].is_emitter)
+            gs4i_collider_move(&sim->boundary.colliders[i], dt);
+    for (i = 0; i < sim->emitter_count; i++) {
+        const gs4i_emitter *e = &sim->emitters[i];
+        gs4i_move_emitter(e, &sim->boundary.colliders[e->collider], sim->time, dt);
     }
-    return gs4i_lattice_span(l, &sim->grid, l->low, high, 1);
 }
 
-/* The next point x (of the world) that is in the emitter now and was not at its last emission. */
-static int gs4i_next_emitted(const gs4i_grid *g, const gs4i_emitter *e, gs4i_lattice *l,
-                             gs4_real x[3])
+/* The places of an emitter, one after the other: those that are in it when material has flowed by
+ * `to` and were not when it had by `from`, less than what a row has room for before. So until all
+ * has flowed by `flowed`. */
+typedef struct gs4i_emission {
+    const gs4i_emitter *e;
+    const gs4i_collider *body;
+    double from, to, flowed;
+    int is_first;             /* `from` is none */
+    double low[3], high[3];   /* the domain, along the axes of the emitter */
+    int64_t first[3], end[3]; /* first <= n < end */
+    int64_t n[3];
+} gs4i_emission;
+
+/* The box along the axes of the emitter that the domain is in. */
+static void gs4i_see_domain(gs4i_emission *q, const gs4i_grid *g)
 {
-    const gs4_real jitter = l->fill->jitter;
-    while (gs4i_lattice_next(l)) {
-        double now[3], then[3];
-        int a;
-        gs4i_lattice_point(l, jitter, l->offset, now);
-        if (!gs4i_lattice_is_inside(l, now)) continue;
-        gs4i_lattice_point(l, jitter, e->emitted_offset, then);
-        if (e->has_emitted && gs4i_lattice_is_inside(l, then)) continue;
-        for (a = 0; a < 3; a++) x[a] = GS4I_C(now[a] + l->moved[a]);
-        if (gs4i_is_in_domain(g, x)) return 1;
+    const gs4_real size[3] = { GS4I_C(g->cells[0]) * g->h, GS4I_C(g->cells[1]) * g->h,
+                               GS4I_C(g->cells[2]) * g->h };
+    int corner, k;
+    for (corner = 0; corner < 8; corner++) {
+        const gs4_vec3 at =
+            gs4i_add(g->origin, gs4i_vec3(corner & 1 ? size[0] : 0, corner & 2 ? size[1] : 0,
+                                          corner & 4 ? size[2] : 0));
+        double p[3];
+        gs4i_to_double(gs4i_to_collider(q->body, at), p);
+        for (k = 0; k < 3; k++) {
+            const double *axis = q->e->axis[k];
+            const double c = p[0] * axis[0] + p[1] * axis[1] + p[2] * axis[2];
+            q->low[k] = corner ? fmin(q->low[k], c) : c;
+            q->high[k] = corner ? fmax(q->high[k], c) : c;
+        }
+    }
+}
+
+/* Places that may come in now, as far as they are in the domain. */
+static void gs4i_begin_places(gs4i_emission *q)
+{
+    const gs4i_emitter *e = q->e;
+    int k;
+    for (k = 0; k < 3; k++) {
+        const double flowed = k ? 0 : q->to, margin = k ? 0 : 1 + ceil(flowed / e->spacing[0]),
+                     begin = floor((q->low[k] - e->low[k] - flowed) / e->spacing[k]) - 1,
+                     end = ceil((q->high[k] - e->low[k] - flowed) / e->spacing[k]) + 1;
+        q->first[k] = (int64_t)fmin(fmax(begin, -margin), e->places[k]);
+        q->end[k] =
+            (int64_t)fmax(fmin(end, e->places[k] + (k ? 0 : 3 - margin)), (double)q->first[k]);
+        q->n[k] = q->first[k];
+    }
+    q->n[0]--;
+    if (q->end[0] == q->first[0] || q->end[1] == q->first[1]) q->end[2] = q->first[2];
+}
+
+static void gs4i_flow_on(gs4i_emission *q)
+{
+    q->from = q->to;
+    q->to = fmin(q->flowed, q->to + 0.25 * q->e->window);
+}
+
+static gs4i_emission gs4i_begin_emission(const gs4i_grid *g, const gs4i_emitter *e,
+                                         const gs4i_collider *body, double flowed)
+{
+    gs4i_emission q;
+    q.e = e;
+    q.body = body;
+    q.flowed = flowed;
+    q.to = q.from = e->emitted;
+    q.is_first = !e->has_emitted;
+    gs4i_see_domain(&q, g);
+    if (!q.is_first) gs4i_flow_on(&q);
+    gs4i_begin_places(&q);
+    return q;
+}
+
+/* To the next place; 0 behind the last one. */
+static int gs4i_next_place(gs4i_emission *q)
+{
+    for (;;) {
+        if (q->end[2] > q->first[2]) {
+            if (++q->n[0] < q->end[0]) return 1;
+            q->n[0] = q->first[0];
+            if (++q->n[1] < q->end[1]) return 1;
+            q->n[1] = q->first[1];
+            if (++q->n[2] < q->end[2]) return 1;
+        }
+        if (!(q->to < q->flowed)) return 0;
+        gs4i_flow_on(q);
+        q->is_first = 0;
+        gs4i_begin_places(q);
+    }
+}
+
+/* How far ahead a row is, in spacings from -1/2 to 1/2, so that not all rows give at once. Mirror
+ * images of a row go with it; the factors are powers of the plastic number's reciprocal. */
+static double gs4i_row_phase(const gs4i_emitter *e, const int64_t n[3])
+{
+    /* rings around the middle */
+    const double u = floor(fabs((double)(2 * n[1] + 1 - e->places[1])) / 2),
+                 v = floor(fabs((double)(2 * n[2] + 1 - e->places[2])) / 2);
+    const double t = 0.5 + 0.75487766624669276 * fmin(u, v) + 0.56984029099805327 * fmax(u, v);
+    return t - floor(t) - 0.5;
+}
+
+/* World point x of the next place that comes into the emitter; 0: there is none. Jitter does not
+ * take it out of there. */
+static int gs4i_next_emitted(gs4i_emission *q, gs4_real x[3])
+{
+    const gs4i_emitter *e = q->e;
+    double c[3], at[3], along;
+    int a, k;
+    while (gs4i_next_place(q)) {
+        for (a = 0; a < 3; a++) c[a] = e->low[a] + ((double)q->n[a] + 0.5) * e->spacing[a];
+        along = c[0] + gs4i_row_phase(e, q->n) * e->spacing[0];
+        c[0] = along + q->from;
+        gs4i_emitter_point(e, c, at);
+        if (!q->is_first && gs4i_is_inside(q->body, at)) continue;
+        c[0] = along + q->to;
+        gs4i_emitter_point(e, c, at);
+        if (!gs4i_is_inside(q->body, at)) continue;
+        for (k = e->is.fill.jitter > 0; k >= 0; k--) {
+            double d[3];
+            for (a = 0; a < 3; a++)
+                d[a] = c[a]
+                       + k * (double)(e->is.fill.jitter * gs4i_lattice_noise(&e->is.fill, q->n, a))
+                             * e->spacing[a];
+            gs4i_emitter_point(e, d, at);
+            if (gs4i_is_inside(q->body, at)) break;
+        }
+        for (a = 0; a < 3; a++) at[a] += (q->flowed - q->to) * e->axis[0][a];
+        gs4i_from_collider(q->body, at, x);
+        return 1;
     }
     return 0;
+}
+
+/* Is there room for all places of an emitter in the domain? */
+static int gs4i_check_emission(gs4_sim *sim, const gs4i_emission *q)
+{
+    double all = 1;
+    int a;
+    for (a = 0; a < 3; a++) all *= (double)(q->end[a] - q->first[a]);
+    if (!(all > 2.0 * GS4I_MAX_PARTICLES)) return GS4_OK;
+    return gs4i_fail_value(&sim->error, GS4_ERROR_MEMORY, "an emitter holds about ", all,
+                           " particles; there may be 1073741808; a larger fill.spacing or "
+                           "max_particles would do");
 }
 
 /* At the begin of a step: which emitters hold their nodes, and room for what they will give in
@@ -13871,23 +14219,21 @@ static int gs4i_prepare_emitters(gs4_sim *sim, double dt)
 {
     int i, n = 0, wanted;
     for (i = 0; i < sim->emitter_count; i++) {
-        const gs4i_emitter *e = &sim->emitters[i];
-        double offset[3], about;
+        gs4i_emitter *e = &sim->emitters[i];
+        gs4i_emission q;
         gs4_real x[3];
-        gs4i_lattice l;
+        gs4i_collider then = sim->boundary.colliders[e->collider];
+        double flowed;
+        e->active = gs4i_emitter_active(e, sim->time, dt);
+        flowed = gs4i_flowed_after(e);
         sim->boundary.colliders[e->collider].is_off = !gs4i_emitter_is_on(e, sim->time);
-        if (!gs4i_emitter_is_on(e, sim->time + dt)) continue;
+        if (!gs4i_emission_is_due(e, flowed)) continue;
         /* with max_particles there is all the room there will be; emitters pause when it is full */
         if (sim->desc.max_particles) continue;
-        gs4i_offset_after(e, dt, offset);
-        if (!gs4i_emission_is_due(e, offset) || !gs4i_emitter_lattice(sim, e, offset, dt, &l))
-            continue;
-        about = e->has_emitted ? 0 : gs4i_estimate_points(&l, 1.2 * GS4I_MAX_PARTICLES);
-        if (about > 1.2 * GS4I_MAX_PARTICLES)
-            return gs4i_fail_value(&sim->error, GS4_ERROR_MEMORY, "an emitter holds about ", about,
-                                   " particles; there may be 1073741808; a larger fill.spacing or "
-                                   "max_particles would do");
-        while (gs4i_next_emitted(&sim->grid, e, &l, x)) n++;
+        gs4i_move_emitter(e, &then, sim->time, dt);
+        q = gs4i_begin_emission(&sim->grid, e, &then, flowed);
+        GS4I_TRY(gs4i_check_emission(sim, &q));
+        while (gs4i_next_emitted(&q, x)) n++;
     }
     if (n == 0) return GS4_OK;
     wanted = sim->particles.count + n;
@@ -13912,35 +14258,43 @@ static void gs4i_note_emission(gs4_sim *sim, const gs4i_material_constants *m)
     if (m->varies) sim->limits_stale = 1;
 }
 
-/* At the end of a step of dt: new particles where the lattices have flowed into their emitters. */
-static void gs4i_emit(gs4_sim *sim, double dt)
+/* New particles of emitter i. */
+static void gs4i_emit_rows(gs4_sim *sim, int i, double flowed)
+{
+    const gs4i_emitter *e = &sim->emitters[i];
+    const gs4i_collider *body = &sim->boundary.colliders[e->collider];
+    gs4i_emission q = gs4i_begin_emission(&sim->grid, e, body, flowed);
+    gs4_real x[3];
+    while (gs4i_next_emitted(&q, x)) {
+        const gs4_vec3 at = gs4i_vec3(x[0], x[1], x[2]);
+        if (!gs4i_is_in_domain(&sim->grid, x)) {
+            gs4i_warn(sim, GS4I_WARN_EMITTER_OUTSIDE,
+                      "an emitter is out of the domain, in part at least: that gives nothing");
+            continue;
+        }
+        if (gs4i_will_warn(sim, GS4I_WARN_EMITTER_IN_BODY) && gs4i_is_in_body(sim, x))
+            gs4i_warn(sim, GS4I_WARN_EMITTER_IN_BODY,
+                      "a collider covers an emitter, in part at least: what it gives has to "
+                      "get out of there");
+        if (!gs4i_add_particle(sim, at, gs4i_collider_velocity(body, at), e->mass, &e->is.fill)) {
+            gs4i_warn(sim, GS4I_WARN_FULL, "an emitter pauses: max_particles is reached");
+            break;
+        }
+    }
+}
+
+/* At the end of a step: new particles where rows have flowed into their emitters. */
+static void gs4i_emit(gs4_sim *sim)
 {
     int i;
     for (i = 0; i < sim->emitter_count; i++) {
         gs4i_emitter *e = &sim->emitters[i];
-        const gs4_fill *f = &e->is.fill;
-        const gs4_real mass = gs4i_mass_of(sim, f);
-        double offset[3];
-        gs4_real x[3];
-        gs4i_lattice l;
-        if (!gs4i_emitter_is_on(e, sim->time)) continue;
-        gs4i_offset_after(e, dt, offset);
-        memcpy(e->offset, offset, sizeof offset);
-        if (!gs4i_emission_is_due(e, offset)) continue;
-        if (gs4i_emitter_lattice(sim, e, offset, 0, &l))
-            while (gs4i_next_emitted(&sim->grid, e, &l, x)) {
-                if (gs4i_will_warn(sim, GS4I_WARN_EMITTER_IN_BODY) && gs4i_is_in_body(sim, x))
-                    gs4i_warn(sim, GS4I_WARN_EMITTER_IN_BODY,
-                              "a collider covers a part of an emitter: what comes out there is put "
-                              "back on its surface");
-                if (!gs4i_add_particle(sim, gs4i_vec3(x[0], x[1], x[2]), f->velocity, mass, f)) {
-                    gs4i_warn(sim, GS4I_WARN_FULL, "an emitter pauses: max_particles is reached");
-                    break;
-                }
-            }
-        memcpy(e->emitted_offset, offset, sizeof offset);
+        e->flowed = gs4i_flowed_after(e);
+        if (!gs4i_emission_is_due(e, e->flowed)) continue;
+        gs4i_emit_rows(sim, i, e->flowed);
+        e->emitted = e->flowed;
         e->has_emitted = 1;
-        gs4i_note_emission(sim, &sim->constants[f->material]);
+        gs4i_note_emission(sim, &sim->constants[e->is.fill.material]);
     }
 }
 
@@ -14041,8 +14395,8 @@ static void gs4i_see_colliders(const gs4_sim *sim, gs4i_report *r)
     int i;
     for (i = 0; i < sim->boundary.collider_count; i++) {
         const gs4i_collider *c = &sim->boundary.colliders[i];
-        r->max_speed = gs4i_max(r->max_speed, gs4i_collider_speed(c, &sim->grid));
-        r->max_speed = gs4i_max(r->max_speed, gs4i_length(c->flow));
+        r->max_speed =
+            gs4i_max(r->max_speed, gs4i_collider_speed(c, &sim->grid) + gs4i_length(c->flow));
         r->max_gradient =
             gs4i_max(r->max_gradient, GS4I_SQRT(GS4I_C(2)) * gs4i_length(c->is.angular_velocity));
     }
@@ -14277,7 +14631,6 @@ static int gs4i_check_stage(gs4_sim *sim)
 static void gs4i_finish(gs4_sim *sim)
 {
     const double dt = (double)sim->integrator.dt;
-    int b;
     if (sim->particles.count) {
         gs4i_report r = gs4i_all_reports(sim);
         r.max_speed = GS4I_SQRT(r.max_speed);
@@ -14292,15 +14645,14 @@ static void gs4i_finish(gs4_sim *sim)
                             "relaxation_time and stretch_time or less anisotropy would do");
         if (r.left) gs4i_drop_outside(sim);
     }
-    for (b = 0; b < sim->boundary.collider_count; b++)
-        gs4i_collider_move(&sim->boundary.colliders[b], dt);
+    gs4i_move_bodies(sim, dt);
     gs4i_see_colliders(sim, &sim->limits);
     sim->time += dt;
     sim->last_dt = dt;
     sim->steps++;
     sim->restart = 0;
     sim->shift = sim->integrator.next_shift;
-    gs4i_emit(sim, dt);
+    gs4i_emit(sim);
     if (sim->bad_distance)
         gs4i_warn(sim, GS4I_WARN_DISTANCE,
                   "a distance function (gs4_sdf) gave NaN or infinity at the end of a step: it "
@@ -15033,8 +15385,8 @@ static void gs4i_restore_scene(gs4_sim *sim, const gs4i_pieces *p)
     for (i = 0; i < sim->emitter_count; i++) {
         gs4i_emitter there, *e = &sim->emitters[i];
         memcpy(&there, p->at[GS4I_PIECE_EMITTERS] + (size_t)i * sizeof there, sizeof there);
-        memcpy(e->offset, there.offset, sizeof e->offset);
-        memcpy(e->emitted_offset, there.emitted_offset, sizeof e->emitted_offset);
+        e->flowed = there.flowed;
+        e->emitted = there.emitted;
         e->has_emitted = there.has_emitted != 0;
         e->is.travel = sim->boundary.colliders[e->collider].is.velocity;
     }
@@ -15098,8 +15450,7 @@ static int gs4i_motions_are_sound(const gs4i_head *h, const gs4i_pieces *p)
     for (i = 0; i < h->emitters; i++) {
         gs4i_emitter e;
         memcpy(&e, p->at[GS4I_PIECE_EMITTERS] + (size_t)i * sizeof e, sizeof e);
-        for (k = 0; k < 3; k++)
-            if (!(fabs(e.offset[k]) < far_away && fabs(e.emitted_offset[k]) < far_away)) return 0;
+        if (!(e.emitted >= 0 && e.flowed >= e.emitted && e.flowed < far_away)) return 0;
     }
     return 1;
 }
@@ -15415,7 +15766,7 @@ static GS4I_COLD int gs4i_check(gs4i_error *e, const char *field, gs4_real value
     case GS4I_FINITE: break;
     case GS4I_POSITIVE: good = sane && value > 0 && !tiny; break;
     case GS4I_NOT_NEGATIVE: good = sane && value >= 0 && !tiny; break;
-    case GS4I_FRACTION: good = value >= 0 && value <= 1 && !tiny; break;
+    case GS4I_FRACTION: good = value >= 0 && value <= 1; break;
     }
     if (good) return GS4_OK;
     t = gs4i_begin_error(e);
@@ -15974,6 +16325,7 @@ static int gs4i_check_emitter(gs4_sim *sim, gs4_emitter *m)
     GS4I_TRY(gs4i_require(e, !(gs4i_length(m->fill.angular_velocity) > 0),
                           "fill.angular_velocity: an emitter does not spin, leave it 0"));
     GS4I_TRY(gs4i_check3(e, "travel", m->travel));
+    GS4I_TRY(gs4i_check3(e, "pivot", m->pivot));
     GS4I_TRY(gs4i_check(e, "start", m->start, GS4I_NOT_NEGATIVE));
     GS4I_TRY(gs4i_check(e, "stop", m->stop, GS4I_NOT_NEGATIVE));
     GS4I_TRY(gs4i_require(e, m->stop == 0 || m->stop > m->start,
@@ -16355,21 +16707,40 @@ GS4_API GS4I_COLD int gs4_add_collider(gs4_sim *sim, const gs4_collider *collide
     return result;
 }
 
+/* The body of a collider's id. */
+static int gs4i_collider_of(gs4_sim *sim, int collider, gs4i_collider **body)
+{
+    GS4I_TRY(gs4i_check_id(&sim->error, "collider", collider, sim->boundary.collider_count));
+    *body = &sim->boundary.colliders[collider];
+    return gs4i_require(&sim->error, !(*body)->is_emitter,
+                        "that id belongs to an emitter, not to a collider");
+}
+
+static int gs4i_emitter_of(gs4_sim *sim, int emitter, gs4i_collider **body)
+{
+    GS4I_TRY(gs4i_check_id(&sim->error, "emitter", emitter, sim->emitter_count));
+    *body = &sim->boundary.colliders[sim->emitters[emitter].collider];
+    return GS4_OK;
+}
+
+static void gs4i_set_motion(gs4_sim *sim, gs4i_collider *body, gs4_vec3 velocity,
+                            gs4_vec3 angular_velocity)
+{
+    body->is.velocity = velocity;
+    body->is.angular_velocity = angular_velocity;
+    gs4i_note_speed(sim, gs4i_collider_speed(body, &sim->grid) + gs4i_length(body->flow));
+    sim->limits_stale = 1;
+}
+
 GS4_API int gs4_move_collider(gs4_sim *sim, int collider, gs4_vec3 velocity,
                               gs4_vec3 angular_velocity)
 {
-    gs4i_collider *c;
+    gs4i_collider *body;
     GS4I_TRY(gs4i_check_idle(sim));
-    GS4I_TRY(gs4i_check_id(&sim->error, "collider", collider, sim->boundary.collider_count));
-    c = &sim->boundary.colliders[collider];
-    GS4I_TRY(gs4i_require(&sim->error, !c->is_emitter,
-                          "that id belongs to an emitter, not to a collider"));
+    GS4I_TRY(gs4i_collider_of(sim, collider, &body));
     GS4I_TRY(gs4i_check3(&sim->error, "velocity", velocity));
     GS4I_TRY(gs4i_check3(&sim->error, "angular_velocity", angular_velocity));
-    c->is.velocity = velocity;
-    c->is.angular_velocity = angular_velocity;
-    gs4i_note_speed(sim, gs4i_collider_speed(c, &sim->grid));
-    sim->limits_stale = 1;
+    gs4i_set_motion(sim, body, velocity, angular_velocity);
     return GS4_OK;
 }
 
@@ -16385,14 +16756,130 @@ GS4_API GS4I_COLD int gs4_add_emitter(gs4_sim *sim, const gs4_emitter *emitter)
 
 GS4_API int gs4_move_emitter(gs4_sim *sim, int emitter, gs4_vec3 travel)
 {
+    gs4i_collider *body;
     GS4I_TRY(gs4i_check_idle(sim));
-    GS4I_TRY(gs4i_check_id(&sim->error, "emitter", emitter, sim->emitter_count));
+    GS4I_TRY(gs4i_emitter_of(sim, emitter, &body));
     GS4I_TRY(gs4i_check3(&sim->error, "travel", travel));
-    sim->emitters[emitter].is.travel = travel;
-    sim->boundary.colliders[sim->emitters[emitter].collider].is.velocity = travel;
-    gs4i_note_speed(sim, gs4i_length(travel));
+    gs4i_set_motion(sim, body, travel, gs4i_vec3(0, 0, 0));
+    return GS4_OK;
+}
+
+/* --- poses ------------------------------------------------------------------------------------ */
+
+static int gs4i_get_pose(gs4i_error *e, const gs4i_collider *body, gs4_pose *pose)
+{
+    int i;
+    GS4I_TRY(gs4i_require(e, pose != NULL, "pose is NULL"));
+    pose->position = gs4i_vec3(GS4I_C(body->at[0]), GS4I_C(body->at[1]), GS4I_C(body->at[2]));
+    for (i = 0; i < 4; i++) pose->quaternion[i] = GS4I_C(body->turn[i]);
+    return GS4_OK;
+}
+
+/* A pose that a user gives, with a unit quaternion. */
+static int gs4i_check_pose(gs4i_error *e, const gs4_pose *pose, double at[3], double turn[4])
+{
+    double most = 0, norm = 0;
+    int i;
+    GS4I_TRY(gs4i_require(e, pose != NULL, "pose is NULL"));
+    GS4I_TRY(gs4i_check3(e, "position", pose->position));
+    for (i = 0; i < 4; i++) {
+        GS4I_TRY(gs4i_check(e, "quaternion", pose->quaternion[i], GS4I_FINITE));
+        most = fmax(most, fabs((double)pose->quaternion[i]));
+    }
+    gs4i_to_double(pose->position, at);
+    for (i = 0; i < 4; i++) {
+        turn[i] = most > 0 ? (double)pose->quaternion[i] / most : i == 0;
+        norm += turn[i] * turn[i];
+    }
+    for (i = 0; i < 4; i++) turn[i] /= sqrt(norm);
+    return GS4_OK;
+}
+
+static int gs4i_put_at(gs4_sim *sim, gs4i_collider *body, const gs4_pose *pose)
+{
+    double at[3], turn[4];
+    GS4I_TRY(gs4i_check_pose(&sim->error, pose, at, turn));
+    memcpy(body->at, at, sizeof at);
+    memcpy(body->turn, turn, sizeof turn);
+    gs4i_collider_orient(body);
     sim->limits_stale = 1;
     return GS4_OK;
+}
+
+/* The velocities that bring a body to a pose in the time `duration`. */
+static int gs4i_move_to(gs4_sim *sim, gs4i_collider *body, const gs4_pose *pose, gs4_real duration)
+{
+    const double *t = body->turn;
+    double at[3], q[4], by[4], half, sine, rate;
+    gs4_vec3 velocity, angular;
+    GS4I_TRY(gs4i_check_pose(&sim->error, pose, at, q));
+    GS4I_TRY(gs4i_check(&sim->error, "duration", duration, GS4I_POSITIVE));
+    /* by = q t*, the turn that is left */
+    by[0] = q[0] * t[0] + q[1] * t[1] + q[2] * t[2] + q[3] * t[3];
+    by[1] = -q[0] * t[1] + q[1] * t[0] - q[2] * t[3] + q[3] * t[2];
+    by[2] = -q[0] * t[2] + q[1] * t[3] + q[2] * t[0] - q[3] * t[1];
+    by[3] = -q[0] * t[3] - q[1] * t[2] + q[2] * t[1] + q[3] * t[0];
+    sine = sqrt(by[1] * by[1] + by[2] * by[2] + by[3] * by[3]);
+    half = atan2(sine, fabs(by[0]));
+    rate = sine > 0 ? 2 * half / sine / (double)duration : 0;
+    if (by[0] < 0) rate = -rate;
+    angular = gs4i_vec3(GS4I_C(by[1] * rate), GS4I_C(by[2] * rate), GS4I_C(by[3] * rate));
+    velocity = gs4i_vec3(GS4I_C((at[0] - body->at[0]) / (double)duration),
+                         GS4I_C((at[1] - body->at[1]) / (double)duration),
+                         GS4I_C((at[2] - body->at[2]) / (double)duration));
+    GS4I_TRY(gs4i_check3(&sim->error, "velocity that this takes", velocity));
+    GS4I_TRY(gs4i_check3(&sim->error, "angular velocity that this takes", angular));
+    gs4i_set_motion(sim, body, velocity, angular);
+    return GS4_OK;
+}
+
+GS4_API int gs4_collider_pose(gs4_sim *sim, int collider, gs4_pose *pose)
+{
+    gs4i_collider *body;
+    GS4I_TRY(gs4i_check_idle(sim));
+    GS4I_TRY(gs4i_collider_of(sim, collider, &body));
+    return gs4i_get_pose(&sim->error, body, pose);
+}
+
+GS4_API int gs4_put_collider(gs4_sim *sim, int collider, const gs4_pose *pose)
+{
+    gs4i_collider *body;
+    GS4I_TRY(gs4i_check_idle(sim));
+    GS4I_TRY(gs4i_collider_of(sim, collider, &body));
+    return gs4i_put_at(sim, body, pose);
+}
+
+GS4_API int gs4_move_collider_to(gs4_sim *sim, int collider, const gs4_pose *pose,
+                                 gs4_real duration)
+{
+    gs4i_collider *body;
+    GS4I_TRY(gs4i_check_idle(sim));
+    GS4I_TRY(gs4i_collider_of(sim, collider, &body));
+    return gs4i_move_to(sim, body, pose, duration);
+}
+
+GS4_API int gs4_emitter_pose(gs4_sim *sim, int emitter, gs4_pose *pose)
+{
+    gs4i_collider *body;
+    GS4I_TRY(gs4i_check_idle(sim));
+    GS4I_TRY(gs4i_emitter_of(sim, emitter, &body));
+    return gs4i_get_pose(&sim->error, body, pose);
+}
+
+GS4_API int gs4_put_emitter(gs4_sim *sim, int emitter, const gs4_pose *pose)
+{
+    gs4i_collider *body;
+    GS4I_TRY(gs4i_check_idle(sim));
+    GS4I_TRY(gs4i_emitter_of(sim, emitter, &body));
+    return gs4i_put_at(sim, body, pose);
+}
+
+GS4_API int gs4_move_emitter_to(gs4_sim *sim, int emitter, const gs4_pose *pose, gs4_real duration)
+{
+    gs4i_collider *body;
+    GS4I_TRY(gs4i_check_idle(sim));
+    GS4I_TRY(gs4i_emitter_of(sim, emitter, &body));
+    return gs4i_move_to(sim, body, pose, duration);
 }
 
 /* --- stepping --------------------------------------------------------------------------------- */
@@ -17222,4 +17709,6 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  * Refused now: numbers too small for a reciprocal, callbacks that give no number, shapes too far
  * out for gs4_real, changes of a simulation by its own callbacks, checkpoints with numbers that no
  * simulation has or with other pivots, starts or stops. `log` says at level 1, once each, what is
- * allowed but hardly meant. gs4_stats has time_left. Files follow symbolic links. */
+ * allowed but hardly meant. gs4_stats has time_left. Files follow symbolic links.
+ * Emitters: the velocity of a filling is relative to the emitter, which travels from its start on.
+ * Coulomb friction holds without a creep. */

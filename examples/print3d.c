@@ -46,7 +46,7 @@ int main(int argc, char **argv)
     preview_solid things[3] = { { 0 } };
     gs4_sim *sim;
     int collider, emitter, more = 1;
-    double angle = 0, dt, low = bed_top + 0.001, lift = 0;
+    double angle = 0, dt, low = bed_top + layer, lift = 0;
     gs4_vec3 at, travel;
     e.name = "print3d";
     e.frames = 96;
@@ -97,8 +97,8 @@ int main(int argc, char **argv)
     nozzle.shape =
         gs4_cylinder(at, vec((double)at.x, low + outlet_height, (double)at.z), real(bead));
     nozzle.fill.temperature = 200;
-    /* it paints as it goes; what it leaves hardly moves */
-    nozzle.fill.velocity = vec(0, -0.05, 0);
+    /* as much as a bead one layer high and as wide as the nozzle takes */
+    nozzle.fill.velocity = vec(0, -2 * layer / (pi * bead) * speed, 0);
     nozzle.fill.jitter = real(0.3);
     emitter = example_need(sim, gs4_add_emitter(sim, &nozzle));
 

@@ -1170,7 +1170,7 @@ static void test_files_forged(void)
                         sizeof bad[v], "velocity");
             files_forge(to, data, bytes, at[1] + offsetof(gs4i_collider, is.angular_velocity),
                         &bad[v], sizeof bad[v], "angular velocity");
-            files_forge(to, data, bytes, at[2] + offsetof(gs4i_emitter, offset), &wrong[v], 8,
+            files_forge(to, data, bytes, at[2] + offsetof(gs4i_emitter, flowed), &wrong[v], 8,
                         "offset");
             files_forge(to, data, bytes, offsetof(gs4i_head, time), &wrong[v], 8, "time");
             files_forge(to, data, bytes, offsetof(gs4i_head, last_dt), &wrong[v], 8, "last dt");

@@ -88,7 +88,7 @@ int main(int count, char **values)
     RUN_ONCE(test_stability);
     RUN(test_stability_by_hand);
     RUN(test_stability_of_turning);
-    RUN_ONCE(test_stability_of_blades);
+    RUN_FULL(test_stability_of_blades);
     RUN_ONCE(test_stability_of_two_densities);
     RUN_ONCE(test_extremes);
     RUN_ONCE(test_short_decay);

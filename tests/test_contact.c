@@ -1489,7 +1489,7 @@ static void run_contact(void)
     RUN(test_contact_node);
     RUN_ONCE(test_contact_friction);
     RUN_ONCE(test_contact_slip);
-    RUN_ONCE(test_contact_friction_holds);
+    RUN_FULL(test_contact_friction_holds);
     RUN_ONCE(test_contact_channel);
     RUN_ONCE(test_contact_sticky_wall);
     RUN_ONCE(test_contact_leaves);
@@ -1498,7 +1498,7 @@ static void run_contact(void)
     RUN_ONCE(test_contact_rides);
     RUN_ONCE(test_contact_sweeps);
     RUN_ONCE(test_contact_spins);
-    RUN_ONCE(test_contact_holds_out);
+    RUN_FULL(test_contact_holds_out);
     RUN_ONCE(test_contact_piston);
     RUN_FULL(test_contact_pairs);
     RUN(test_contact_open);

@@ -595,7 +595,7 @@ static void run_mesh(void)
     RUN(test_mesh_table_moves);
     RUN(test_mesh_stray);
     RUN(test_mesh_far);
-    RUN_ONCE(test_mesh_fan);
+    RUN_FULL(test_mesh_fan);
     RUN(test_mesh_soup);
     RUN(test_mesh_needles);
     RUN(test_mesh_refused);

@@ -592,13 +592,13 @@ static void run_mesh(void)
     RUN_ONCE(test_mesh_ball);
     RUN(test_mesh_parts);
     RUN(test_mesh_table);
-    RUN(test_mesh_table_moves);
+    RUN_ONCE(test_mesh_table_moves);
     RUN(test_mesh_stray);
     RUN(test_mesh_far);
     RUN_FULL(test_mesh_fan);
     RUN(test_mesh_soup);
     RUN(test_mesh_needles);
     RUN(test_mesh_refused);
-    RUN_ONCE(test_mesh_memory);
+    RUN_FULL(test_mesh_memory);
     RUN(test_mesh_too_much);
 }

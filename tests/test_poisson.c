@@ -923,7 +923,7 @@ static void run_poisson(void)
     RUN(test_poisson_guess_and_units);
     RUN_ONCE(test_poisson_symmetry);
     RUN(test_poisson_graphs);
-    RUN_ONCE(test_poisson_same_bits);
+    RUN_FULL(test_poisson_same_bits);
     RUN_ONCE(test_poisson_reuse);
     RUN(test_poisson_diagonal);
     RUN(test_poisson_limit);

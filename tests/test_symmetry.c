@@ -722,9 +722,9 @@ static void run_symmetry(void)
 {
     RUN_ONCE(test_symmetry_flows);
     RUN_ONCE(test_symmetry_walls);
-    RUN_ONCE(test_symmetry_bodies);
-    RUN_ONCE(test_symmetry_solids);
-    RUN_ONCE(test_symmetry_stress);
+    RUN_FULL(test_symmetry_bodies);
+    RUN_FULL(test_symmetry_solids);
+    RUN_FULL(test_symmetry_stress);
     RUN_ONCE(test_symmetry_heat);
     RUN_ONCE(test_symmetry_emitters);
     RUN_ONCE(test_symmetry_fills);

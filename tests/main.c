@@ -37,7 +37,7 @@ int main(int count, char **values)
     RUN_ONCE(test_drop_at_rest);
     RUN_SLOW(test_drop_impact);
     RUN_FULL(test_elastic_wave);
-    RUN_ONCE(test_channel_overshoot);
+    RUN_FULL(test_channel_overshoot);
     RUN_FULL(test_elastic_couette);
     RUN(test_stress_is_paid_for_where_it_is);
     RUN(test_stress_counts);
@@ -55,7 +55,7 @@ int main(int count, char **values)
     RUN_ONCE(test_heat_drifts);
     RUN_ONCE(test_heat_around);
     RUN_ONCE(test_heat_walls);
-    RUN(test_heat_bounds);
+    RUN_ONCE(test_heat_bounds);
     RUN_ONCE(test_heat_long_steps);
     RUN_ONCE(test_heat_beside_walls);
     RUN_ONCE(test_heat_waves_at_walls);

@@ -1493,9 +1493,9 @@ static void run_contact(void)
     RUN_ONCE(test_contact_channel);
     RUN_ONCE(test_contact_sticky_wall);
     RUN_ONCE(test_contact_leaves);
-    RUN_ONCE(test_contact_carries);
+    RUN_FULL(test_contact_carries);
     RUN_ONCE(test_contact_glides);
-    RUN_ONCE(test_contact_rides);
+    RUN_FULL(test_contact_rides);
     RUN_ONCE(test_contact_sweeps);
     RUN_FULL(test_contact_spins);
     RUN_FULL(test_contact_holds_out);

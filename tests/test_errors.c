@@ -480,6 +480,7 @@ static void test_errors_emitter(void)
         ERR_FIELD(gs4_emitter, fill.temperature, "fill.temperature", ERR_LATER),
         ERR_FIELD(gs4_emitter, fill.jitter, "fill.jitter", ERR_REAL),
         ERR_VEC(gs4_emitter, travel, "travel"),
+        ERR_VEC(gs4_emitter, pivot, "pivot"),
         ERR_FIELD(gs4_emitter, start, "start", ERR_REAL),
         ERR_FIELD(gs4_emitter, stop, "stop", ERR_REAL)
     };

@@ -1599,7 +1599,7 @@ static void test_files_two_writers(void)
 static void run_files(void)
 {
     files_begin();
-    RUN_ONCE(test_files_memory);
+    RUN_FULL(test_files_memory);
     RUN_ONCE(test_files_load_refused);
     RUN(test_files_frames);
     RUN(test_files_places);

@@ -13788,7 +13788,7 @@ static int gs4i_add_collider(gs4_sim *sim, const gs4_collider *c, double spacing
 /* --- emitters --------------------------------------------------------------------------------- */
 
 enum {
-    GS4I_EMITTER_LINES = 128,     /* a side, by which the area of an emitter is found to 1 % */
+    GS4I_EMITTER_LINES = 64,      /* a side, by which the area of an emitter is found to 1 % */
     GS4I_EMITTER_ROWS = 1 << 16,  /* more are not counted: so many have their area to 1 % */
     GS4I_EMITTER_PLACES = 1 << 30 /* along each axis */
 };
@@ -13830,7 +13830,7 @@ static void gs4i_emitter_point(const gs4i_emitter *e, const double c[3], double 
 }
 
 /* Does the line along the flow, at c[1] and c[2] across it, meet the shape between low and high?
- * It goes by the distance, and by 1/128 of the way at least. */
+ * It goes by the distance, and by 1/64 of the way at least. */
 static int gs4i_line_meets(const gs4i_emitter *e, const gs4i_collider *shape, double c[3],
                            double low, double high)
 {

@@ -13847,9 +13847,9 @@ static int gs4i_line_meets(const gs4i_emitter *e, const gs4i_collider *shape, do
 }
 
 /* Lines through the box low..high: the area (m^2) of those that meet the shape. Shrinks the box
- * to them across the flow, and to where the first of them does. */
-static double gs4i_emitter_area(const gs4i_emitter *e, const gs4i_collider *shape, double low[3],
-                                double high[3])
+ * to them and `margin` lines more across the flow, and to where the first of them does. */
+static double gs4i_emitter_area(const gs4i_emitter *e, const gs4i_collider *shape, int margin,
+                                double low[3], double high[3])
 {
     const double step[3] = { 0, (high[1] - low[1]) / GS4I_EMITTER_LINES,
                              (high[2] - low[2]) / GS4I_EMITTER_LINES };
@@ -13867,8 +13867,8 @@ static double gs4i_emitter_area(const gs4i_emitter *e, const gs4i_collider *shap
             }
         }
     for (a = 1; a < 3 && met > 0; a++) {
-        high[a] = low[a] + (last[a] + 1) * step[a];
-        low[a] += first[a] * step[a];
+        high[a] = fmin(high[a], low[a] + (last[a] + 1 + margin) * step[a]);
+        low[a] = fmax(low[a], low[a] + (first[a] - margin) * step[a]);
     }
     low[0] = fmax(low[0], inlet);
     return met * step[1] * step[2];
@@ -13955,12 +13955,13 @@ static void gs4i_emitter_bounds(const gs4i_emitter *e, const gs4i_grid *g, doubl
 static int gs4i_lay_rows(gs4_sim *sim, gs4i_emitter *e)
 {
     const gs4i_collider *shape = &sim->boundary.colliders[e->collider];
-    double low[3], high[3], area, rows;
-    int finer;
+    double low[3], high[3], area = 0, rows;
+    int finer, margin;
     gs4i_emitter_axes(e->is.fill.velocity, e->axis);
     gs4i_emitter_bounds(e, &sim->grid, low, high);
     sim->bad_distance = 0;
-    area = gs4i_emitter_area(e, shape, low, high);
+    /* once more in what is left of the box, for the area itself */
+    for (margin = 1; margin >= 0; margin--) area = gs4i_emitter_area(e, shape, margin, low, high);
     GS4I_TRY(gs4i_check_distances(sim));
     GS4I_TRY(gs4i_require(&sim->error, area > 0,
                           "shape: no line along the flow meets it; it is inside out, or thinner "

@@ -272,6 +272,19 @@
  * and gs4_step refuses more. gs4_advance takes the fraction `cfl` of it, and half of that again, up
  * to 7 times, where a step is refused.
  *
+ * IN A GAME. Sixty times a second, in 10 ms of computing each; desc.now is a clock. What does not
+ * fit waits for the next frame, up to a tenth of a second: from there on the scene is slower than
+ * the clock.
+ *
+ *     gs4_budget budget = { 0, 0.010, NULL, NULL };
+ *     double due = 0, done;
+ *     while (is_running()) {
+ *         due = due + 1.0 / 60 < 0.1 ? due + 1.0 / 60 : 0.1;
+ *         if (gs4_advance_within(sim, (gs4_real)due, &budget, &done) < 0) break;
+ *         due -= done;
+ *         draw(gs4_particles(sim, GS4_FIELD_POSITION));
+ *     }
+ *
  * ELLIPTIC SOLVER. gs4_poisson_* solves (diagonal - div coefficient grad) x = rhs on a box of cells
  * that are liquid, air or solid, by itself: multigrid in float preconditions conjugate gradients in
  * double. It needs 6 to 11 iterations for a residual of 1e-8 whatever the size, also where large
@@ -348,6 +361,7 @@ typedef double gs4_real;
 #define gs4_add_particles gs4_add_particles_f64
 #define gs4_add_points gs4_add_points_f64
 #define gs4_advance gs4_advance_f64
+#define gs4_advance_within gs4_advance_within_f64
 #define gs4_box gs4_box_f64
 #define gs4_collider_pose gs4_collider_pose_f64
 #define gs4_create gs4_create_f64
@@ -377,9 +391,12 @@ typedef double gs4_real;
 #define gs4_put_collider gs4_put_collider_f64
 #define gs4_put_emitter gs4_put_emitter_f64
 #define gs4_real_size gs4_real_size_f64
+#define gs4_remove_particles gs4_remove_particles_f64
 #define gs4_result_string gs4_result_string_f64
 #define gs4_save gs4_save_f64
 #define gs4_sdf gs4_sdf_f64
+#define gs4_set_gravity gs4_set_gravity_f64
+#define gs4_set_viscosity gs4_set_viscosity_f64
 #define gs4_sphere gs4_sphere_f64
 #define gs4_stable_dt gs4_stable_dt_f64
 #define gs4_state_hash gs4_state_hash_f64
@@ -659,6 +676,11 @@ GS4_API uint64_t gs4_state_hash(const gs4_sim *sim);
 /* The id of the new material, from 0; up to 256. */
 GS4_API int gs4_add_material(gs4_sim *sim, const gs4_material *material);
 
+/* Change the world between steps: gravity (m/s^2), as in a tank that is tilted; the member
+ * `viscosity` of a material (Pa s). A checkpoint is loaded where both are as they were. */
+GS4_API int gs4_set_gravity(gs4_sim *sim, gs4_vec3 gravity);
+GS4_API int gs4_set_viscosity(gs4_sim *sim, int material, gs4_real viscosity);
+
 /* Liquids: water, olive oil, glycerol, honey. Viscoelastic: cream, ice cream, boger fluid, polymer
  * melt. Melting, in degrees Celsius, with solids much softer than real ones: chocolate, wax,
  * butter, lava. Sources are in [[liquid]]. */
@@ -678,6 +700,9 @@ typedef struct gs4_fill {
 GS4_API int gs4_add_particles(gs4_sim *sim, gs4_shape shape, const gs4_fill *fill);
 GS4_API int gs4_add_points(gs4_sim *sim, const gs4_real *xyz, int count, gs4_real volume_each,
                            const gs4_fill *fill);
+
+/* Take those in a shape away. How many there were; others keep their ids. */
+GS4_API int gs4_remove_particles(gs4_sim *sim, gs4_shape shape);
 
 /* A rigid body that moves as it is told, whatever the material does. */
 typedef struct gs4_collider {
@@ -732,6 +757,20 @@ GS4_API int gs4_move_emitter_to(gs4_sim *sim, int emitter, const gs4_pose *pose,
  * it have: the sentence says how many, and how much time is left (gs4_stats.time_left). */
 GS4_API int gs4_step(gs4_sim *sim, gs4_real dt);
 GS4_API int gs4_advance(gs4_sim *sim, gs4_real duration);
+
+/* What gs4_advance_within may use. It ends after a step that uses it up, and before one that as
+ * long as the last one would exceed `seconds`; it takes one step at least. All 0: no limit. */
+typedef struct gs4_budget {
+    int steps;
+    double seconds;           /* by `now` of the description */
+    int (*go_on)(void *user); /* asked after each step; 0: stop */
+    void *user;
+} gs4_budget;
+
+/* gs4_advance within a budget. `done` (s), if it is not NULL, is how much of the duration has
+ * passed, refused or not; the rest is gs4_stats.time_left. To end early is no error. */
+GS4_API int gs4_advance_within(gs4_sim *sim, gs4_real duration, const gs4_budget *budget,
+                               double *done);
 GS4_API gs4_real gs4_stable_dt(const gs4_sim *sim); /* s, see STABILITY; without `cfl` */
 
 /* Of each particle; SI. A scene has stress to flux only where a material needs them. */
@@ -786,7 +825,7 @@ typedef struct gs4_stats {
     uint64_t stress_bounded;
     /* so far; stress is evaluated within the transfers */
     double seconds_transfer, seconds_stress, seconds_solve, seconds_sort, seconds_total;
-    double time_left; /* s, of the duration of the last gs4_advance: 0 unless it was refused */
+    double time_left; /* s, of the duration of the last gs4_advance: 0 unless it ended early */
 } gs4_stats;
 GS4_API gs4_stats gs4_get_stats(gs4_sim *sim);
 
@@ -13304,6 +13343,23 @@ static void gs4i_copy_members(gs4_material *to, const gs4_material *m)
 }
 
 /* Its id, or an error. */
+/* Gravity from now on. Where it is less than before, default speeds of sound stay: particles have
+ * their J by them. Rates are of what was. */
+static void gs4i_set_gravity(gs4_sim *sim, gs4_vec3 gravity)
+{
+    const gs4_real top = sim->top_speed;
+    gs4_material any;
+    double before, after;
+    memset(&any, 0, sizeof any);
+    any.density = 1;
+    before = gs4i_sound_speed_of(&sim->desc, &any, top) / 10;
+    sim->desc.gravity = gravity;
+    after = gs4i_sound_speed_of(&sim->desc, &any, top) / 10;
+    if (after < before)
+        sim->top_speed = GS4I_C(sqrt(before * before - after * after + (double)top * (double)top));
+    gs4i_set_constants(sim);
+}
+
 static int gs4i_add_material(gs4_sim *sim, const gs4_material *m)
 {
     gs4i_material_constants *of_liquid, *of_solid;
@@ -14299,8 +14355,9 @@ static void gs4i_emit(gs4_sim *sim)
     }
 }
 
-/* Particles that went out through an open wall are dropped; the others close up in order. */
-static void gs4i_drop_outside(gs4_sim *sim)
+/* Particles inside the shape are dropped; with NULL, those that went out through an open wall. The
+ * others close up in order. */
+static void gs4i_drop(gs4_sim *sim, const gs4i_collider *shape)
 {
     gs4i_particles *p = &sim->particles;
     gs4i_array a[GS4I_ARRAYS];
@@ -14308,7 +14365,10 @@ static void gs4i_drop_outside(gs4_sim *sim)
     int k;
     gs4i_particle_arrays(p, a);
     for (i = 0; i < (size_t)p->count; i++) {
-        if (!gs4i_is_in_domain(&sim->grid, p->position + 4 * i)) continue;
+        const gs4_real *x = p->position + 4 * i;
+        if (shape ? gs4i_collider_distance(shape, gs4i_vec3(x[0], x[1], x[2])) < 0
+                  : !gs4i_is_in_domain(&sim->grid, x))
+            continue;
         for (k = 0; k < GS4I_ARRAYS && kept != i; k++)
             if (*a[k].data)
                 memcpy((char *)*a[k].data + kept * a[k].size, (char *)*a[k].data + i * a[k].size,
@@ -14317,6 +14377,31 @@ static void gs4i_drop_outside(gs4_sim *sim)
     }
     p->count = (int)kept;
     sim->needs_sort = 1;
+}
+
+/* Particles in a shape go. How many, or an error. */
+static int gs4i_empty_shape(gs4_sim *sim, const gs4_shape *shape)
+{
+    const int before = sim->particles.count;
+    gs4_collider described;
+    gs4i_collider placed;
+    int i, result;
+    memset(&described, 0, sizeof described);
+    described.shape = *shape;
+    GS4I_TRY(gs4i_make_collider(sim, &placed, &described, 0.5 * (double)sim->grid.h));
+    sim->bad_distance = 0;
+    for (i = 0; i < before; i++) { /* asks for all distances before anything goes */
+        const gs4_real *x = sim->particles.position + 4 * (size_t)i;
+        (void)gs4i_collider_distance(&placed, gs4i_vec3(x[0], x[1], x[2]));
+    }
+    result = gs4i_check_distances(sim);
+    if (result == GS4_OK) {
+        gs4i_drop(sim, &placed);
+        sim->limits_stale = 1;
+        result = before - sim->particles.count;
+    }
+    gs4i_field_free(&sim->memory, &placed.field);
+    return result;
 }
 
 /* ==== [[step]] one step; the function to read first is gs4i_step, at the end of this section == */
@@ -14644,7 +14729,7 @@ static void gs4i_finish(gs4_sim *sim)
                             (double)r.substeps / sim->particles.count,
                             " substeps a particle in one step; shorter steps (max_dt), longer "
                             "relaxation_time and stretch_time or less anisotropy would do");
-        if (r.left) gs4i_drop_outside(sim);
+        if (r.left) gs4i_drop(sim, NULL);
     }
     gs4i_move_bodies(sim, dt);
     gs4i_see_colliders(sim, &sim->limits);
@@ -16606,6 +16691,32 @@ GS4_API GS4I_COLD int gs4_add_material(gs4_sim *sim, const gs4_material *materia
     return gs4i_add_material(sim, material);
 }
 
+GS4_API GS4I_COLD int gs4_set_gravity(gs4_sim *sim, gs4_vec3 gravity)
+{
+    GS4I_TRY(gs4i_check_idle(sim));
+    GS4I_TRY(gs4i_check3(&sim->error, "gravity", gravity));
+    gs4i_restart(sim);
+    gs4i_set_gravity(sim, gravity);
+    return GS4_OK;
+}
+
+GS4_API GS4I_COLD int gs4_set_viscosity(gs4_sim *sim, int material, gs4_real viscosity)
+{
+    gs4i_scene scene;
+    gs4_material m;
+    GS4I_TRY(gs4i_check_idle(sim));
+    GS4I_TRY(gs4i_check_id(&sim->error, "material", material, sim->material_count));
+    scene = gs4i_scene_of(sim);
+    m = sim->constants[material].is;
+    m.viscosity = viscosity;
+    if (m.viscosity_law != GS4_VISCOSITY_CROSS_WLF) memset(&m.cross_wlf, 0, sizeof m.cross_wlf);
+    GS4I_TRY(gs4i_check_material(&sim->error, &scene, &m));
+    sim->constants[material].is.viscosity = viscosity;
+    gs4i_set_constants(sim);
+    sim->limits_stale = 1;
+    return GS4_OK;
+}
+
 /* After an edit by hand: the phases that temperatures say, for whoever asks first. */
 static void gs4i_settle_edit(const gs4_sim *sim)
 {
@@ -16653,6 +16764,18 @@ GS4_API int gs4_add_particles(gs4_sim *sim, gs4_shape shape, const gs4_fill *fil
     gs4i_warn_of_filling(sim, &shape, &f);
     sim->busy = 1;
     result = gs4i_fill_shape(sim, &shape, &f);
+    sim->busy = 0;
+    return result;
+}
+
+GS4_API int gs4_remove_particles(gs4_sim *sim, gs4_shape shape)
+{
+    int result;
+    GS4I_TRY(gs4i_check_idle(sim));
+    GS4I_TRY(gs4i_check_edit(sim));
+    GS4I_TRY(gs4i_check_shape(&sim->error, &sim->memory, sim->grid.h, &shape));
+    sim->busy = 1;
+    result = gs4i_empty_shape(sim, &shape);
     sim->busy = 0;
     return result;
 }
@@ -16946,11 +17069,15 @@ static double gs4i_less(const gs4_sim *sim)
     return part > 0 && part < 0.5 ? part : 0.5;
 }
 
-/* Steps until nothing of sim->time_left (s) is left. */
-static int gs4i_advance(gs4_sim *sim)
+/* Steps until nothing of sim->time_left (s) is left, or of the budget. */
+static int gs4i_advance(gs4_sim *sim, const gs4_budget *budget)
 {
     double *left = &sim->time_left;
+    const double start = gs4i_now(sim);
+    double now = start;
+    int taken = 0;
     while (*left > 0) {
+        const double began = now;
         double fraction = (double)sim->desc.cfl, dt, steps;
         int tries, result = GS4_OK;
         /* a refused step is tried again, shorter */
@@ -16970,22 +17097,45 @@ static int gs4i_advance(gs4_sim *sim)
         }
         if (result != GS4_OK) return result;
         *left = steps <= 1 ? 0 : *left - sim->last_dt;
+        now = gs4i_now(sim);
+        taken++;
+        if ((budget->steps > 0 && taken >= budget->steps)
+            || (budget->seconds > 0 && now - start + (now - began) > budget->seconds)
+            || (budget->go_on && !budget->go_on(budget->user)))
+            break;
     }
     return GS4_OK;
 }
 
-GS4_API int gs4_advance(gs4_sim *sim, gs4_real duration)
+static int gs4i_check_budget(gs4_sim *sim, const gs4_budget *b)
+{
+    gs4i_error *e = &sim->error;
+    GS4I_TRY(gs4i_require(e, b != NULL, "budget is NULL"));
+    GS4I_TRY(gs4i_require_value(e, b->steps >= 0, "budget.steps is ", b->steps,
+                                "; it must be 0 (any number) or above"));
+    GS4I_TRY(gs4i_require_value(e, b->seconds >= 0 && b->seconds <= (double)GS4I_HUGE,
+                                "budget.seconds is ", b->seconds,
+                                "; it must be 0 (any time) or a finite number above"));
+    return gs4i_require(e, !(b->seconds > 0) || sim->desc.now,
+                        "budget.seconds needs a clock: `now` of the description is NULL");
+}
+
+GS4_API int gs4_advance_within(gs4_sim *sim, gs4_real duration, const gs4_budget *budget,
+                               double *done)
 {
     uint64_t before;
     size_t used;
     gs4i_text t;
     int result;
+    if (done) *done = 0;
     GS4I_TRY(gs4i_check_idle(sim));
     GS4I_TRY(gs4i_check(&sim->error, "duration", duration, GS4I_NOT_NEGATIVE));
+    GS4I_TRY(gs4i_check_budget(sim, budget));
     GS4I_TRY(gs4i_check_edit(sim));
     before = sim->steps;
     sim->time_left = (double)duration;
-    result = gs4i_advance(sim);
+    result = gs4i_advance(sim, budget);
+    if (done) *done = (double)duration - sim->time_left;
     if (result == GS4_OK || sim->steps == before) return result;
     /* what it did nevertheless */
     used = strlen(sim->error.text);
@@ -16996,6 +17146,12 @@ GS4_API int gs4_advance(gs4_sim *sim, gs4_real duration)
     gs4i_put_real(&t, sim->time_left);
     gs4i_put(&t, " s are left");
     return result;
+}
+
+GS4_API int gs4_advance(gs4_sim *sim, gs4_real duration)
+{
+    const gs4_budget unlimited = { 0, 0, NULL, NULL };
+    return gs4_advance_within(sim, duration, &unlimited, NULL);
 }
 
 /* --- looking ---------------------------------------------------------------------------------- */
@@ -17712,4 +17868,5 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  * simulation has or with other pivots, starts or stops. `log` says at level 1, once each, what is
  * allowed but hardly meant. gs4_stats has time_left. Files follow symbolic links.
  * Emitters: the velocity of a filling is relative to the emitter, which travels from its start on.
- * Coulomb friction holds without a creep. */
+ * Coulomb friction holds without a creep. New: poses, gs4_advance_within, gs4_set_gravity,
+ * gs4_set_viscosity, gs4_remove_particles. */

@@ -116,7 +116,7 @@ static void test_spin(void)
 }
 
 /* as in README.md */
-#define MOMENTUM_ROUNDING (sizeof(gs4_real) == 8 ? 3e-15 : 2e-7)
+#define MOMENTUM_ROUNDING (sizeof(gs4_real) == 8 ? 1e-14 : 2e-7)
 
 /* A drop that breathes, shears and turns, off to the right at speed `drift`, far from walls:
  * what 100 steps of half the limit change of its momentum, over sum m |v|. *spin, *t: what is

@@ -4988,14 +4988,6 @@ GS4I_INLINE gs4_vec3 gs4i_place_position(const gs4i_grid *g, const int x[3], int
                                           g->h));
 }
 
-GS4I_INLINE gs4_vec3 gs4i_node_position(const gs4i_grid *g, uint32_t node)
-{
-    int first[3], x[3];
-    gs4i_block_origin(g, g->block[gs4i_slot_of(node)], first);
-    gs4i_node_coordinates(first, (int)(node % GS4I_BLOCK_NODES), x);
-    return gs4i_place_position(g, x, GS4I_AT_CELL);
-}
-
 static gs4_vec3 gs4i_block_centre(const gs4i_grid *g, uint32_t block)
 {
     int first[3];
@@ -8874,6 +8866,28 @@ static void gs4i_collider_orient(gs4i_collider *b)
     for (i = 0; i < 9; i++) b->axes[i] = GS4I_C(r[i]);
 }
 
+/* sin x and cos x by their series, of an angle halved until that is short: the same bits with every
+ * libm. To rounding where |x| < 1/2, as in a step that is stable. */
+static void gs4i_sin_cos(double x, double *sine, double *cosine)
+{
+    int halved = 0, k;
+    double x2, s = 1, c = 1;
+    for (; fabs(x) > 0.5 && halved < 64; halved++) x *= 0.5;
+    x2 = x * x;
+    for (k = 16; k >= 2; k -= 2) { /* the rest is less than 2^-18/18! */
+        s = 1 - x2 / (k * (k + 1)) * s;
+        c = 1 - x2 / (k * (k - 1)) * c;
+    }
+    s *= x;
+    for (; halved > 0; halved--) {
+        const double twice = 2 * s * c;
+        c = 1 - 2 * s * s;
+        s = twice;
+    }
+    *sine = s;
+    *cosine = c;
+}
+
 /* Pose after dt: the pivot moves, the body turns about it by the angle |omega| dt. */
 static void gs4i_collider_move(gs4i_collider *b, double dt)
 {
@@ -8883,8 +8897,8 @@ static void gs4i_collider_move(gs4i_collider *b, double dt)
     gs4i_to_double(b->is.angular_velocity, o);
     rate = sqrt(o[0] * o[0] + o[1] * o[1] + o[2] * o[2]);
     half = 0.5 * rate * dt;
-    s = rate > 0 ? sin(half) / rate : 0;
-    c = cos(half);
+    gs4i_sin_cos(half, &s, &c);
+    s = rate > 0 ? s / rate : 0;
     x = o[0] * s;
     y = o[1] * s;
     z = o[2] * s;
@@ -9602,7 +9616,7 @@ static void gs4i_field_count_crossings(const gs4i_field *f, const gs4i_facet *t,
 {
     const int first = 8 * f->first[0], end = first + 8 * f->blocks[0];
     int y[2], z[2], j, k, grows;
-    double p[3], x;
+    double p[3], x = 0;
     gs4i_field_range(f, t, 1, f->spacing, y);
     gs4i_field_range(f, t, 2, f->spacing, z);
     for (k = z[0]; k <= z[1]; k++)
@@ -13897,7 +13911,7 @@ static int gs4i_line_meets(const gs4i_emitter *e, const gs4i_collider *shape, do
         d = (double)gs4i_shape_or_field(shape,
                                         gs4i_vec3(GS4I_C(at[0]), GS4I_C(at[1]), GS4I_C(at[2])));
         if (d < 0) return 1;
-        c[0] += fmax((high - low) / GS4I_EMITTER_LINES, d);
+        c[0] += fmax((high - low) / (double)GS4I_EMITTER_LINES, d);
     }
     return 0;
 }
@@ -13907,8 +13921,8 @@ static int gs4i_line_meets(const gs4i_emitter *e, const gs4i_collider *shape, do
 static double gs4i_emitter_area(const gs4i_emitter *e, const gs4i_collider *shape, int margin,
                                 double low[3], double high[3])
 {
-    const double step[3] = { 0, (high[1] - low[1]) / GS4I_EMITTER_LINES,
-                             (high[2] - low[2]) / GS4I_EMITTER_LINES };
+    const double step[3] = { 0, (high[1] - low[1]) / (double)GS4I_EMITTER_LINES,
+                             (high[2] - low[2]) / (double)GS4I_EMITTER_LINES };
     int first[3] = { 0, GS4I_EMITTER_LINES, GS4I_EMITTER_LINES }, last[3] = { 0, -1, -1 }, n[3], a;
     double c[3], met = 0, inlet = high[0];
     for (n[1] = 0; n[1] < GS4I_EMITTER_LINES; n[1]++)
@@ -13916,7 +13930,7 @@ static double gs4i_emitter_area(const gs4i_emitter *e, const gs4i_collider *shap
             for (a = 1; a < 3; a++) c[a] = low[a] + (n[a] + 0.5) * step[a];
             if (!gs4i_line_meets(e, shape, c, low[0], high[0])) continue;
             met++;
-            inlet = fmin(inlet, c[0] - (high[0] - low[0]) / GS4I_EMITTER_LINES);
+            inlet = fmin(inlet, c[0] - (high[0] - low[0]) / (double)GS4I_EMITTER_LINES);
             for (a = 1; a < 3; a++) {
                 if (n[a] < first[a]) first[a] = n[a];
                 if (n[a] > last[a]) last[a] = n[a];
@@ -13940,12 +13954,12 @@ static double gs4i_count_rows(gs4i_emitter *e, const gs4i_collider *shape, const
     for (a = 1; a < 3; a++) {
         const double n =
             finer * fmax(1, floor((high[a] - low[a]) / (double)e->is.fill.spacing + 0.5));
-        if (!(n <= GS4I_EMITTER_PLACES)) return -1;
+        if (!(n <= (double)GS4I_EMITTER_PLACES)) return -1;
         e->places[a] = (int)n;
         e->spacing[a] = (high[a] - low[a]) / n;
         e->low[a] = low[a];
     }
-    if ((double)e->places[1] * e->places[2] > GS4I_EMITTER_ROWS)
+    if ((double)e->places[1] * e->places[2] > (double)GS4I_EMITTER_ROWS)
         return area / (e->spacing[1] * e->spacing[2]);
     for (i = 0; i < e->places[1]; i++)
         for (j = 0; j < e->places[2]; j++) {
@@ -13972,7 +13986,8 @@ static int gs4i_space_rows(gs4_sim *sim, gs4i_emitter *e, double area, double lo
     e->low[0] = low;
     e->spacing[0] = spacing;
     e->window = fmin(high - low, spacing);
-    GS4I_TRY(gs4i_require(&sim->error, area > 0 && (high - low) / spacing < GS4I_EMITTER_PLACES,
+    GS4I_TRY(gs4i_require(&sim->error,
+                          area > 0 && (high - low) / spacing < (double)GS4I_EMITTER_PLACES,
                           "shape is more than 2^30 particles wide"));
     e->places[0] = (int)ceil((high - low) / spacing);
     return gs4i_require(&sim->error, e->window > 0.01 * spacing,

@@ -1226,6 +1226,12 @@ static void test_files_forged_order(void)
     remove(files_path("o.sav"));
 }
 
+/* A rate that leads too far in a step: that is refused, and the state stays finite. */
+static int files_refuses_step(gs4_sim *sim)
+{
+    return gs4_advance(sim, (gs4_real)0.01) == GS4_ERROR_UNSTABLE && physics_is_finite(sim);
+}
+
 /* Any number of a checkpoint is a bad one, under a right checksum: refused, or it goes on with
  * finite numbers. What materials have become does not come from the file. */
 static void test_files_forged_anywhere(void)
@@ -1249,8 +1255,8 @@ static void test_files_forged_anywhere(void)
             if (where >= sizeof(gs4i_head)) files_sign(sim, data);
             files_write(files_path("h.sav"), data, bytes);
             if (gs4_load(sim, files_path("h.sav")) == GS4_OK)
-                err_report(err_goes_on(sim), "checkpoint", "byte", (double)where, 0,
-                           gs4_last_error(sim));
+                err_report(err_goes_on(sim) || files_refuses_step(sim), "checkpoint", "byte",
+                           (double)where, 0, gs4_last_error(sim));
             memcpy(data + where, before, 4);
         }
         free(data);

@@ -630,6 +630,14 @@ static void test_couette_surface(void)
         }
 }
 
+static gs4_vec3 sticky_node(const gs4i_grid *g, int slot, int i)
+{
+    int first[3], x[3];
+    gs4i_block_origin(g, g->block[slot], first);
+    gs4i_node_coordinates(first, i, x);
+    return gs4i_place_position(g, x, GS4I_AT_CELL);
+}
+
 /* All nodes that a body which lies askew and is 1.5 cells thick can reach have its velocity,
  * wherever they are in their blocks. */
 static void sticky_holds(gs4_sim *sim, gs4_vec3 origin, gs4_vec3 velocity)
@@ -638,7 +646,7 @@ static void sticky_holds(gs4_sim *sim, gs4_vec3 origin, gs4_vec3 velocity)
     for (s = 0; s < sim->grid.active; s++)
         for (i = 0; i < 64; i++) {
             const gs4_real *u = sim->grid.momentum + 4 * ((size_t)s * 64 + (size_t)i);
-            const gs4_vec3 p = gs4i_node_position(&sim->grid, gs4i_first_node(s) + (uint32_t)i);
+            const gs4_vec3 p = sticky_node(&sim->grid, s, i);
             const double away =
                 ((double)(p.x - origin.x) + (double)(p.y - origin.y) + (double)(p.z - origin.z))
                 / sqrt(3.0) * 24;

@@ -8866,52 +8866,50 @@ static void gs4i_collider_orient(gs4i_collider *b)
     for (i = 0; i < 9; i++) b->axes[i] = GS4I_C(r[i]);
 }
 
-/* sin x and cos x by their series, of an angle halved until that is short: the same bits with every
- * libm. To rounding where |x| < 1/2, as in a step that is stable. */
-static void gs4i_sin_cos(double x, double *sine, double *cosine)
+/* sin(x)/x and cos x from x^2 by their series, of an angle halved until that is short: the same
+ * bits with every libm. To rounding where |x| < 1/2, as in a step that is stable. */
+static void gs4i_sinc_cos(double x2, double *sinc, double *cosine)
 {
     int halved = 0, k;
-    double x2, s = 1, c = 1;
-    for (; fabs(x) > 0.5 && halved < 64; halved++) x *= 0.5;
-    x2 = x * x;
+    double s = 1, c = 1;
+    for (; x2 > 0.25 && halved < 64; halved++) x2 *= 0.25;
     for (k = 16; k >= 2; k -= 2) { /* the rest is less than 2^-18/18! */
         s = 1 - x2 / (k * (k + 1)) * s;
         c = 1 - x2 / (k * (k - 1)) * c;
     }
-    s *= x;
     for (; halved > 0; halved--) {
-        const double twice = 2 * s * c;
-        c = 1 - 2 * s * s;
+        const double twice = s * c;
+        c = 1 - 2 * x2 * s * s;
         s = twice;
+        x2 *= 4;
     }
-    *sine = s;
+    *sinc = s;
     *cosine = c;
 }
 
 /* Pose after dt: the pivot moves, the body turns about it by the angle |omega| dt. */
 static void gs4i_collider_move(gs4i_collider *b, double dt)
 {
-    double o[3], rate, half, norm = 0, q[4], s, c, x, y, z;
+    double o[3], square, q[4], s, c, x, y, z, norm = 0;
     const double *t = b->turn;
     int i;
     gs4i_to_double(b->is.angular_velocity, o);
-    rate = sqrt(o[0] * o[0] + o[1] * o[1] + o[2] * o[2]);
-    half = 0.5 * rate * dt;
-    gs4i_sin_cos(half, &s, &c);
-    s = rate > 0 ? s / rate : 0;
-    x = o[0] * s;
-    y = o[1] * s;
-    z = o[2] * s;
+    square = o[0] * o[0] + o[1] * o[1] + o[2] * o[2];
+    gs4i_sinc_cos(0.25 * dt * dt * square, &s, &c);
+    x = o[0] * s * 0.5 * dt;
+    y = o[1] * s * 0.5 * dt;
+    z = o[2] * s * 0.5 * dt;
     b->at[0] += (double)b->is.velocity.x * dt;
     b->at[1] += (double)b->is.velocity.y * dt;
     b->at[2] += (double)b->is.velocity.z * dt;
-    if (rate <= 0) return;
+    if (!(square > 0)) return;
     q[0] = c * t[0] - x * t[1] - y * t[2] - z * t[3];
     q[1] = c * t[1] + x * t[0] + y * t[3] - z * t[2];
     q[2] = c * t[2] - x * t[3] + y * t[0] + z * t[1];
     q[3] = c * t[3] + x * t[2] - y * t[1] + z * t[0];
     for (i = 0; i < 4; i++) norm += q[i] * q[i];
-    for (i = 0; i < 4; i++) b->turn[i] = q[i] / sqrt(norm);
+    /* 1/sqrt(norm) to the square of what norm is off 1 */
+    for (i = 0; i < 4; i++) b->turn[i] = q[i] * (1.5 - 0.5 * norm);
     gs4i_collider_orient(b);
 }
 

@@ -372,7 +372,7 @@ static void test_mesh_fan(void)
 {
     mesh_cones(1000, 0.3);
     mesh_cones(2000, 300);
-    if (test_full) mesh_cones(100000, 0.3);
+    if (test_slow) mesh_cones(100000, 0.3);
 }
 
 /* A box whose triangles have vertices of their own, and one with a needle of no area along an
@@ -524,7 +524,7 @@ static void test_mesh_memory(void)
     uint64_t reference = 0;
     long k, calls = 0;
     mesh_box(&slab, at(-80, 0.1, -30), at(10, 0.35, 60), 0);
-    for (k = -1; k < 0 || k < calls; k += k < 0 || test_full ? 1 : 7) {
+    for (k = -1; k < 0 || k < calls; k += k < 0 || test_slow ? 1 : 7) {
         gs4_sim_desc d = scene_cube(20);
         gs4_sim *sim = NULL;
         files_memory m;

@@ -1247,7 +1247,7 @@ static void test_files_forged_anywhere(void)
         sim = files_small(euler, 12);
         CHECK_RESULT(sim, gs4_save(sim, files_path("g.sav")), 0);
         data = files_read(files_path("g.sav"), &bytes);
-        for (where = 0; where + 12 <= bytes; where += where < 9000 ? (test_full ? 4 : 92) : 484) {
+        for (where = 0; where + 12 <= bytes; where += where < 9000 ? (test_slow ? 4 : 92) : 484) {
             const uint32_t pattern = patterns[gs4i_mix(where) % 8];
             unsigned char before[4];
             memcpy(before, data + where, 4);

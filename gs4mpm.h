@@ -16844,9 +16844,10 @@ GS4_API GS4I_COLD int gs4_add_collider(gs4_sim *sim, const gs4_collider *collide
     return result;
 }
 
-/* The body of a collider's id. */
+/* The body of a collider's id, while it may be changed. */
 static int gs4i_collider_of(gs4_sim *sim, int collider, gs4i_collider **body)
 {
+    GS4I_TRY(gs4i_check_idle(sim));
     GS4I_TRY(gs4i_check_id(&sim->error, "collider", collider, sim->boundary.collider_count));
     *body = &sim->boundary.colliders[collider];
     return gs4i_require(&sim->error, !(*body)->is_emitter,
@@ -16855,6 +16856,7 @@ static int gs4i_collider_of(gs4_sim *sim, int collider, gs4i_collider **body)
 
 static int gs4i_emitter_of(gs4_sim *sim, int emitter, gs4i_collider **body)
 {
+    GS4I_TRY(gs4i_check_idle(sim));
     GS4I_TRY(gs4i_check_id(&sim->error, "emitter", emitter, sim->emitter_count));
     *body = &sim->boundary.colliders[sim->emitters[emitter].collider];
     return GS4_OK;
@@ -16873,7 +16875,6 @@ GS4_API int gs4_move_collider(gs4_sim *sim, int collider, gs4_vec3 velocity,
                               gs4_vec3 angular_velocity)
 {
     gs4i_collider *body;
-    GS4I_TRY(gs4i_check_idle(sim));
     GS4I_TRY(gs4i_collider_of(sim, collider, &body));
     GS4I_TRY(gs4i_check3(&sim->error, "velocity", velocity));
     GS4I_TRY(gs4i_check3(&sim->error, "angular_velocity", angular_velocity));
@@ -16894,7 +16895,6 @@ GS4_API GS4I_COLD int gs4_add_emitter(gs4_sim *sim, const gs4_emitter *emitter)
 GS4_API int gs4_move_emitter(gs4_sim *sim, int emitter, gs4_vec3 travel)
 {
     gs4i_collider *body;
-    GS4I_TRY(gs4i_check_idle(sim));
     GS4I_TRY(gs4i_emitter_of(sim, emitter, &body));
     GS4I_TRY(gs4i_check3(&sim->error, "travel", travel));
     gs4i_set_motion(sim, body, travel, gs4i_vec3(0, 0, 0));
@@ -16973,7 +16973,6 @@ static int gs4i_move_to(gs4_sim *sim, gs4i_collider *body, const gs4_pose *pose,
 GS4_API int gs4_collider_pose(gs4_sim *sim, int collider, gs4_pose *pose)
 {
     gs4i_collider *body;
-    GS4I_TRY(gs4i_check_idle(sim));
     GS4I_TRY(gs4i_collider_of(sim, collider, &body));
     return gs4i_get_pose(&sim->error, body, pose);
 }
@@ -16981,7 +16980,6 @@ GS4_API int gs4_collider_pose(gs4_sim *sim, int collider, gs4_pose *pose)
 GS4_API int gs4_put_collider(gs4_sim *sim, int collider, const gs4_pose *pose)
 {
     gs4i_collider *body;
-    GS4I_TRY(gs4i_check_idle(sim));
     GS4I_TRY(gs4i_collider_of(sim, collider, &body));
     return gs4i_put_at(sim, body, pose);
 }
@@ -16990,7 +16988,6 @@ GS4_API int gs4_move_collider_to(gs4_sim *sim, int collider, const gs4_pose *pos
                                  gs4_real duration)
 {
     gs4i_collider *body;
-    GS4I_TRY(gs4i_check_idle(sim));
     GS4I_TRY(gs4i_collider_of(sim, collider, &body));
     return gs4i_move_to(sim, body, pose, duration);
 }
@@ -16998,7 +16995,6 @@ GS4_API int gs4_move_collider_to(gs4_sim *sim, int collider, const gs4_pose *pos
 GS4_API int gs4_emitter_pose(gs4_sim *sim, int emitter, gs4_pose *pose)
 {
     gs4i_collider *body;
-    GS4I_TRY(gs4i_check_idle(sim));
     GS4I_TRY(gs4i_emitter_of(sim, emitter, &body));
     return gs4i_get_pose(&sim->error, body, pose);
 }
@@ -17006,7 +17002,6 @@ GS4_API int gs4_emitter_pose(gs4_sim *sim, int emitter, gs4_pose *pose)
 GS4_API int gs4_put_emitter(gs4_sim *sim, int emitter, const gs4_pose *pose)
 {
     gs4i_collider *body;
-    GS4I_TRY(gs4i_check_idle(sim));
     GS4I_TRY(gs4i_emitter_of(sim, emitter, &body));
     return gs4i_put_at(sim, body, pose);
 }
@@ -17014,7 +17009,6 @@ GS4_API int gs4_put_emitter(gs4_sim *sim, int emitter, const gs4_pose *pose)
 GS4_API int gs4_move_emitter_to(gs4_sim *sim, int emitter, const gs4_pose *pose, gs4_real duration)
 {
     gs4i_collider *body;
-    GS4I_TRY(gs4i_check_idle(sim));
     GS4I_TRY(gs4i_emitter_of(sim, emitter, &body));
     return gs4i_move_to(sim, body, pose, duration);
 }

@@ -1159,9 +1159,10 @@ static void test_files_forged(void)
                     "J");
         files_forge(to, data, bytes, at[3 + 8], &seven, 1, "material");
         files_forge(to, data, bytes, at[3 + 13], &seven, 1, "liquid");
-        for (v = 0; v < 3 && !euler; v++)
-            files_forge(to, data, bytes, at[n - 2] + size[n - 2] / 2, &bad[v], sizeof bad[v],
-                        "node");
+        for (v = 0; v < 6 && !euler; v++) /* and in the lane of mass */
+            files_forge(to, data, bytes,
+                        at[n - 2] + size[n - 2] / 2 + (size_t)(v / 3 * 3) * sizeof bad[0],
+                        &bad[v % 3], sizeof bad[0], "node");
         for (v = 0; v < 3; v++) {
             files_forge(to, data, bytes, at[1] + offsetof(gs4i_collider, at), &wrong[v], 8, "at");
             files_forge(to, data, bytes, at[1] + offsetof(gs4i_collider, turn), &wrong[v], 8,
@@ -1238,6 +1239,7 @@ static void test_files_forged_anywhere(void)
 {
     const uint32_t patterns[] = { 0x7fc00000u, 0x7f800000u, 0xff800000u, 0x60ad78ecu,
                                   0xffffffffu, 0x7fffffffu, 0x00000001u, 0xbf800000u };
+    const size_t dense = test_full ? 4 : 92, sparse = test_slow ? 4 : 484;
     int euler;
     for (euler = 0; euler < 2; euler++) {
         size_t bytes = 0, where;
@@ -1247,7 +1249,7 @@ static void test_files_forged_anywhere(void)
         sim = files_small(euler, 12);
         CHECK_RESULT(sim, gs4_save(sim, files_path("g.sav")), 0);
         data = files_read(files_path("g.sav"), &bytes);
-        for (where = 0; where + 12 <= bytes; where += where < 9000 ? (test_slow ? 4 : 92) : 484) {
+        for (where = 0; where + 12 <= bytes; where += where < 9000 ? dense : sparse) {
             const uint32_t pattern = patterns[gs4i_mix(where) % 8];
             unsigned char before[4];
             memcpy(before, data + where, 4);

@@ -12,6 +12,7 @@
 #include "test_stability.c"
 #include "test_solid.c"
 #include "test_stress.c"
+#include "test_yield.c"
 #include "test_poisson.c"
 #include "test_symmetry.c"
 #include "test_contact.c"
@@ -80,6 +81,7 @@ int main(int count, char **values)
     run_errors();
     run_files();
     run_stress();
+    run_yield();
     run_poisson();
     run_symmetry();
     run_contact();

@@ -301,6 +301,13 @@ static void test_errors_material(void)
         ERR_FIELD(gs4_material, cross_wlf.t2, "cross_wlf", ERR_LATER),
         ERR_FIELD(gs4_material, bulk_modulus, "bulk_modulus", ERR_REAL),
         ERR_FIELD(gs4_material, sound_speed, "sound_speed", ERR_REAL),
+        ERR_FIELD(gs4_material, herschel_bulkley.yield_stress, "herschel_bulkley.yield_stress",
+                  ERR_LATER),
+        ERR_FIELD(gs4_material, herschel_bulkley.consistency, "herschel_bulkley.consistency",
+                  ERR_LATER),
+        ERR_FIELD(gs4_material, herschel_bulkley.index, "herschel_bulkley.index", ERR_LATER),
+        ERR_FIELD(gs4_material, herschel_bulkley.creep_rate, "herschel_bulkley.creep_rate",
+                  ERR_LATER),
         ERR_FIELD(gs4_material, incompressible, "incompressible", ERR_LATER_INT),
         ERR_FIELD(gs4_material, solid, "solid", ERR_INT),
         ERR_FIELD(gs4_material, shear_modulus, "shear_modulus", ERR_LATER),
@@ -321,6 +328,15 @@ static void test_errors_material(void)
         ERR_FIELD(gs4_material, latent_heat, "latent_heat", ERR_REAL),
         ERR_FIELD(gs4_material, can_melt, "can_melt", ERR_INT),
         ERR_FIELD(gs4_material, viscous_heating, "viscous_heating", ERR_INT)
+    };
+    static const err_field paste[] = {
+        ERR_FIELD(gs4_material, herschel_bulkley.yield_stress, "herschel_bulkley", ERR_REAL),
+        ERR_FIELD(gs4_material, herschel_bulkley.consistency, "herschel_bulkley", ERR_REAL),
+        ERR_FIELD(gs4_material, herschel_bulkley.index, "herschel_bulkley.index", ERR_REAL),
+        ERR_FIELD(gs4_material, herschel_bulkley.creep_rate, "herschel_bulkley", ERR_REAL),
+        ERR_FIELD(gs4_material, viscosity, "viscosity", ERR_LATER),
+        ERR_FIELD(gs4_material, liquid, "liquid", ERR_LATER_INT),
+        ERR_FIELD(gs4_material, solid, "solid", ERR_LATER_INT)
     };
     static const err_field pom_pom[] = {
         ERR_FIELD(gs4_material, liquid, "liquid", ERR_INT),
@@ -379,6 +395,14 @@ static void test_errors_material(void)
     m.cross_wlf.t1 = 1;
     m.cross_wlf.t2 = -50;
     err_try_all(ERR_MATERIAL, &m, sizeof m, cross, ERR_COUNT(cross));
+    m = err_material();
+    m.viscosity = 0;
+    m.viscosity_law = GS4_VISCOSITY_HERSCHEL_BULKLEY;
+    m.herschel_bulkley.yield_stress = (gs4_real)0.5;
+    m.herschel_bulkley.consistency = 1;
+    m.herschel_bulkley.index = (gs4_real)0.5;
+    m.herschel_bulkley.creep_rate = 1;
+    err_try_all(ERR_MATERIAL, &m, sizeof m, paste, ERR_COUNT(paste));
     m = err_material();
     /* the fields that exclude each other, one at a time */
     m.sound_speed = 0;

@@ -322,11 +322,12 @@
  *
  * MEMORY. GS4: 65 bytes a particle in float (position, velocity, J and their rates, mass, id,
  * material, and 4 for sorting), 16 more unless flip_decay_time is INFINITY, 49 a cell near material
- * (sharp_gradients: 69), 16 more near walls and colliders, 4 per 64 cells of the domain; 260
- * (double: 512) more for each particle within 8 cells of a sticky collider. Symplectic Euler: 89
- * and 33. A scene with a viscoelastic liquid: 48 more a particle (Euler 24). With a solid: 96 more
- * (Euler 36). With heat: 17 more a particle, 32 more with a flux_relaxation_time, 16 (or 32) a cell
- * near material, and about 150 a cell of the box around all material, where the solver works.
+ * (sharp_gradients: 69), 16 more near walls and colliders, 4 per 64 cells of the domain; 276
+ * (double: 536) more for each particle within 8 cells of a sticky collider, and 20 (double: 40) a
+ * cell there where it is not flat. Symplectic Euler: 89 and 33. A scene with a viscoelastic liquid:
+ * 48 more a particle (Euler 24). With a solid: 96 more (Euler 36). With heat: 17 more a particle,
+ * 32 more with a flux_relaxation_time, 16 (or 32) a cell near material, and about 150 a cell of the
+ * box around all material, where the solver works.
  * A mesh: about 400 (double 800) per cell face of its surface in the domain or within 10 cells of
  * it; where that is more than 1 GB it is refused. Its distance is sampled twice a cell within three
  * cells of the surface. A mesh that moves is sampled anew now and then, but for one that takes less
@@ -461,7 +462,8 @@ GS4_API int gs4_version(void);   /* GS4_VERSION of the implementation */
 GS4_API int gs4_real_size(void); /* bytes of gs4_real in the implementation */
 
 /* Signed distance (m, negative inside) of a point, finite; from several threads at once when there
- * are. A step or a filling that sees one that is not finite is refused. */
+ * are. A step or a filling that sees one that is not finite is refused. It must not change: of a
+ * sticky body at rest it is asked for when blocks of material come and go, not every step. */
 typedef gs4_real (*gs4_sdf_fn)(gs4_vec3 point, void *user);
 
 typedef enum gs4_shape_kind {
@@ -9033,8 +9035,28 @@ typedef struct gs4i_image_particle {
     gs4_real carried[4][4];
     /* from them: velocity and acceleration, value and columns of the gradient */
     gs4_real seen[2][4][4];
+    /* how far the particle is from the nearest body, and how far that bends away from a half space,
+     * see gs4i_sample_patch; before the step it is farther than `room` from all of them */
+    gs4_real d, bend, room;
+    int body;              /* the nearest one, -1: none is near */
     int kind, whole, slot; /* GS4I_IMAGE_*; all its nodes exist; block of x */
 } gs4i_image_particle;
+
+/* The nodes of a slot near a sticky body where it is not flat, with four numbers each, of which two
+ * are in use: see gs4i_sample_patch. */
+typedef struct gs4i_patch {
+    int collider, slot;
+} gs4i_patch;
+
+typedef struct gs4i_patches {
+    int count, still; /* so many, those of bodies at rest first */
+    /* int32_t: 1 + number of the patch, or 0, per collider and slot; gs4i_patch; distances of
+     * nodes; their four numbers */
+    gs4i_scratch of, all, distance, nodes;
+    /* for which those at rest hold: gs4i_collider, block of each slot */
+    gs4i_scratch colliders, blocks;
+    int collider_count, active, occupied;
+} gs4i_patches;
 
 typedef struct gs4i_image_particles {
     /* one for each particle of the blocks near sticky bodies; 0: there are none */
@@ -9044,6 +9066,7 @@ typedef struct gs4i_image_particles {
     /* int32_t: sorted by slot; per slot, where it begins; slots that have some, by colour */
     gs4i_scratch order, first, slots;
     int colour_first[9];
+    gs4i_patches patches;
 } gs4i_image_particles;
 
 typedef struct gs4i_boundary {
@@ -9113,6 +9136,11 @@ static void gs4i_collider_move(gs4i_collider *b, double dt)
     /* 1/sqrt(norm) to the square of what norm is off 1 */
     for (i = 0; i < 4; i++) b->turn[i] = q[i] * (1.5 - 0.5 * norm);
     gs4i_collider_orient(b);
+}
+
+static int gs4i_is_moving(const gs4i_collider *b)
+{
+    return gs4i_length(b->is.velocity) > 0 || gs4i_length(b->is.angular_velocity) > 0;
 }
 
 /* A direction of the shape in the world. */
@@ -10000,7 +10028,7 @@ static double gs4i_field_open(gs4i_memory *m, gs4i_field *f, const gs4_shape *s,
  * what the domain reaches, and may reach soon. */
 static double gs4i_field_open_for(gs4i_memory *m, gs4i_collider *b, const gs4i_grid *g, double most)
 {
-    const int moves = gs4i_length(b->is.velocity) > 0 || gs4i_length(b->is.angular_velocity) > 0;
+    const int moves = gs4i_is_moving(b);
     gs4i_field *f = &b->field;
     int first[3] = { 0, 0, 0 }, last[3], a;
     double bytes;
@@ -11095,84 +11123,352 @@ enum {
     GS4I_IMAGE_FORCE
 };
 
-/* The sticky body nearest to p, if one is nearer than `within`; and how far it is. */
-static const gs4i_collider *gs4i_nearest_sticky(const gs4i_boundary *b, gs4_vec3 p, gs4_real within,
-                                                gs4_real *distance)
-{
-    const gs4i_collider *found = NULL;
-    int i;
-    for (i = 0; i < b->collider_count; i++) {
-        const gs4_real d =
-            gs4i_is_sticky(&b->colliders[i]) ? gs4i_collider_distance(&b->colliders[i], p) : within;
-        if (d < within) {
-            *distance = within = d;
-            found = &b->colliders[i];
-        }
-    }
-    return found;
-}
-
-/* A flat surface near a block: all of the sticky bodies that its particles are near. */
-/* distance d at the midst of the block; body NULL: none */
-typedef struct gs4i_face {
-    const gs4i_collider *collider;
-    gs4_vec3 at, n;
-    gs4_real d;
-} gs4i_face;
+/* --- surfaces: how far particles are from them ------------------------------------------------- *
+ *
+ * Distance functions may be slow, so each is asked once a node near it instead of several times a
+ * particle: once a step, of bodies at rest once as long as blocks stay. Particles take from nodes,
+ * to third order in h. Where a body is flat it is known without. */
 
 /* cells: half the diagonal of a block, and a cell that particles may be outside of it */
 #define GS4I_BLOCK_REACH GS4I_C(5.2)
+/* cells: half the diagonal of the nodes of a block; how far nodes are that a particle sees */
+#define GS4I_NODES_REACH GS4I_C(2.6)
+/* how far a body may bend from a half space under an image, in cells */
+#define GS4I_IMAGE_BEND GS4I_C(0.25)
 
-static gs4i_face gs4i_find_face(const gs4_sim *sim, int o)
+/* A flat surface near a block. */
+typedef struct gs4i_face {
+    gs4_vec3 at, n;
+    gs4_real d; /* distance of `at` */
+} gs4i_face;
+
+enum {
+    GS4I_SURFACE_FAR,
+    GS4I_SURFACE_FLAT,
+    GS4I_SURFACE_CURVED
+};
+
+/* What a block has of the surface of a body: particles in it may have images by it, or none. */
+static int gs4i_find_face(const gs4i_grid *g, const gs4i_collider *b, uint32_t block, gs4i_face *f)
 {
-    const gs4_real h = sim->grid.h, prediction = GS4I_BLOCK_REACH * h, deep = GS4I_IMAGE_NODES * h;
-    gs4i_face f;
-    int i, near = 0;
-    memset(&f, 0, sizeof f); /* gs4i_place_image_particle reads d and n */
-    f.at = gs4i_block_centre(&sim->grid, sim->grid.occupied_block[o]);
-    for (i = 0; i < sim->boundary.collider_count; i++) {
-        const gs4i_collider *b = &sim->boundary.colliders[i];
-        const gs4_real d = gs4i_is_sticky(b) ? gs4i_collider_distance(b, f.at) : GS4I_HUGE;
-        if (d < prediction + GS4I_IMAGE_REACH * h) {
-            near++;
-            f.d = d;
-            f.collider = b;
-        }
-    }
-    if (near != 1 || !gs4i_collider_is_flat(f.collider, f.at, prediction, deep, &f.n))
-        f.collider = NULL;
-    return f;
+    const gs4_real reach = GS4I_BLOCK_REACH * g->h;
+    f->at = gs4i_block_centre(g, block);
+    f->d = gs4i_collider_distance(b, f->at);
+    if (!(f->d < reach + GS4I_IMAGE_REACH * g->h)) return GS4I_SURFACE_FAR;
+    return gs4i_collider_is_flat(b, f->at, reach, GS4I_IMAGE_NODES * g->h, &f->n)
+               ? GS4I_SURFACE_FLAT
+               : GS4I_SURFACE_CURVED;
 }
 
-/* The sticky body near p, NULL if there is none, how far p is from it and its outward normal
- * there. */
-static const gs4i_collider *gs4i_find_surface(const gs4_sim *sim, gs4_vec3 p, gs4_real *d,
-                                              gs4_vec3 *n)
+/* Number of the patch of a body in a slot, or -1. */
+GS4I_INLINE int gs4i_patch_of(const gs4_sim *sim, int collider, int slot)
 {
-    const gs4_real step = GS4I_C(0.1) * sim->grid.h;
-    const gs4i_collider *collider =
-        gs4i_nearest_sticky(&sim->boundary, p, GS4I_IMAGE_REACH * sim->grid.h, d);
-    if (!collider) return NULL;
-    *n = gs4i_collider_normal(collider, p, step);
-    return gs4i_length(*n) > 0 ? collider : NULL;
+    const gs4i_patches *p = &sim->image_particles.patches;
+    return ((const int32_t *)p->of.data)[(size_t)collider * (size_t)p->active + (size_t)slot] - 1;
+}
+
+/* Distance of node i of a slot, at p, from a body. */
+static gs4_real gs4i_node_distance(const gs4_sim *sim, int collider, int slot, int i, gs4_vec3 p)
+{
+    const gs4i_patches *patches = &sim->image_particles.patches;
+    const int patch = patches->count ? gs4i_patch_of(sim, collider, slot) : -1;
+    return patch < 0 ? gs4i_collider_distance(&sim->boundary.colliders[collider], p)
+                     : ((const gs4_real *)
+                            patches->distance.data)[(size_t)patch * GS4I_BLOCK_NODES + (size_t)i];
+}
+
+static void gs4i_sample_distances(int index, void *context)
+{
+    const gs4_sim *sim = (const gs4_sim *)((const gs4i_pass *)context)->sim;
+    const gs4i_patches *patches = &sim->image_particles.patches;
+    const int number = ((const gs4i_pass *)context)->count + index;
+    const gs4i_patch *patch = (const gs4i_patch *)patches->all.data + number;
+    gs4_real *d = (gs4_real *)patches->distance.data + (size_t)number * GS4I_BLOCK_NODES;
+    int first[3], x[3], i;
+    gs4i_block_origin(&sim->grid, sim->grid.block[patch->slot], first);
+    for (i = 0; i < GS4I_BLOCK_NODES; i++) {
+        gs4i_node_coordinates(first, i, x);
+        d[i] = gs4i_collider_distance(&sim->boundary.colliders[patch->collider],
+                                      gs4i_place_position(&sim->grid, x, GS4I_AT_CELL));
+    }
+}
+
+/* Distances of the nodes of a patch and of one more to each side, 6^3; where there is none it goes
+ * on as a line. Edges and corners are left out. */
+static void gs4i_load_distances(const gs4_sim *sim, const gs4i_patch *patch, gs4_real d[216])
+{
+    static const int apart[3] = { 1, 6, 36 };
+    const gs4_real *all = (const gs4_real *)sim->image_particles.patches.distance.data;
+    gs4i_surroundings t;
+    int x[3], a, i, pass;
+    gs4i_surroundings_of(&sim->grid, patch->slot, &t);
+    for (pass = 0; pass < 2; pass++)
+        for (i = 0; i < 216; i++) {
+            int out = 0, axis = 0, inwards, number;
+            int64_t node;
+            x[0] = i % 6;
+            x[1] = i / 6 % 6;
+            x[2] = i / 36;
+            for (a = 0; a < 3; a++)
+                if (x[a] == 0 || x[a] == 5) {
+                    out++;
+                    axis = a;
+                }
+            if (out != pass) continue;
+            node = gs4i_surrounding_node(&t, x[0] + 1, x[1] + 1, x[2] + 1);
+            number =
+                node < 0 ? -1 : gs4i_patch_of(sim, patch->collider, gs4i_slot_of((uint32_t)node));
+            inwards = (x[axis] ? -1 : 1) * apart[axis];
+            d[i] = number < 0 ? 2 * d[i + inwards] - d[i + 2 * inwards]
+                              : all[(size_t)number * GS4I_BLOCK_NODES + (size_t)(node & 63)];
+        }
+}
+
+/* Two numbers of each node of a patch. Its distance d, such that sum w d is that of particles:
+ * less a share of its second differences, as sum w d is d + h^2 lap d/8 else. How far the point as
+ * deep behind the surface as images matter is from being as deep in the body. */
+static void gs4i_sample_patch(int index, void *context)
+{
+    const gs4_sim *sim = ((const gs4i_pass *)context)->sim;
+    const gs4i_patches *patches = &sim->image_particles.patches;
+    const int number = ((const gs4i_pass *)context)->count + index;
+    const gs4i_patch *patch = (const gs4i_patch *)patches->all.data + number;
+    const gs4i_collider *b = &sim->boundary.colliders[patch->collider];
+    const gs4_real h = sim->grid.h, deep = GS4I_IMAGE_NODES * h;
+    gs4_real d[216], *to = gs4i_of_slot((gs4_real *)patches->nodes.data, number);
+    int first[3], x[3], i;
+    gs4i_load_distances(sim, patch, d);
+    gs4i_block_origin(&sim->grid, sim->grid.block[patch->slot], first);
+    for (i = 0; i < GS4I_BLOCK_NODES; i++, to += 4) {
+        const gs4_real *at = d + 43 + (i & 3) + 6 * (i >> 2 & 3) + 36 * (i >> 4);
+        const gs4_vec3 g = gs4i_vec3(at[1] - at[-1], at[6] - at[-6], at[36] - at[-36]);
+        const gs4_real length = gs4i_length(g),
+                       lap = at[1] + at[-1] + at[6] + at[-6] + at[36] + at[-36] - 6 * *at;
+        gs4_vec3 p, n;
+        to[0] = *at - lap * GS4I_C(0.125);
+        to[1] = h;
+        to[2] = 0;
+        to[3] = 0;
+        /* what particles see that may have images */
+        if (!(*at > -2 * GS4I_NODES_REACH * h && *at < (GS4I_IMAGE_REACH + GS4I_NODES_REACH) * h
+              && length > 0))
+            continue;
+        gs4i_node_coordinates(first, i, x);
+        p = gs4i_place_position(&sim->grid, x, GS4I_AT_CELL);
+        n = gs4i_scale(g, 1 / length);
+        to[1] = gs4i_collider_distance(b, gs4i_sub(p, gs4i_scale(n, *at + deep))) + deep;
+    }
+}
+
+/* Do the patches of bodies at rest hold: of the same bodies, in the same blocks? */
+static int gs4i_patches_hold(const gs4_sim *sim)
+{
+    const gs4i_patches *p = &sim->image_particles.patches;
+    const gs4i_grid *g = &sim->grid;
+    const gs4i_collider *before = (const gs4i_collider *)p->colliders.data;
+    const uint32_t *blocks = (const uint32_t *)p->blocks.data;
+    int i;
+    if (p->collider_count != sim->boundary.collider_count || p->active != g->active
+        || p->occupied != g->occupied
+        || memcmp(blocks, g->block, (size_t)g->active * sizeof *blocks) != 0
+        || memcmp(blocks + g->active, g->occupied_block, (size_t)g->occupied * sizeof *blocks) != 0)
+        return 0;
+    for (i = 0; i < p->collider_count; i++, before++) {
+        const gs4i_collider *now = &sim->boundary.colliders[i];
+        if (gs4i_is_sticky(now) != gs4i_is_sticky(before)
+            || gs4i_is_moving(now) != gs4i_is_moving(before)
+            || (!gs4i_is_moving(now) && memcmp(now, before, sizeof *now) != 0))
+            return 0;
+    }
+    return 1;
+}
+
+/* And remember for which they do. */
+static int gs4i_keep_patches(gs4_sim *sim)
+{
+    gs4i_patches *p = &sim->image_particles.patches;
+    const gs4i_grid *g = &sim->grid;
+    const size_t colliders = (size_t)sim->boundary.collider_count * sizeof *sim->boundary.colliders;
+    uint32_t *blocks = (uint32_t *)gs4i_scratch_reserve(
+        &sim->memory, &p->blocks, (size_t)(g->active + g->occupied) * sizeof *blocks, 0);
+    if (!blocks || !gs4i_scratch_reserve(&sim->memory, &p->colliders, colliders, 0))
+        return gs4i_fail_memory(&sim->error);
+    memcpy(blocks, g->block, (size_t)g->active * sizeof *blocks);
+    memcpy(blocks + g->active, g->occupied_block, (size_t)g->occupied * sizeof *blocks);
+    memcpy(p->colliders.data, sim->boundary.colliders, colliders);
+    p->occupied = g->occupied;
+    p->collider_count = sim->boundary.collider_count;
+    return GS4_OK;
+}
+
+/* List the patches of a body: around blocks that are near it, where it is not flat. */
+static int gs4i_list_patches(gs4_sim *sim, int collider)
+{
+    gs4i_patches *p = &sim->image_particles.patches;
+    const gs4i_grid *g = &sim->grid;
+    const gs4i_collider *b = &sim->boundary.colliders[collider];
+    int32_t *of = (int32_t *)p->of.data + (size_t)collider * (size_t)g->active;
+    gs4i_patch *all = (gs4i_patch *)gs4i_scratch_reserve(
+        &sim->memory, &p->all, (size_t)(p->count + g->active) * sizeof *all,
+        (size_t)p->count * sizeof *all);
+    gs4i_face face;
+    int o, i;
+    if (!all) return gs4i_fail_memory(&sim->error);
+    memset(of, 0, (size_t)g->active * sizeof *of);
+    for (o = 0; o < g->occupied; o++) {
+        if (gs4i_find_face(g, b, g->occupied_block[o], &face) != GS4I_SURFACE_CURVED) continue;
+        for (i = 0; i < 27; i++) {
+            const int slot = g->neighbour[27 * o + i];
+            if (of[slot]) continue;
+            of[slot] = -1; /* none of its nodes is seen */
+            if (gs4i_find_face(g, b, g->block[slot], &face) == GS4I_SURFACE_FAR) continue;
+            all[p->count].collider = collider;
+            all[p->count].slot = slot;
+            of[slot] = ++p->count;
+        }
+    }
+    return GS4_OK;
+}
+
+/* The patches of all sticky bodies; those of bodies at rest are made anew where blocks or bodies
+ * have changed. */
+static int gs4i_sample_patches(gs4_sim *sim)
+{
+    gs4i_patches *p = &sim->image_particles.patches;
+    const int hold = gs4i_patches_hold(sim), kept = hold ? p->still : 0;
+    const size_t nodes = GS4I_BLOCK_NODES * sizeof(gs4_real);
+    gs4i_pass pass;
+    int i, moving;
+    p->collider_count = -1;
+    p->active = sim->grid.active;
+    p->count = kept;
+    if (!gs4i_scratch_reserve(
+            &sim->memory, &p->of,
+            (size_t)sim->boundary.collider_count * (size_t)p->active * sizeof(int32_t), 0))
+        return gs4i_fail_memory(&sim->error);
+    if (!hold)
+        memset(p->of.data, 0,
+               (size_t)sim->boundary.collider_count * (size_t)p->active * sizeof(int32_t));
+    for (moving = hold; moving < 2; moving++) {
+        for (i = 0; i < sim->boundary.collider_count; i++) {
+            const gs4i_collider *b = &sim->boundary.colliders[i];
+            if (gs4i_is_sticky(b) && gs4i_is_moving(b) == moving)
+                GS4I_TRY(gs4i_list_patches(sim, i));
+        }
+        if (!moving) p->still = p->count;
+    }
+    if (!gs4i_scratch_reserve(&sim->memory, &p->distance, (size_t)p->count * nodes,
+                              (size_t)kept * nodes)
+        || !gs4i_scratch_reserve(&sim->memory, &p->nodes, (size_t)p->count * 4 * nodes,
+                                 (size_t)kept * 4 * nodes))
+        return gs4i_fail_memory(&sim->error);
+    pass.sim = sim;
+    pass.blocks = NULL;
+    pass.count = kept;
+    gs4i_parallel_for(&sim->tasks, p->count - kept, gs4i_sample_distances, &pass);
+    gs4i_parallel_for(&sim->tasks, p->count - kept, gs4i_sample_patch, &pass);
+    return sim->bad_distance ? GS4_OK : gs4i_keep_patches(sim);
+}
+
+/* What the patches of a body have around occupied block o, as a tile. */
+static void gs4i_load_patches(const gs4_sim *sim, int collider, int o, gs4_real *tile)
+{
+    static const int from[3] = { 8, 0, 0 }, to[3] = { 0, 8, 24 }, count[3] = { 8, 16, 8 };
+    const gs4i_grid *g = &sim->grid;
+    const gs4_real *nodes = (const gs4_real *)sim->image_particles.patches.nodes.data;
+    int row, i, k;
+    for (row = 0; row < GS4I_TILE * GS4I_TILE; row++, tile += 4 * GS4I_TILE) {
+        ptrdiff_t at[3];
+        gs4i_tile_row(g, o, row & 7, row >> 3, at);
+        for (i = 0; i < 3; i++) {
+            const int slot = (int)(at[i] / GS4I_NODE_REALS),
+                      patch = gs4i_patch_of(sim, collider, slot);
+            gs4_real *out = tile + to[i];
+            if (patch >= 0)
+                memcpy(out,
+                       nodes + (ptrdiff_t)patch * GS4I_NODE_REALS + at[i] % GS4I_NODE_REALS
+                           + from[i],
+                       (size_t)count[i] * sizeof *out);
+            for (k = 0; k < count[i] && patch < 0; k++) /* at least as far */
+                out[k] = k % 4 ? 0 : (GS4I_IMAGE_REACH + GS4I_NODES_REACH) * g->h;
+        }
+    }
+    memset(tile, 0, 16 * sizeof *tile);
+}
+
+/* A particle is near body number `collider`, by what it has of the numbers of a patch. */
+static void gs4i_meet_particle(const gs4_sim *sim, int collider, const gs4_real four[4], gs4_vec3 n,
+                               gs4i_image_particle *g)
+{
+    const gs4_real h = sim->grid.h,
+                   /* thin bodies lie between nodes */
+        error = gs4i_abs(four[1]) < GS4I_IMAGE_BEND * h ? GS4I_IMAGE_BEND * h : h;
+    g->room = gs4i_min(g->room, four[0] - error);
+    if (!(four[0] < g->d)) return;
+    g->d = four[0];
+    g->bend = four[1];
+    g->n[0] = n.x;
+    g->n[1] = n.y;
+    g->n[2] = n.z;
+    g->body = collider;
+}
+
+/* How far the particles of occupied block o are from a body. */
+static void gs4i_meet_body(const gs4_sim *sim, int collider, int o, gs4i_image_particle *g)
+{
+    const gs4i_grid *grid = &sim->grid;
+    const gs4i_frame frame = gs4i_tile_frame(grid, grid->occupied_block[o]);
+    const gs4_real deep = GS4I_IMAGE_NODES * grid->h;
+    gs4_real tile[GS4I_TILE_REALS];
+    gs4i_face face;
+    size_t i = (size_t)grid->first[o], end = (size_t)grid->first[o + 1];
+    const int kind =
+        gs4i_find_face(grid, &sim->boundary.colliders[collider], grid->occupied_block[o], &face);
+    if (kind == GS4I_SURFACE_FAR) return;
+    if (kind == GS4I_SURFACE_CURVED) gs4i_load_patches(sim, collider, o, tile);
+    for (; i < end; i += GS4I_BATCH) {
+        const int n = gs4i_batch_size(i, end);
+        gs4i_batch q;
+        gs4i_lanes x[3];
+        gs4i_stencils s;
+        gs4i_gathered u;
+        int b;
+        gs4i_load_batch(&sim->particles, i, n, sim->integrator.prediction, &q);
+        gs4i_predict_positions(&q, sim->integrator.prediction, x);
+        gs4i_stencils_at(&s, &frame, x);
+        for (b = 0; b < n; b++, g++) {
+            gs4i_row w, dw;
+            gs4_vec3 slope;
+            if (s.base[b] < 0) continue; /* it will be sorted first */
+            if (kind == GS4I_SURFACE_FLAT) {
+                const gs4_vec3 p =
+                    gs4i_vec3(GS4I_NTH(x[0], b), GS4I_NTH(x[1], b), GS4I_NTH(x[2], b));
+                u.value[0] = face.d + gs4i_dot(face.n, gs4i_sub(p, face.at));
+                u.value[1] = u.value[0] > -deep ? GS4I_C(0) : grid->h;
+                gs4i_meet_particle(sim, collider, u.value, face.n, g);
+                continue;
+            }
+            gs4i_x_weights(&s, b, &w, &dw);
+            gs4i_gather_local(tile + 4 * s.base[b], &s, b, &w, &dw, &u);
+            slope = gs4i_vec3(u.dx[4 * b], u.dy[4 * b], u.dz[4 * b]);
+            gs4i_meet_particle(sim, collider, u.value + 4 * b, slope, g);
+        }
+    }
 }
 
 /* The image of a particle at p. It can be had where the body is flat and thick enough: a point
- * as deep behind the surface, at most one and a half cells, is as deep in the body, within a
- * quarter of a cell. One that would stick out on the far side is left out. */
-static void gs4i_place_image_particle(const gs4_sim *sim, gs4_vec3 p, const gs4i_face *face,
-                                      gs4i_image_particle *g)
+ * one and a half cells behind the surface is as deep in the body, within a quarter of a cell. */
+static void gs4i_place_image_particle(const gs4_sim *sim, gs4_vec3 p, gs4i_image_particle *g)
 {
-    const gs4_real h = sim->grid.h, deep = GS4I_IMAGE_NODES * h;
-    gs4_real d = face->d + gs4i_dot(face->n, gs4i_sub(p, face->at));
-    gs4_vec3 n = face->n, foot, image, v;
-    const int flat = face->collider && d > -deep;
-    const gs4i_collider *collider = !flat                      ? gs4i_find_surface(sim, p, &d, &n)
-                                    : d < GS4I_IMAGE_REACH * h ? face->collider
-                                                               : NULL;
+    const gs4_real h = sim->grid.h, d = g->d;
+    gs4_vec3 n = gs4i_vec3(g->n[0], g->n[1], g->n[2]), foot, image, v;
+    const gs4_real length = gs4i_length(n);
+    const gs4i_collider *collider;
     g->kind = GS4I_NO_IMAGE;
     g->whole = 0;
-    if (!collider) return;
+    if (g->body < 0 || !(length > 0)) return;
+    collider = &sim->boundary.colliders[g->body];
+    n = gs4i_scale(n, 1 / length);
     foot = gs4i_sub(p, gs4i_scale(n, d));
     image = gs4i_sub(foot, gs4i_scale(n, d));
     v = gs4i_collider_velocity(collider, foot);
@@ -11189,17 +11485,12 @@ static void gs4i_place_image_particle(const gs4_sim *sim, gs4_vec3 p, const gs4i
     g->spin[1] = collider->is.angular_velocity.y;
     g->spin[2] = collider->is.angular_velocity.z;
     g->share = gs4i_max(gs4i_min(GS4I_IMAGE_NODES - d * sim->grid.inv_h, 1), 0);
-    if (d > -GS4I_C(0.5) * h
-        && (flat
-            || gs4i_abs(gs4i_collider_distance(collider, gs4i_sub(foot, gs4i_scale(n, deep)))
-                        + deep)
-                   < GS4I_C(0.25) * h)) {
+    if (d > -GS4I_C(0.5) * h && gs4i_abs(g->bend) < GS4I_IMAGE_BEND * h) {
         const gs4_real nearer[3] = { image.x + h * n.x, image.y + h * n.y, image.z + h * n.z };
         g->slot = gs4i_slot_at(&sim->grid, g->x);
         /* a tile has room for a cell around its block */
         if (g->slot < 0) g->slot = gs4i_slot_at(&sim->grid, nearer);
-        if (g->slot >= 0 && (flat || d < deep || gs4i_collider_distance(collider, image) < 0))
-            g->kind = GS4I_HAS_IMAGE;
+        if (g->slot >= 0) g->kind = GS4I_HAS_IMAGE;
         return;
     }
     /* of nodes that would be held it sees next to nothing */
@@ -11262,10 +11553,15 @@ static void gs4i_place_image_particles(int index, void *context)
     const gs4i_particles *p = &sim->particles;
     const gs4_real ahead = sim->integrator.prediction.ahead;
     gs4i_image_particle *g = gs4i_image_particles_of(sim, index);
-    gs4i_face face;
     size_t i = (size_t)sim->grid.first[index], end = (size_t)sim->grid.first[index + 1];
+    int k;
     if (!g) return;
-    face = gs4i_find_face(sim, index);
+    for (k = 0; k < (int)(end - i); k++) {
+        g[k].d = g[k].room = GS4I_IMAGE_REACH * sim->grid.h;
+        g[k].body = -1;
+    }
+    for (k = 0; k < sim->boundary.collider_count; k++)
+        if (gs4i_is_sticky(&sim->boundary.colliders[k])) gs4i_meet_body(sim, k, index, g);
     for (; i < end; i += GS4I_BATCH) {
         const int n = gs4i_batch_size(i, end);
         gs4i_batch q;
@@ -11274,8 +11570,11 @@ static void gs4i_place_image_particles(int index, void *context)
         gs4i_load_batch(p, i, n, sim->integrator.prediction, &q);
         gs4i_predict_positions(&q, sim->integrator.prediction, x);
         for (b = 0; b < n; b++, g++) {
-            gs4i_place_image_particle(
-                sim, gs4i_vec3(GS4I_NTH(x[0], b), GS4I_NTH(x[1], b), GS4I_NTH(x[2], b)), &face, g);
+            const gs4_vec3 at = gs4i_vec3(GS4I_NTH(x[0], b), GS4I_NTH(x[1], b), GS4I_NTH(x[2], b)),
+                           before = gs4i_vec3(GS4I_NTH(q.x[0], b), GS4I_NTH(q.x[1], b),
+                                              GS4I_NTH(q.x[2], b));
+            g->room -= gs4i_length(gs4i_sub(at, before));
+            gs4i_place_image_particle(sim, at, g);
             g->x[3] = GS4I_NTH(q.x[3], b);
             memset(g->carried, 0, sizeof g->carried);
             for (c = 0; c < 3; c++)
@@ -11328,22 +11627,24 @@ static int gs4i_find_image_particles(gs4_sim *sim)
     const gs4i_grid *grid = &sim->grid;
     gs4i_image_particles *g = &sim->image_particles;
     gs4i_pass pass;
+    gs4i_face face;
     int32_t *of;
     int i, o, sticky = 0;
-    g->count = 0;
+    g->count = g->patches.count = 0;
     for (i = 0; i < sim->boundary.collider_count; i++)
         sticky |= gs4i_is_sticky(&sim->boundary.colliders[i]);
     if (!sticky) return GS4_OK;
+    GS4I_TRY(gs4i_sample_patches(sim));
     of = (int32_t *)gs4i_scratch_reserve(&sim->memory, &g->of, (size_t)grid->occupied * sizeof *of,
                                          0);
     if (!of) return gs4i_fail_memory(&sim->error);
     for (o = 0; o < grid->occupied; o++) {
-        gs4_real d;
-        of[o] =
-            gs4i_nearest_sticky(&sim->boundary, gs4i_block_centre(grid, grid->occupied_block[o]),
-                                (GS4I_BLOCK_REACH + GS4I_IMAGE_REACH) * grid->h, &d)
-                ? g->count
-                : -1;
+        of[o] = -1;
+        for (i = 0; i < sim->boundary.collider_count && of[o] < 0; i++)
+            if (gs4i_is_sticky(&sim->boundary.colliders[i])
+                && gs4i_find_face(grid, &sim->boundary.colliders[i], grid->occupied_block[o], &face)
+                       != GS4I_SURFACE_FAR)
+                of[o] = g->count;
         if (of[o] >= 0) g->count += grid->first[o + 1] - grid->first[o];
     }
     if (!g->count) return GS4_OK;
@@ -11687,9 +11988,12 @@ static void gs4i_reflect_affine(gs4i_image_particle *g, int n, const gs4i_stenci
 
 static void gs4i_free_image_particles(gs4i_memory *m, gs4i_image_particles *g)
 {
-    gs4i_scratch *const parts[5] = { &g->all, &g->of, &g->order, &g->first, &g->slots };
+    gs4i_patches *p = &g->patches;
+    gs4i_scratch *const parts[11] = { &g->all,   &g->of,        &g->order, &g->first,
+                                      &g->slots, &p->of,        &p->all,   &p->distance,
+                                      &p->nodes, &p->colliders, &p->blocks };
     int i;
-    for (i = 0; i < 5; i++) gs4i_free(m, parts[i]->data, parts[i]->bytes, 1);
+    for (i = 0; i < 11; i++) gs4i_free(m, parts[i]->data, parts[i]->bytes, 1);
     memset(g, 0, sizeof *g);
 }
 
@@ -11760,7 +12064,7 @@ static void gs4i_hold_nodes(const gs4_sim *sim, int slot, gs4_real *velocity,
             if (!(v[3] > 0) || (imaged && !jump)) continue; /* no particle sees it */
             gs4i_node_coordinates(first, i, x);
             p = gs4i_place_position(g, x, GS4I_AT_CELL);
-            d = gs4i_collider_distance(collider, p);
+            d = gs4i_node_distance(sim, b, slot, i, p);
             if (sticky && jump && d < 0) jump[4 * i + 3] = 1;
             if (imaged || !gs4i_holds_node(&sim->boundary, g, collider, p, d)) continue;
             none[0] = none[1] = none[2] = 0;
@@ -12314,7 +12618,8 @@ GS4I_INLINE void gs4i_store_batch(const gs4i_particles *p, size_t i, int n, cons
            4 * (size_t)n * sizeof *o->position_residual);
 }
 
-/* Is any of n positions inside of a body, or may be? By the ball around their box. */
+/* Is any of n positions inside of a body, or may be? By the ball around their box. Sticky bodies
+ * are left out: image particles know of them. */
 static int gs4i_may_touch(const gs4i_boundary *b, const gs4_real *x, int n, gs4_real h)
 {
     gs4_real low[3], high[3], prediction;
@@ -12333,15 +12638,23 @@ static int gs4i_may_touch(const gs4i_boundary *b, const gs4_real *x, int n, gs4_
     prediction = gs4i_length(gs4i_vec3(high[0] - low[0], high[1] - low[1], high[2] - low[2]))
                  + GS4I_C(0.1) * h;
     for (i = 0; i < b->collider_count; i++)
-        if (!b->colliders[i].is_off
+        if (!b->colliders[i].is_off && !gs4i_is_sticky(&b->colliders[i])
             && !(gs4i_collider_distance(&b->colliders[i], midst) > prediction))
             return 1;
     return 0;
 }
 
+/* May a particle that was at `from` be in a sticky body at x? */
+GS4I_INLINE int gs4i_may_stick(const gs4i_image_particle *g, const gs4_real *from,
+                               const gs4_real *x)
+{
+    const gs4_vec3 moved = gs4i_vec3(x[0] - from[0], x[1] - from[1], x[2] - from[2]);
+    return !(g->room > 0 && gs4i_dot(moved, moved) < g->room * g->room);
+}
+
 /* Walls, colliders and emitters on each particle after the step. */
-static void gs4i_correct_contact(gs4_sim *sim, size_t i, int n, gs4i_stored *o, gs4i_gathered *L,
-                                 gs4i_report *report)
+static void gs4i_correct_contact(gs4_sim *sim, size_t i, int n, const gs4i_image_particle *images,
+                                 gs4i_stored *o, gs4i_gathered *L, gs4i_report *report)
 {
     gs4_real *elastic = sim->particles.elastic_reals
                             ? sim->particles.elastic + (size_t)sim->particles.elastic_reals * i
@@ -12350,7 +12663,11 @@ static void gs4i_correct_contact(gs4_sim *sim, size_t i, int n, gs4i_stored *o, 
     int b;
     for (b = 0; b < n; b++) {
         const gs4i_collider *emitter;
-        if (!touches && gs4i_is_in_domain(&sim->grid, o->x + 4 * b)) continue;
+        if (!touches && gs4i_is_in_domain(&sim->grid, o->x + 4 * b)
+            && !(images
+                 && gs4i_may_stick(images + b, sim->particles.position + 4 * (i + (size_t)b),
+                                   o->x + 4 * b)))
+            continue;
         gs4i_put_back(&sim->boundary, &sim->grid, o->x + 4 * b, o->v + 4 * b);
         emitter = gs4i_hold_in_emitter(&sim->boundary, o->x + 4 * b, o->v + 4 * b);
         if (emitter) {
@@ -12542,7 +12859,6 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_heat
         }
         gs4i_stage_batch(&p, i, n, integrator.prediction, &frame, &q, &s);
         gs4i_gather_corrections(&tiles, &s, n, solids, images, &u, &k);
-        if (images) images += n;
         if (p.with_subgrid) {
             gs4i_prefetch_subgrid(&p, i + 4 * GS4I_BATCH);
             gs4i_to_lanes(p.subgrid + 4 * i, n, k.subgrid);
@@ -12551,11 +12867,13 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_heat
         gs4i_advance_response(&r, i, n, k.L, &k.rates, q.v[3], commit);
         if (!commit) {
             gs4i_validate_batch(&q, k.L, p.position + 4 * i, n, g->h, p.id + i, report);
+            if (images) images += n;
             continue;
         }
         if (heat) gs4i_gather_heat(&r, &s, k.L, heat);
         gs4i_pack_batch(&q, 1, &out);
-        if (edge) gs4i_correct_contact(sim, i, n, &out, &u, report);
+        if (edge) gs4i_correct_contact(sim, i, n, images, &out, &u, report);
+        if (images) images += n;
         gs4i_see_motion(&r.seen, q.v, k.L);
         gs4i_store_batch(&p, i, n, &out);
     }
@@ -12778,19 +13096,18 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, gs4i
             gs4i_x_weights(&s, b, &w, &d);
             gs4i_gather_local(nodes + 4 * s.base[b], &s, b, &w, &d, &u);
         }
-        if (images) {
-            gs4i_make_odd(images, n, &u);
-            images += n;
-        }
+        if (images) gs4i_make_odd(images, n, &u);
         gs4i_advect_batch(sim->integrator.dt, &u, n, &q, C);
         gs4i_advance_response(&r, i, n, C, NULL, q.v[3], commit);
         if (!commit) {
             gs4i_validate_batch(&q, C, p.position + 4 * i, n, g->h, p.id + i, report);
+            if (images) images += n;
             continue;
         }
         if (heat) gs4i_gather_heat(&r, &s, C, heat);
         gs4i_pack_batch(&q, 0, &out);
-        if (edge) gs4i_correct_contact(sim, i, n, &out, &u, report);
+        if (edge) gs4i_correct_contact(sim, i, n, images, &out, &u, report);
+        if (images) images += n;
         gs4i_see_motion(&r.seen, q.v, C);
         gs4i_store_batch(&p, i, n, &out);
         memcpy(p.affine[0] + 4 * i, u.dx, 4 * (size_t)n * sizeof *u.dx);
@@ -18023,6 +18340,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_GRAPHS
 #undef GS4I_GREATER
 #undef GS4I_HUGE
+#undef GS4I_IMAGE_BEND
 #undef GS4I_IMAGE_NODES
 #undef GS4I_IMAGE_REACH
 #undef GS4I_COLD
@@ -18050,6 +18368,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_MOST_STRETCH
 #undef GS4I_MUL
 #undef GS4I_NEVER_MELTS
+#undef GS4I_NODES_REACH
 #undef GS4I_NODE_REALS
 #undef GS4I_NO_HEAT
 #undef GS4I_NO_POM_POM
@@ -18132,7 +18451,8 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  * liquids, solids, walls, colliders, emitters, frames, checkpoints. Checkpoints have a byte of
  * flags a node; those written before cannot be read. The rim of a collider that turns counts in the
  * stable step and in default speeds of sound. Sticky colliders near each other hold nodes inside
- * of them alone; sub-grid velocity decays at the nodes that sticky colliders hold.
+ * of them alone; sub-grid velocity decays at the nodes that sticky colliders hold. Distances of
+ * sticky colliders are asked for at nodes, of those at rest not every step.
  * Meshes: sampled where the domain meets them, at half a cell whatever their size, before coarser
  * where they were large. Parts that overlap are a union, before the overlap was empty. Parts inside
  * out, and bodies thinner than 0.3 cells on average, are refused.

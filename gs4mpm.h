@@ -212,9 +212,9 @@
  * Symplectic Euler, the fast tier: one affine scatter with stress and one gather (MLS-MPM, APIC),
  * first order.
  *
- * SAFETY. Before S7 nothing of the state has changed. If a particle would leave 1/16 < J < 16, move
- * more than two cells or become non-finite, the step is refused and the last good state stays. Most
- * blocks need no trial pass to know, by this lemma:
+ * SAFETY. Before S7 nothing of the state has changed. If a particle would leave 1/16 < J < 256,
+ * move more than two cells or become non-finite, the step is refused and the last good state stays.
+ * Most blocks need no trial pass to know, by this lemma:
  *     In a particle of mass m_p node i has weight at most m_i/m_p, and a gradient of at most
  *     sqrt(2 m_i/m_p)/h along each axis; the gradients of 27 nodes sum to at most 2/h. Let
  *     q_i = min(1, 14 sqrt(m_i/m_min)), r any velocity, |.|_1 the sum over axes. Nodes with q_i = 1
@@ -277,7 +277,10 @@
  *                           b_max (2 - 1/sqrt(b_max)));
  *                           sharp_gradients: om^2 and d 2.3 times as large;
  *                           symplectic Euler: (om dt)^2 + 2 d dt <= 4, om = 3.5 c/h,
- *                           d = 16 F_v mu/(rho h^2)
+ *                           d = 16 F_v mu/(rho h^2);
+ *                           GS4: om^2 of a material is 4/(1 + 3 x) times as large where that is
+ *                           more than 1, x = mass of a cell of the lightest material over that of
+ *                           the heaviest particle: one among lighter ones swings by itself
  *     flow                  one cell a step along each axis, the fall within the step included,
  *                           and the rim of a collider that turns, where the domain can meet it
  *     strain, relaxation    |grad v| dt <= 1, of colliders too (sqrt(2) |w|),  dt <= 1000 lambda_b
@@ -585,9 +588,11 @@ typedef struct gs4_material {
         gs4_real creep_rate;   /* 1/s, above 0 with a yield stress or an index below 1 */
     } herschel_bulkley;
 
-    /* Volume response of both phases, (3): give one of the two, or neither. Then c0 = 10 sqrt(2 g H
-     * + v^2), H the height of the domain and v the greatest speed given so far, of the rims of
-     * colliders too: flow compresses by 1 %, impact by more; of solids at least sqrt(10 G/rho0). */
+    /* Volume response of both phases, (3): give one of the two, or neither. Then rho0 c0^2 = 100
+     * rho_max (2 g H + v^2), H the height of the domain, v the greatest speed given so far, of the
+     * rims of colliders too, rho_max the density of the densest material: flow compresses by 1 %,
+     * impact by more; of solids at least 10 G. One that is given for the lighter of two materials
+     * should bear the weight of the denser one, too. */
     gs4_real bulk_modulus; /* K = rho0 c0^2, Pa */
     gs4_real sound_speed;  /* c0, m/s */
     int incompressible;    /* for partitioned and semi-implicit schemes: K is infinite */
@@ -6476,6 +6481,7 @@ typedef struct gs4i_material_constants {
     gs4_real inv_density, tait; /* 1 / rho0; rho0 c0^2 / 7 */
     /* viscosity: the local part, F_v mu, or the consistency */
     gs4_real viscosity, sound_speed, density;
+    gs4_real lone; /* squared speeds of its waves count so often: see gs4i_lone_waves */
     gs4_real local, temperature; /* F_v; K, where the scene has no heat: that of the air */
     /* non-local: G0; 1 / lambda_b; 2 lambda_b / lambda_0s; 2 / Q; all 0: none */
     gs4_real modulus, inv_lambda, stretch, nu, alpha;
@@ -6501,7 +6507,9 @@ GS4I_INLINE void gs4i_pressure(const gs4i_wide *tait, const gs4i_wide *J, gs4i_w
 
 /* What the particles of a batch need of their materials. */
 typedef struct gs4i_batch_constants {
-    gs4i_lanes inv_density, tait, viscosity, sound_speed;
+    gs4i_lanes inv_density, tait, viscosity;
+    /* what the limit of the step sees: c0 sqrt(lone), lone / rho0 */
+    gs4i_lanes wave_speed, wave_volume;
     /* that of the air where the scene has no heat; else see gs4i_stage_temperature */
     gs4i_lanes temperature;
     const gs4i_material_constants *of[GS4I_BATCH];
@@ -6527,7 +6535,8 @@ GS4I_INLINE void gs4i_load_constants(const gs4i_material_constants *constants,
         GS4I_NTH(l->inv_density, b) = mat->inv_density;
         GS4I_NTH(l->tait, b) = mat->tait;
         GS4I_NTH(l->viscosity, b) = mat->viscosity;
-        GS4I_NTH(l->sound_speed, b) = mat->sound_speed;
+        GS4I_NTH(l->wave_speed, b) = mat->sound_speed * GS4I_SQRT(mat->lone);
+        GS4I_NTH(l->wave_volume, b) = mat->lone * mat->inv_density;
         GS4I_NTH(l->temperature, b) = mat->temperature;
     }
 }
@@ -8649,9 +8658,11 @@ enum {
     GS4I_BAD_DEFORMATION
 };
 
-/* A volume ratio outside of this range is refused: Tait's equation is far beyond its own there. */
+/* A volume ratio outside of this range is refused: Tait's equation is far beyond its own there. A
+ * soft liquid that a dense one has pressed flies apart, until its particles, half a cell apart at
+ * first, are three cells apart and see each other no more: 6^3. */
 #define GS4I_J_LOW GS4I_C(0.0625)
-#define GS4I_J_HIGH GS4I_C(16)
+#define GS4I_J_HIGH GS4I_C(256)
 
 static void gs4i_report_clear(gs4i_report *r)
 {
@@ -8699,7 +8710,7 @@ GS4I_INLINE void gs4i_see_liquids(gs4i_seen *r, const gs4i_batch_constants *l, c
     GS4I_BATCH_LOOP(b) {
         /* by (3) */
         const gs4i_wide viscosity = mu[b] * l->inv_density[b],
-                        sound = l->sound_speed[b] / (J[b] * J[b] * J[b]);
+                        sound = l->wave_speed[b] / (J[b] * J[b] * J[b]);
         GS4I_WIDE_MIN(r->min_J[b], r->min_J[b], J[b]);
         GS4I_WIDE_MAX(r->max_J[b], r->max_J[b], J[b]);
         GS4I_WIDE_MAX(r->max_viscosity[b], r->max_viscosity[b], viscosity);
@@ -8821,7 +8832,7 @@ static void gs4i_see_stiffness(gs4i_response *r, gs4i_lanes stiffness)
     int b, good = 1;
     GS4I_BATCH_LOOP(b) {
         const gs4i_wide_mask fine = stiffness[b] < GS4I_HUGE;
-        const gs4i_wide speed2 = stiffness[b] * r->constants.inv_density[b];
+        const gs4i_wide speed2 = stiffness[b] * r->constants.wave_volume[b];
         GS4I_WIDE_MAX(r->seen.max_stiffness[b], r->seen.max_stiffness[b], speed2);
         good &= gs4i_all(&fine);
     }
@@ -10659,7 +10670,7 @@ struct gs4_sim {
     /* stress integrated robustly, bounded: particles and steps so far */
     uint64_t steps, split, bounded;
     uint32_t next_id;
-    gs4_real min_mass; /* of any particle so far */
+    gs4_real min_mass, max_mass; /* of any particle so far */
     /* m/s, the greatest that was ever set: chooses a sound speed where none is given */
     gs4_real top_speed;
     gs4_real shift; /* of the rates of positions, left by the last step */
@@ -10693,7 +10704,8 @@ typedef enum gs4i_warning {
     GS4I_WARN_SUBSTEPS = 128,
     GS4I_WARN_DISTANCE = 256,
     GS4I_WARN_FULL = 512,
-    GS4I_WARN_EMITTER_OUTSIDE = 1024
+    GS4I_WARN_EMITTER_OUTSIDE = 1024,
+    GS4I_WARN_SOFT = 2048
 } gs4i_warning;
 
 static int gs4i_will_warn(const gs4_sim *sim, gs4i_warning which)
@@ -13677,9 +13689,11 @@ static int gs4i_solve_heat(gs4_sim *sim, gs4i_node_pass *nodes)
 /* --- materials -------------------------------------------------------------------------------- */
 
 /* Speed of sound, m/s. Where none is given: ten times the fastest that anything here moves, falls
- * or flows down, since compression goes as the Mach number squared: 1 %. Of solids also at least
- * sqrt(10 G/rho): a bulk modulus of 10 shear moduli, Poisson's ratio 0.45. */
-static double gs4i_sound_speed_of(const gs4_sim_desc *d, const gs4_material *m, gs4_real top_speed)
+ * or flows down, since compression goes as the Mach number squared: 1 %. Of lighter materials so
+ * much more that the pressure of the densest one compresses them no more than itself. Of solids
+ * also at least sqrt(10 G/rho): a bulk modulus of 10 shear moduli, Poisson's ratio 0.45. */
+static double gs4i_sound_speed_of(const gs4_sim_desc *d, const gs4_material *m, gs4_real top_speed,
+                                  double densest)
 {
     const double size = (double)d->cell_size;
     const double fall = fabs((double)d->gravity.x) * d->cells[0] * size
@@ -13689,7 +13703,8 @@ static double gs4i_sound_speed_of(const gs4_sim_desc *d, const gs4_material *m, 
     if (m->sound_speed > 0) return (double)m->sound_speed;
     if (m->bulk_modulus > 0) return sqrt((double)m->bulk_modulus / (double)m->density);
     if (speed <= 0) speed = size; /* nothing moves so far: a cell a second is as good as any */
-    return fmax(10 * speed, sqrt(10 * (double)m->shear_modulus / (double)m->density));
+    return fmax(10 * speed * sqrt(densest / (double)m->density),
+                sqrt(10 * (double)m->shear_modulus / (double)m->density));
 }
 
 /* rho0 c0^2 / 7 of (3), Pa. */
@@ -13698,12 +13713,41 @@ static gs4_real gs4i_tait_of(const gs4_material *m, double sound_speed)
     return GS4I_C((double)m->density * sound_speed * sound_speed / 7);
 }
 
+/* Greatest density of the materials, or the least where `sign` is -1; 0: there are none. */
+static double gs4i_extreme_density(const gs4_sim *sim, int sign)
+{
+    double most = 0;
+    int i;
+    for (i = 0; i < sim->material_count; i++) {
+        const double density = (double)sim->constants[i].is.density;
+        if (i == 0 || sign * (density - most) > 0) most = density;
+    }
+    return most;
+}
+
+/* GS4: a particle among much lighter ones swings alone against the nodes, as in symplectic Euler,
+ * where sum |grad w|^2/w = 12/h^2. Lighter nodes give way: a particle of mass m_p in nodes of mass
+ * m_i has 12/h^2 / (1 + 3 m_i/m_p), 3/h^2 in its own material. Measured for density ratios of 10,
+ * 30, 100 and 1000, 8 particles a cell: 3.3, 4.9, 7.1, 11 (this: 3.5, 6.7, 9.7, 11.7); of 10 with
+ * heavy ones a cell wide: 5.5 (this: 9.2). How often the squared speed of waves counts by that. */
+static gs4_real gs4i_lone_waves(const gs4_sim *sim, const gs4_material *m)
+{
+    const double most = GS4I_EULER_SOUND_EIGENVALUE / GS4I_SOUND_EIGENVALUE,
+                 h = (double)sim->grid.h;
+    const double cell = h * h * h, mass = fmin((double)sim->max_mass, (double)m->density * cell),
+                 node = gs4i_extreme_density(sim, -1) * cell;
+    if (!sim->particles.with_rates || !(mass > 0)) return 1;
+    return GS4I_C(fmax(1, most / (1 + (most - 1) * node / mass)));
+}
+
 static void gs4i_set_constants(gs4_sim *sim)
 {
     int i;
     for (i = 0; i < sim->material_count; i++) {
         gs4i_material_constants *l = &sim->constants[i];
-        const double c0 = gs4i_sound_speed_of(&sim->desc, &l->is, sim->top_speed);
+        const double c0 =
+            gs4i_sound_speed_of(&sim->desc, &l->is, sim->top_speed, gs4i_extreme_density(sim, 1));
+        l->lone = gs4i_lone_waves(sim, &l->is);
         l->sound_speed = GS4I_C(c0);
         l->tait = gs4i_tait_of(&l->is, c0);
         gs4i_set_material_constants(l, sim->desc.ambient_temperature);
@@ -13719,6 +13763,21 @@ static void gs4i_note_speed(gs4_sim *sim, gs4_real speed)
     if (speed > sim->top_speed) {
         sim->top_speed = speed;
         gs4i_set_constants(sim);
+    }
+}
+
+/* What the mass of a new particle says of scales: see gs4i_lone_waves. */
+static void gs4i_note_mass(gs4_sim *sim, gs4_real mass)
+{
+    int i;
+    sim->min_mass = sim->min_mass > 0 ? gs4i_min(sim->min_mass, mass) : mass;
+    if (mass <= sim->max_mass) return;
+    sim->max_mass = mass;
+    for (i = 0; i < sim->material_count; i++) {
+        const gs4_real lone = gs4i_lone_waves(sim, &sim->constants[i].is);
+        if (lone == sim->constants[i].lone) continue;
+        sim->constants[i].lone = sim->solid_phase[i].lone = lone;
+        sim->limits_stale = 1;
     }
 }
 
@@ -13887,9 +13946,9 @@ static void gs4i_set_gravity(gs4_sim *sim, gs4_vec3 gravity)
     double before, after;
     memset(&any, 0, sizeof any);
     any.density = 1;
-    before = gs4i_sound_speed_of(&sim->desc, &any, top) / 10;
+    before = gs4i_sound_speed_of(&sim->desc, &any, top, 1) / 10;
     sim->desc.gravity = gravity;
-    after = gs4i_sound_speed_of(&sim->desc, &any, top) / 10;
+    after = gs4i_sound_speed_of(&sim->desc, &any, top, 1) / 10;
     if (after < before)
         sim->top_speed = GS4I_C(sqrt(before * before - after * after + (double)top * (double)top));
     gs4i_set_constants(sim);
@@ -13945,7 +14004,7 @@ static int gs4i_add_particle(gs4_sim *sim, gs4_vec3 x, gs4_vec3 v, gs4_real mass
     p->id[i] = sim->next_id++;
     p->material[i] = (uint8_t)f->material;
     p->count++;
-    sim->min_mass = sim->min_mass > 0 ? gs4i_min(sim->min_mass, mass) : mass;
+    gs4i_note_mass(sim, mass);
     sim->needs_sort = 1;
     return 1;
 }
@@ -14843,11 +14902,11 @@ static int gs4i_prepare_emitters(gs4_sim *sim, double dt)
 static void gs4i_note_emission(gs4_sim *sim, const gs4i_material_constants *m)
 {
     gs4i_report *r = &sim->limits;
-    r->max_sound = gs4i_max(r->max_sound, m->sound_speed);
+    r->max_sound = gs4i_max(r->max_sound, m->sound_speed * GS4I_SQRT(m->lone));
     r->max_viscosity = gs4i_max(r->max_viscosity, m->viscosity * m->inv_density);
     r->max_stiffness =
-        gs4i_max(r->max_stiffness,
-                 gs4i_max(2 * m->modulus, GS4I_SOLID_WAVES * m->shear_modulus) * m->inv_density);
+        gs4i_max(r->max_stiffness, gs4i_max(2 * m->modulus, GS4I_SOLID_WAVES * m->shear_modulus)
+                                       * m->lone * m->inv_density);
     if (m->varies) sim->limits_stale = 1;
 }
 
@@ -14950,7 +15009,7 @@ static int gs4i_fail_bad(gs4_sim *sim, const gs4i_report *r)
     gs4i_put(&t, "particle ");
     gs4i_put_integer(&t, (int64_t)r->bad_id);
     gs4i_put(
-        &t, r->bad == GS4I_BAD_VOLUME ? " would leave the range of volume ratios 1/16 to 16"
+        &t, r->bad == GS4I_BAD_VOLUME ? " would leave the range of volume ratios 1/16 to 256"
             : r->bad == GS4I_BAD_MOTION
                 ? " would move more than two cells, or its state would not be finite"
             : r->bad == GS4I_BAD_STRESS
@@ -14979,7 +15038,7 @@ static gs4i_report gs4i_with_both_phases(const gs4_sim *sim, gs4i_report r)
         mu = l->local * gs4i_viscosity_of(l, l->melting, none, 0);
         r.max_stiffness = gs4i_max(r.max_stiffness,
                                    gs4i_max(GS4I_SOLID_WAVES * solid->shear_modulus, 2 * l->modulus)
-                                       * l->inv_density);
+                                       * l->lone * l->inv_density);
         if (mu < GS4I_HUGE) r.max_viscosity = gs4i_max(r.max_viscosity, mu * l->inv_density);
     }
     return r;
@@ -15029,8 +15088,9 @@ static void gs4i_follow_speed(const gs4_sim *sim, gs4_real top_speed, gs4i_batch
 {
     int b;
     for (b = 0; b < GS4I_BATCH && top_speed > sim->top_speed; b++) {
-        const double c0 = gs4i_sound_speed_of(&sim->desc, &l->of[b]->is, top_speed);
-        GS4I_NTH(l->sound_speed, b) = GS4I_C(c0);
+        const double c0 =
+            gs4i_sound_speed_of(&sim->desc, &l->of[b]->is, top_speed, gs4i_extreme_density(sim, 1));
+        GS4I_NTH(l->wave_speed, b) = GS4I_C(c0) * GS4I_SQRT(l->of[b]->lone);
         GS4I_NTH(l->tait, b) = gs4i_tait_of(&l->of[b]->is, c0);
     }
 }
@@ -15757,7 +15817,7 @@ typedef struct gs4i_head {
     uint64_t steps;
     uint32_t next_id;
     int32_t restart, needs_sort, limits_stale, needs_spin;
-    double min_mass, top_speed, shift;
+    double min_mass, max_mass, top_speed, shift;
     int32_t particles, materials, colliders, emitters, active, occupied, elastic_reals,
         deformation_reals, with_heat, with_flux;
     uint64_t split, bounded;
@@ -15806,6 +15866,7 @@ static GS4I_COLD void gs4i_head_of(const gs4_sim *sim, gs4i_head *h)
     h->limits_stale = sim->limits_stale;
     h->needs_spin = sim->needs_spin;
     h->min_mass = (double)sim->min_mass;
+    h->max_mass = (double)sim->max_mass;
     h->top_speed = (double)sim->top_speed;
     h->shift = (double)sim->shift;
     h->particles = sim->particles.count;
@@ -16040,16 +16101,18 @@ static int gs4i_is_place(const double at[3])
 /* Of the head: times, extremes that set the limit, flags. */
 static int gs4i_head_is_sound(const gs4i_head *h)
 {
-    const double times[5] = { h->time, h->last_dt, h->top_speed, h->min_mass, h->shift };
+    const double times[6] = {
+        h->time, h->last_dt, h->top_speed, h->min_mass, h->max_mass, h->shift
+    };
     const gs4_real limits[7] = { h->limits.max_speed,     h->limits.max_gradient,
                                  h->limits.min_J,         h->limits.max_J,
                                  h->limits.max_viscosity, h->limits.max_sound,
                                  h->limits.max_stiffness };
     int i, sound = 1;
-    for (i = 0; i < 5; i++) sound &= times[i] >= 0 && times[i] < (double)GS4I_HUGE;
+    for (i = 0; i < 6; i++) sound &= times[i] >= 0 && times[i] < (double)GS4I_HUGE;
     for (i = 0; i < 7; i++) sound &= limits[i] >= 0 && gs4i_finite(limits[i]);
     return sound && (h->restart | h->needs_sort | h->limits_stale | h->needs_spin) >> 1 == 0
-           && (h->min_mass > 0 || h->particles == 0);
+           && (h->min_mass > 0 || h->particles == 0) && h->max_mass >= h->min_mass;
 }
 
 /* Of what moves. */
@@ -16084,7 +16147,8 @@ static int gs4i_particle_is_sound(const gs4_sim *sim, const gs4i_head *h, size_t
     const gs4_real *x = p->position + 4 * i, *v = p->velocity + 4 * i, h1 = sim->grid.h;
     int k, sound = p->material[i] < sim->material_count && p->id[i] < h->next_id
                    && gs4i_is_in_domain(&sim->grid, x) && gs4i_are_sane(v, 3) && v[3] > GS4I_J_LOW
-                   && v[3] < GS4I_J_HIGH && (double)x[3] >= h->min_mass;
+                   && v[3] < GS4I_J_HIGH && (double)x[3] >= h->min_mass
+                   && (double)x[3] <= h->max_mass;
     /* the largest that gs4_add_points takes */
     sound = sound && x[3] <= 9 * h1 * h1 * h1 * sim->constants[p->material[i]].density;
     for (k = 0; k < 3 && p->affine[k]; k++) sound &= gs4i_are_sane(p->affine[k] + 4 * i, 3);
@@ -16236,6 +16300,7 @@ static void gs4i_copy_without_state(const gs4_sim *sim, const gs4i_head *h, gs4_
 static void gs4i_restore_head(gs4_sim *sim, const gs4i_head *h)
 {
     sim->top_speed = GS4I_C(h->top_speed);
+    sim->max_mass = GS4I_C(h->max_mass);
     gs4i_set_constants(sim);
     sim->time = h->time;
     sim->last_dt = h->last_dt;
@@ -17590,6 +17655,28 @@ GS4_API int gs4_move_emitter_to(gs4_sim *sim, int emitter, const gs4_pose *pose,
 
 /* --- stepping --------------------------------------------------------------------------------- */
 
+/* A material whose bulk modulus is below the pressure that the densest one has when it has fallen
+ * or flows: it gives way to less than 3/4 of its volume, and flies apart where it gets free. */
+static void gs4i_warn_of_soft(gs4_sim *sim)
+{
+    const double densest = gs4i_extreme_density(sim, 1);
+    gs4_material any;
+    double c0;
+    int i;
+    memset(&any, 0, sizeof any);
+    any.density = GS4I_C(densest);
+    c0 = gs4i_sound_speed_of(&sim->desc, &any, sim->top_speed, densest);
+    for (i = 0; i < sim->material_count; i++) {
+        const gs4i_material_constants *l = &sim->constants[i];
+        const double rho = (double)l->density, c = (double)l->sound_speed;
+        if (rho < densest && rho * c * c < densest * c0 * c0 / 100)
+            gs4i_warn_value(sim, GS4I_WARN_SOFT,
+                            "a material is too soft to bear the densest one, which will press it "
+                            "to a part of its volume: a bulk_modulus of ",
+                            densest * c0 * c0, " Pa, or none, would do");
+    }
+}
+
 /* Largest stable dt of the present state, s. What an edit by hand has brought is seen, but left
  * to the next call that checks it. */
 static gs4_real gs4i_limit_now(const gs4_sim *sim)
@@ -17613,6 +17700,7 @@ static int gs4i_try_step(gs4_sim *sim, gs4_real dt)
     if (sim->limits_stale) {
         gs4i_find_limits(sim, sim->top_speed, &sim->limits);
         sim->limits_stale = 0;
+        gs4i_warn_of_soft(sim);
     }
     limit = gs4i_limit_now(sim);
     sim->busy = 0;
@@ -18463,6 +18551,8 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  * simulation has or with other pivots, starts or stops. `log` says at level 1, once each, what is
  * allowed but hardly meant. gs4_stats has time_left. Files follow symbolic links.
  * Emitters: the velocity of a filling is relative to the emitter, which travels from its start on.
+ * Densities: the stable step of GS4 sees heavy particles among light ones, default speeds of sound
+ * the densest material. J may be up to 256, before 16.
  * Coulomb friction holds without a creep. New: poses, gs4_advance_within, gs4_set_gravity,
  * gs4_set_viscosity, gs4_remove_particles; Herschel-Bulkley liquids and presets of such, with which
  * gs4_material has new members: checkpoints written before cannot be read. */

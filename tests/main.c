@@ -10,6 +10,7 @@
 #include "test_errors.c"
 #include "test_files.c"
 #include "test_stability.c"
+#include "test_density.c"
 #include "test_solid.c"
 #include "test_stress.c"
 #include "test_yield.c"
@@ -98,6 +99,7 @@ int main(int count, char **values)
     RUN(test_thickening);
     RUN(test_thickening_within_a_step);
     RUN(test_nozzle_from_outside);
+    run_density();
     RUN(test_order_as_printed);
     RUN(test_order_in_time);
     return test_finish();

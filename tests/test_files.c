@@ -1176,6 +1176,7 @@ static void test_files_forged(void)
             files_forge(to, data, bytes, offsetof(gs4i_head, time), &wrong[v], 8, "time");
             files_forge(to, data, bytes, offsetof(gs4i_head, last_dt), &wrong[v], 8, "last dt");
             files_forge(to, data, bytes, offsetof(gs4i_head, min_mass), &wrong[v], 8, "mass");
+            files_forge(to, data, bytes, offsetof(gs4i_head, max_mass), &wrong[v], 8, "heaviest");
             files_forge(to, data, bytes, offsetof(gs4i_head, top_speed), &wrong[v], 8, "speed");
             files_forge(to, data, bytes, offsetof(gs4i_head, shift), &wrong[v], 8, "shift");
             files_forge(to, data, bytes, offsetof(gs4i_head, limits.max_speed), &bad[v],

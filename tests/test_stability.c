@@ -437,7 +437,7 @@ static void test_stability_of_turning(void)
             for (later = 0; later < 2; later++) {
                 gs4_sim_desc d = scene_cube(8);
                 const gs4_material m = scene_liquid(1000, 0, 1e-3),
-                                   by_default = scene_liquid(1, 0, 0);
+                                   by_default = scene_liquid(1000, 0, 0);
                 const double turn = pow(10, w) * (w % 2 ? 1 : -1),
                              rim = fmax(far[i], sqrt(2) / 8) * fabs(turn);
                 gs4_collider c;
@@ -507,7 +507,8 @@ static void test_stability_by_hand(void)
         for (moves = 0; moves < 2; moves++) {
             const double v = moves ? 0.7 : 0;
             gs4_sim_desc d = scene_cube(8);
-            const gs4_material m = scene_liquid(1000, 0, 1e-3), by_default = scene_liquid(1, 0, 0);
+            const gs4_material m = scene_liquid(1000, 0, 1e-3),
+                               by_default = scene_liquid(1000, 0, 0);
             const gs4_fill f =
                 scene_fill(at(axis == 0 ? v : 0, axis == 1 ? v : 0, axis == 2 ? v : 0));
             gs4_collider c;

@@ -37,6 +37,7 @@ int main(int count, char **values)
     RUN_ONCE(test_column_at_rest);
     RUN(test_sound_speed);
     RUN_ONCE(test_drop_at_rest);
+    RUN_ONCE(test_noise_after_impact);
     RUN_SLOW(test_drop_impact);
     RUN_FULL(test_elastic_wave);
     RUN_FULL(test_channel_overshoot);

@@ -10,13 +10,15 @@ typedef struct ref_particle {
     double F[3][3], M[3][3];           /* solids: dF/dt = M F */
     double w[3], dw[3];                /* solids: spin, rad/s, and its rate */
     double s[3][3], ds[3][3];          /* Oldroyd-B: non-local stress and its rate */
-    double sub_grid[3];                /* V - v~ of this step */
+    double sub_grid[3], noise;         /* V - v~ of this step; how much faster it decays, 1/s */
+    double fades;                      /* of dJ/dt the decay, in the last step */
     double C[3][3];                    /* symplectic Euler: velocity gradient */
 } ref_particle;
 
 typedef struct ref_node {
     double m, v[3], f[3];   /* mass; momentum, then velocity; force, then acceleration */
     double ag[3];           /* the acceleration that it remembers */
+    double b;               /* sum w m (rho0 c0^2 / 7) (J~ - 1), then over m */
     int remembers, pressed; /* has an ag; material pressed on the separating wall here */
     int folds, mirrors;     /* bit a: folds along axis a; it does so at a wall, not a period */
 } ref_node;
@@ -25,7 +27,7 @@ typedef struct ref_sim {
     gs4_sim_desc d; /* as gs4_get_desc completes it */
     ref_particle *p;
     ref_node *node; /* of cells + 4 along each axis; two are behind each wall */
-    int count, restart, n[3];
+    int count, restart, solids, n[3];
     double h, shift, lightest, most_c0, least_rho, origin[3], g[3];
     double dt, alpha_m, alpha_f, gamma, ahead, s, before; /* of this step: ref_rule */
 } ref_sim;
@@ -273,6 +275,7 @@ static void ref_fold_forces(ref_sim *s)
                     mirror->pressed |= push > 0 && push > -0.1 * out * to->v[wall / 2] * mirror->m;
                 for (c = 0; c < 3 && pass != 1 && mirror->folds >> wall / 2 & 1; c++)
                     to->f[c] += ref_sign(s, wall, c) * mirror->f[c];
+                if (pass != 1 && mirror->folds >> wall / 2 & 1) to->b += mirror->b;
             }
 }
 
@@ -289,6 +292,7 @@ static void ref_fill(ref_sim *s)
                 mirror->v[c] = ref_sign(s, wall, c) * from->v[c];
                 mirror->f[c] = ref_sign(s, wall, c) * from->f[c];
             }
+            mirror->b = from->b;
             if (s->d.walls[wall] == GS4_WALL_PERIODIC) mirror->m = from->m;
         }
 }
@@ -315,7 +319,7 @@ static void ref_clear(ref_sim *s)
     int i, c;
     for (i = 0; i < ref_nodes(s); i++) {
         ref_node *n = &s->node[i];
-        n->m = 0;
+        n->m = n->b = 0;
         for (c = 0; c < 3; c++) n->v[c] = n->f[c] = 0;
         n->folds = n->mirrors = 0;
     }
@@ -340,19 +344,36 @@ static double ref_bound(double squared, double dt)
     return squared * dt * dt > 0.0625 ? 0.25 / (sqrt(squared) * dt) : 1;
 }
 
-/* k = 1 / flip_decay_time. Where k dt > 1 it is no rate: 1 - 1/(1 + s k) of V - v~ goes at once.
- * Else v fades at k (1 + x)/(1 + x + x^2), x = k dt (3 + r + q - r q)/(3.2 (1 - r q)), so that the
- * explicit (4) stays stable; w at k, implicit in itself. */
-static double ref_decay(const ref_sim *s, double *k, double *at_once)
+/* A rate k of decay as it is taken, so that the explicit (4) stays stable: k (1 + x)/(1 + x + x^2),
+ * x = k dt (3 + r + q - r q)/(3.2 (1 - r q)). */
+static double ref_stable(const ref_sim *s, double k)
 {
     const double r = (double)s->d.rho_inf, q = (double)s->d.rho_inf_spurious;
-    const double time = (double)s->d.flip_decay_time;
-    double x;
-    *k = time < 1e30 ? 1 / time : 0; /* INFINITY: none */
-    *at_once = *k * s->dt > 1 ? 1 - 1 / (1 + s->s * *k) : 0;
-    if (*at_once > 0) *k = 0;
-    x = *k * s->dt * (3 + r + q - r * q) / (3.2 * (1 - r * q));
-    return *k * (1 + x) / (1 + x + x * x);
+    const double x = k * s->dt * (3 + r + q - r * q) / (3.2 * (1 - r * q));
+    return k * (1 + x) / (1 + x + x * x);
+}
+
+/* k = 1 / flip_decay_time, 1/s; by default 1 / 0.5 s, and |V - v~|/h more. Where k dt > 1 it is no
+ * rate: 1 - 1/(1 + s k) of V - v~ goes at once. */
+static double ref_decay(const ref_sim *s, double *at_once)
+{
+    const double time = s->d.flip_decay_time == 0 ? 0.5 : (double)s->d.flip_decay_time;
+    const double k = time < 1e30 ? 1 / time : 0; /* INFINITY: none */
+    *at_once = k * s->dt > 1 ? 1 - 1 / (1 + s->s * k) : 0;
+    return *at_once > 0 ? 0 : k;
+}
+
+/* How much faster particles decay as noise. */
+static double ref_noise(const ref_sim *s, const double *d, double k)
+{
+    if (s->d.flip_decay_time != 0) return 0;
+    return ref_stable(s, k + sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / s->h)
+           - ref_stable(s, k);
+}
+
+static double ref_tait(const gs4_material *m)
+{
+    return (double)m->density * (double)m->sound_speed * (double)m->sound_speed / 7;
 }
 
 /* S7 for solids: M by (4) with grad u = L;  F <- (I - X/2)^-1 (I + X/2) F, X = dt (M + gamma dM),
@@ -400,14 +421,14 @@ static void ref_correct_stress(const ref_sim *s, ref_particle *p, double L[3][3]
         }
 }
 
-/* S7 for solids: dw/dt = curl(A - L L)/2 - k (w - curl u/2), the last implicit in w. */
+/* S7 for solids: dw/dt = curl(A - L L)/2 - k (w - curl u/2), the last implicit in w; k that
+ * of the sub-grid velocity. */
 static void ref_correct_spin(const ref_sim *s, ref_particle *p, double grad_acc[3][3],
                              double L[3][3])
 {
-    double k, at_once, seen, before, R;
+    double at_once, seen, before, R, k = ref_decay(s, &at_once) + p->noise;
     int c;
     if (p->is->solid != GS4_NEO_HOOKEAN) return;
-    ref_decay(s, &k, &at_once);
     for (c = 0; c < 3; c++) {
         const int y = (c + 1) % 3, z = (c + 2) % 3;
         seen = (L[z][y] - L[y][z]) / 2;
@@ -437,7 +458,7 @@ static void ref_restart(ref_sim *s)
     s->shift = 0;
     for (k = 0; k < s->count; k++) {
         ref_particle *p = &s->p[k];
-        p->dJ = 0;
+        p->dJ = p->fades = 0;
         memset(p->a, 0, sizeof p->a);
         memset(p->lag, 0, sizeof p->lag);
         memset(p->M, 0, sizeof p->M);

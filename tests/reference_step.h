@@ -40,28 +40,32 @@ static void ref_scatter(ref_sim *s)
     ref_velocities(s);
 }
 
-/* S4, S5: V = sum w v_i,  L~ = sum v_i (x) grad w,  J~ = J** + s J~ tr L~,  sigma there;
- * f_i = - sum J~ m / rho0 sigma grad w + sum w m g */
+/* S4, S5: V = sum w v_i,  L~ = sum v_i (x) grad w,  J~ = J** + s (J~ tr L~ + its last decay),
+ * sigma there;  f_i = - sum J~ m / rho0 sigma grad w + sum w m (g - noise (V - v~)),
+ * b_i = sum w m (rho0 c0^2/7) (J~ - 1) with J~ as predicted */
 static void ref_forces(ref_sim *s)
 {
     int k, i, c, a;
     for (k = 0; k < s->count; k++) {
         ref_particle *p = &s->p[k];
-        double x[3], V[3], L[3][3], sigma[3][3], J;
+        double x[3], V[3], L[3][3], sigma[3][3], J, at_once;
         ref_stencil t;
         for (c = 0; c < 3; c++) x[c] = p->x[c] + s->ahead * p->move[c];
         ref_weights(s, x, &t);
         ref_gather(&t, REF_VELOCITY, V, L);
         for (c = 0; c < 3; c++) p->sub_grid[c] = V[c] - (p->v[c] + s->ahead * p->a[c]);
-        J = (p->J + s->before * p->dJ) / (1 - s->s * ref_trace(L));
+        p->noise = ref_noise(s, p->sub_grid, ref_decay(s, &at_once));
+        J = (p->J + s->before * p->dJ + s->s * p->fades) / (1 - s->s * ref_trace(L));
         ref_stress(s, p, L, J, sigma);
-        for (i = 0; i < 27; i++)
+        for (i = 0; i < 27; i++) {
             for (c = 0; c < 3; c++) {
                 double pull = 0;
                 for (a = 0; a < 3; a++) pull += sigma[c][a] * t.dw[i][a];
-                t.node[i]->f[c] +=
-                    t.w[i] * p->m * s->g[c] - J * p->m / (double)p->is->density * pull;
+                t.node[i]->f[c] += t.w[i] * p->m * (s->g[c] - p->noise * p->sub_grid[c])
+                                   - J * p->m / (double)p->is->density * pull;
             }
+            t.node[i]->b += t.w[i] * p->m * ref_tait(p->is) * (p->J + s->ahead * p->dJ - 1);
+        }
     }
     ref_fold_forces(s);
 }
@@ -76,6 +80,7 @@ static void ref_accelerate(ref_sim *s)
         ref_node *n = &s->node[i];
         const double filled = n->m / (s->least_rho * s->h * s->h * s->h);
         const double part = s->restart ? 1 : ref_smooth((filled - 0.1) * 3);
+        n->b *= n->m > s->lightest ? 1 / n->m : 0;
         for (c = 0; c < 3; c++) {
             n->f[c] *= n->m > s->lightest ? 1 / n->m : 0;
             if (s->restart || !n->remembers) n->ag[c] = s->restart ? 0 : n->f[c];
@@ -87,17 +92,29 @@ static void ref_accelerate(ref_sim *s)
     ref_fill(s);
 }
 
-/* S7: A = sum w acc_i, U = sum w u_i, L = grad u;  by (4) dx/dt = U,  dJ/dt = J tr L implicit in J,
- * dv/dt = A + fade (V - v~) + near (U - v), the last implicit in v: c0/h times the weight of mirror
- * nodes, and in spray, whose nodes are filled by less than 8 % (none from 20 %), once more. */
+/* dJ/dt where noise decays by itself and nothing is solid: k (B - J~), B = 1 + sum w b_i / (rho0
+ * c0^2/7), k = noise + c0 |B - J~| / h - g / c0, the difference at least 0. */
+static double ref_volume_decay(const ref_sim *s, const ref_particle *p, double b)
+{
+    const double d = b / ref_tait(p->is) - (p->J + s->ahead * p->dJ - 1);
+    const double g = sqrt(s->g[0] * s->g[0] + s->g[1] * s->g[1] + s->g[2] * s->g[2]);
+    if (s->d.flip_decay_time != 0 || s->solids) return 0;
+    return ref_stable(s, p->noise + fmax(0, s->most_c0 * fabs(d) / s->h - g / s->most_c0)) * d;
+}
+
+/* S7: A = sum w acc_i, U = sum w u_i, L = grad u;  by (4) dx/dt = U,  dJ/dt = J tr L, implicit in
+ * J, and its decay,  dv/dt = A + (fade + noise) (V - v~) + near (U - v), the last implicit in v:
+ * c0/h times the weight of mirror nodes, and in spray, whose nodes are filled by less than 8 %
+ * (none from 20 %), once more. */
 static void ref_correct_particles(ref_sim *s)
 {
-    double k, at_once;
-    const double fade = ref_decay(s, &k, &at_once), shift = (s->gamma - 0.5) * s->dt;
+    double at_once;
+    const double fade = ref_stable(s, ref_decay(s, &at_once)), shift = (s->gamma - 0.5) * s->dt;
     int n, i, c;
     for (n = 0; n < s->count; n++) {
         ref_particle *p = &s->p[n];
-        double x[3], U[3], A[3], L[3][3], grad_acc[3][3], near, R, filled = 0, mirrors = 0;
+        double x[3], U[3], A[3], L[3][3], grad_acc[3][3], near, R, filled = 0, mirrors = 0, b = 0,
+                                                                   fades;
         ref_stencil t;
         for (c = 0; c < 3; c++) x[c] = p->x[c] + s->ahead * p->move[c];
         ref_weights(s, x, &t);
@@ -106,17 +123,21 @@ static void ref_correct_particles(ref_sim *s)
         for (i = 0; i < 27; i++) {
             filled += t.w[i] * t.node[i]->m / (s->least_rho * s->h * s->h * s->h);
             mirrors += t.w[i] * t.node[i]->mirrors;
+            b += t.w[i] * t.node[i]->b;
         }
         near = (mirrors + 1 - ref_smooth((filled - 0.08) / 0.12)) * s->most_c0 / s->h;
         for (c = 0; c < 3; c++) {
-            R = A[c] + fade * p->sub_grid[c] + near * (U[c] - p->v[c] - s->before * p->a[c]);
+            R = A[c] + (fade + p->noise) * p->sub_grid[c]
+                + near * (U[c] - p->v[c] - s->before * p->a[c]);
             ref_correct(s, R / (1 + s->s * near), &p->v[c], &p->a[c]);
             p->v[c] += at_once * p->sub_grid[c];
             ref_correct(s, U[c], &p->x[c], &p->move[c]);
             p->lag[c] = ref_half(p->v[c] - p->move[c] - shift * p->a[c]);
         }
-        R = (p->J + s->before * p->dJ) / (1 - s->s * ref_trace(L)) * ref_trace(L);
-        ref_correct(s, R, &p->J, &p->dJ);
+        fades = ref_volume_decay(s, p, b);
+        R = (p->J + s->before * p->dJ + s->s * fades) / (1 - s->s * ref_trace(L)) * ref_trace(L);
+        ref_correct(s, R + fades, &p->J, &p->dJ);
+        p->fades = ref_half(fades);
         ref_correct_deformation(s, p, L);
         ref_correct_stress(s, p, L);
         ref_correct_spin(s, p, grad_acc, L);

@@ -87,8 +87,8 @@ static void order_case(double rho, double spurious, double decay)
     CHECK_BETWEEN(J, 1.92, most);
 }
 
-/* All kinds of members of the family, without decay and with one as long as half the run; in quick
- * runs every other one, with and without in turn. */
+/* All kinds of members of the family, without decay, with one as long as half the run, and by
+ * default; in quick runs every other one, with and without in turn, and one by default. */
 static void test_order_in_time(void)
 {
     static const double members[7][2] = { { 0, 0 },   { 0.5, 0 },   { 0.5, 0.5 }, { 1, 0 },
@@ -101,6 +101,7 @@ static void test_order_in_time(void)
             if ((test_full && !sharp) || i % 4 < 2)
                 order_case(members[i][0], members[i][1], (double)INFINITY);
             if ((test_full && !sharp) || i % 4 > 1) order_case(members[i][0], members[i][1], 0.2);
+            if (test_full || i == 2) order_case(members[i][0], members[i][1], 0);
             scene_sharp = 0;
         }
 }

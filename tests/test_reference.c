@@ -189,6 +189,7 @@ static void reference_begin(const reference_scene *c, gs4_sim *sim, const gs4_ma
     r->d = gs4_get_desc(sim);
     r->h = (double)r->d.cell_size;
     r->restart = 1;
+    r->solids = c->solid > 0;
     r->least_rho = HUGE_VAL;
     for (i = 0; i < 1 + (c->solid > 0) + (c->oldroyd != 0); i++) {
         r->least_rho = fmin(r->least_rho, (double)m[i].density);

@@ -787,6 +787,64 @@ static void test_errors_log(void)
     CHECK(gs4_create(&d, &sim) == GS4_ERROR_ARGUMENT && seen[2] == 4);
 }
 
+/* A round emitter that begins at a wall is within the grid: not a word. */
+static void test_errors_log_of_emitters(void)
+{
+    gs4_sim_desc d = err_desc();
+    const gs4_material m = err_material();
+    int seen[4] = { 0, 0, 0, 0 }, a;
+    d.log = err_log;
+    d.log_user = seen;
+    for (a = 0; a < 3; a++) {
+        gs4_emitter e;
+        gs4_sim *sim;
+        memset(&e, 0, sizeof e);
+        e.shape = gs4_cylinder(at(a == 0 ? 0.01 : 0.5, a == 1 ? 0.01 : 0.5, a == 2 ? 0.01 : 0.5),
+                               at(a == 0 ? 0.3 : 0.5, a == 1 ? 0.3 : 0.5, a == 2 ? 0.3 : 0.5),
+                               (gs4_real)0.25);
+        e.fill = scene_fill(at(a == 0, a == 1, a == 2));
+        CHECK(gs4_create(&d, &sim) == GS4_OK && gs4_add_material(sim, &m) == 0);
+        CHECK_RESULT(sim, gs4_add_emitter(sim, &e), 0);
+        CHECK(seen[1] == 0 && seen[2] == 0);
+        gs4_destroy(sim);
+    }
+}
+
+static gs4_real err_thickening(gs4_real T, gs4_real rate, void *user)
+{
+    const double *most = (const double *)user;
+    (void)T;
+    return (gs4_real)(rate > 0 ? *most : 0.1);
+}
+
+/* A step that gs4_advance takes a second time, shorter, is no error; one that it gives up is one,
+ * not eight. */
+static void test_errors_log_of_retries(void)
+{
+    double most = 1e3;
+    gs4_material m = err_material();
+    gs4_sim_desc d = err_desc();
+    const gs4_fill f = scene_fill(at(0, 0, 0));
+    gs4_sim *sim;
+    int seen[4] = { 0, 0, 0, 0 };
+    d.log = err_log;
+    d.log_user = seen;
+    d.gravity = at(0, -10, 0);
+    m.viscosity_law = GS4_VISCOSITY_CALLBACK;
+    m.viscosity_fn = err_thickening;
+    m.viscosity_user = &most;
+    CHECK(gs4_create(&d, &sim) == GS4_OK && gs4_add_material(sim, &m) == 0);
+    CHECK(gs4_add_particles(sim, gs4_box(at(0.25, 0.25, 0.25), at(0.5, 0.5, 0.5)), &f) > 0);
+    gs4_set_gravity(sim, at(INFINITY, 0, 0));
+    CHECK(seen[2] == 1);
+    CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)0.02), GS4_OK);
+    CHECK(seen[2] == 1 && strstr(gs4_last_error(sim), "gravity"));
+    most = -1;
+    CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)0.02), GS4_ERROR_UNSTABLE);
+    CHECK(seen[2] == 2 && strstr(gs4_last_error(sim), "viscosity"));
+    gs4_destroy(sim);
+}
+
 /* --- shapes ----------------------------------------------------------------------------------- */
 
 static gs4_real err_bad_sdf(gs4_vec3 p, void *user)
@@ -1709,6 +1767,18 @@ static void test_errors_distances(void)
                                                       along * e[2] + across * u[2])),
                     expected, tiny);
     }
+    for (i = 0; i < 3; i++) { /* a cylinder along an axis has no width beyond its ends */
+        const gs4_shape along =
+            gs4_cylinder(at(0, 0, 0), at(i == 0, i == 1, i == 2), (gs4_real)0.5);
+        gs4i_shape_bounds(&along, &low, &high);
+        CHECK(low.x == (gs4_real)(i == 0 ? 0 : -0.5) && high.x == (gs4_real)(i == 0 ? 1 : 0.5));
+        CHECK(low.y == (gs4_real)(i == 1 ? 0 : -0.5) && high.y == (gs4_real)(i == 1 ? 1 : 0.5));
+        CHECK(low.z == (gs4_real)(i == 2 ? 0 : -0.5) && high.z == (gs4_real)(i == 2 ? 1 : 0.5));
+    }
+    gs4i_shape_bounds(&cylinder, &low, &high); /* 1.5 e and 0.25 sqrt(1 - e^2) */
+    CHECK_CLOSE(low.x, -0.25 * sqrt(5.0) / 3, tiny);
+    CHECK_CLOSE(low.y, -0.5 - 0.25 * sqrt(8.0) / 3, tiny);
+    CHECK_CLOSE(high.z, 1 + 0.25 * sqrt(5.0) / 3, tiny);
     {
         const gs4_shape ball = gs4_sphere(at(1, 2, 3), (gs4_real)0.5);
         gs4i_shape_bounds(&ball, &low, &high);
@@ -2259,6 +2329,8 @@ static void run_errors(void)
     RUN(test_errors_half_hooks);
     RUN(test_errors_strings);
     RUN(test_errors_log);
+    RUN(test_errors_log_of_retries);
+    RUN(test_errors_log_of_emitters);
     RUN(test_errors_shapes);
     RUN_ONCE(test_errors_sdf);
     RUN(test_errors_mesh);

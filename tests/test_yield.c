@@ -412,6 +412,96 @@ static void test_yield_stands(void)
     gs4_destroy(sim);
 }
 
+/* --- slumps ----------------------------------------------------------------------------------- */
+
+/* Where a plane slump stops: the depth h at the distance x from its front, of s = yield stress over
+ * rho g. The floor bears the yield stress, and the plug above is drawn out: 2 sqrt(yield^2 -
+ * shear^2), pi/2 s h over the depth. Together s = (h - pi s/2) dh/dx, h^2/2 - (pi s/2) h = s x. The
+ * shallow limit is h = sqrt(2 s x). */
+static double yield_depth(double s, double x)
+{
+    const double a = acos(0.0) * s;
+    return fmin(a + sqrt(a * a + 2 * s * x), 1);
+}
+
+/* Its length, from the volume under it. Where the depth would be above 1 nothing flows. */
+static double yield_run_out(double s, double volume)
+{
+    const double dx = 1e-4;
+    double x = 0;
+    for (; volume > 0; x += dx) volume -= yield_depth(s, x + dx / 2) * dx;
+    return x;
+}
+
+/* A dam of the height 1 and the length given against a slip wall, on a sticky floor, g = 1: front,
+ * depth at the wall, and the mean difference from the final depth over the height. */
+typedef struct yield_slump {
+    double front, wall, error;
+} yield_slump;
+
+static yield_slump yield_slump_after(const gs4_material *m, int high, int length, double t)
+{
+    const double s = (double)m->herschel_bulkley.yield_stress, end = yield_run_out(s, length),
+                 h = 1.0 / high;
+    gs4_sim_desc d = scene_cube(high);
+    const gs4_fill f = scene_fill(at(0, 0, 0));
+    double depth[400];
+    yield_slump q = { 0, 0, 0 };
+    gs4_view x;
+    gs4_sim *sim;
+    int i;
+    d.cells[0] = (int)(1.2 * end * high);
+    d.cells[1] = high + 4;
+    d.cells[2] = 4;
+    d.walls[2] = GS4_WALL_STICK;
+    d.gravity = at(0, -1, 0);
+    d.cfl = (gs4_real)0.9;
+    sim = physics_create(&d, m);
+    CHECK(gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(length, 1, 1)), &f) > 0);
+    CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)t), GS4_OK);
+    x = gs4_particles(sim, GS4_FIELD_POSITION);
+    memset(depth, 0, sizeof depth);
+    for (i = 0; i < x.count; i++) {
+        const double place = (double)x.data[i * x.stride];
+        q.front = fmax(q.front, place);
+        depth[(int)(place / h)] += length / (x.count * h);
+    }
+    q.wall = (depth[0] + depth[1] + depth[2]) / 3;
+    for (i = 0; i < d.cells[0]; i++) {
+        const double from_front = end - (i + 0.5) * h;
+        q.error += fabs(depth[i] - (from_front > 0 ? yield_depth(s, from_front) : 0)) * h / length;
+    }
+    if (test_filter[0])
+        printf("slump, yield stress %.3f: front %.3f, due %.3f (shallow %.3f), depth at the wall "
+               "%.3f, due %.3f (shallow %.3f), shape within %.1f %%, %llu steps\n",
+               s, q.front, end, pow(1.5 * length / sqrt(2 * s), 2.0 / 3), q.wall,
+               yield_depth(s, end), sqrt(2 * s * pow(1.5 * length / sqrt(2 * s), 2.0 / 3)),
+               100 * q.error, (unsigned long long)gs4_get_stats(sim).steps);
+    gs4_destroy(sim);
+    return q;
+}
+
+/* One whose back does not yield, and a longer one that yields everywhere. When they have all but
+ * stopped they are where they should stop, and creep on from there. */
+static void test_yield_slump(void)
+{
+    gs4_material m = yield_material(0.15, 1, 0.01);
+    yield_slump q;
+    m.herschel_bulkley.consistency = (gs4_real)0.2;
+    q = yield_slump_after(&m, 8, 2, 6);
+    CHECK_CLOSE(q.front / yield_run_out(0.15, 2), 1, 0.05);
+    CHECK_CLOSE(q.wall, 1, 0.02);
+    CHECK(q.error < 0.08);
+    if (!test_slow) return;
+    m.herschel_bulkley.yield_stress = (gs4_real)(0.2 / 3);
+    m.herschel_bulkley.consistency = (gs4_real)0.1;
+    m.herschel_bulkley.creep_rate = (gs4_real)0.005;
+    q = yield_slump_after(&m, 8, 3, 16);
+    CHECK_CLOSE(q.front / yield_run_out(0.2 / 3, 3), 1, 0.03);
+    CHECK_CLOSE(q.wall / yield_depth(0.2 / 3, yield_run_out(0.2 / 3, 3)), 1, 0.03);
+    CHECK(q.error < 0.1);
+}
+
 /* --- presets ---------------------------------------------------------------------------------- */
 
 /* The stress at a rate (1/s) that each is said to have. Ketchup: 0.4 Pa s at 236 1/s; yoghurt:
@@ -581,5 +671,6 @@ static void run_yield(void)
     RUN_ONCE(test_yield_stands);
     RUN_FULL(test_yield_regularised);
     RUN_FULL(test_yield_channel);
+    RUN_FULL(test_yield_slump);
     RUN(test_yield_presets);
 }

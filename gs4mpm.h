@@ -349,12 +349,13 @@
  *
  * MEMORY. GS4: 65 bytes a particle in float (position, velocity, J and their rates, mass, id,
  * material, and 4 for sorting), 16 more unless flip_decay_time is INFINITY, 49 a cell near material
- * (sharp_gradients: 69), 16 more near walls and colliders, 4 per 64 cells of the domain; 276
- * (double: 536) more for each particle within 8 cells of a sticky collider, and 20 (double: 40) a
- * cell there where it is not flat. Symplectic Euler: 89 and 33. A scene with a viscoelastic liquid:
- * 48 more a particle (Euler 24). With a solid: 96 more (Euler 36). With heat: 17 more a particle,
- * 32 more with a flux_relaxation_time, 16 (or 32) a cell near material, and about 150 a cell of the
- * box around all material, where the solver works.
+ * (sharp_gradients: 69), 16 more near walls and colliders, 4 per 64 cells of the domain; 36
+ * (double: 64) more for each particle within 8 cells of a sticky collider, 260 (double: 508) for
+ * each with an image, within three cells, and 20 (double: 40) a cell where such a collider is not
+ * flat. Symplectic Euler: 89 and 33. A scene with a viscoelastic liquid: 48 more a particle (Euler
+ * 24). With a solid: 96 more (Euler 36). With heat: 17 more a particle, 32 more with a
+ * flux_relaxation_time, 16 (or 32) a cell near material, and about 150 a cell of the box around all
+ * material, where the solver works.
  * A mesh: about 400 (double 800) per cell face of its surface in the domain or within 10 cells of
  * it; where that is more than 1 GB it is refused. Its distance is sampled twice a cell within three
  * cells of the surface. A mesh that moves is sampled anew now and then, but for one that takes less
@@ -9083,7 +9084,18 @@ typedef struct gs4i_collider {
     int *bad_distance; /* of the simulation: set where the shape's function gives no number */
 } gs4i_collider;
 
-/* A particle before a sticky collider and its image behind it: gs4i_place_image_particle. */
+/* A particle of a block near sticky bodies. */
+typedef struct gs4i_near_particle {
+    /* how far it is from the nearest body, how far that bends away from a half space, see
+     * gs4i_sample_patch, and its normal; before the step it is farther than `room` from all */
+    gs4_real d, bend, n[3], room;
+    int32_t body; /* the nearest, -1: none is within three cells */
+    /* the first node that it sees in the tile of its block; number of its image, or GS4I_NO_IMAGE,
+     * GS4I_HOLDS_NODES */
+    int32_t base, image;
+} gs4i_near_particle;
+
+/* The image of a particle behind the surface of a sticky collider: gs4i_place_image_particle. */
 typedef struct gs4i_image_particle {
     /* place and mass; normal of the surface; the body's velocity at its foot and angular
      * velocity */
@@ -9096,11 +9108,7 @@ typedef struct gs4i_image_particle {
     gs4_real carried[4][4];
     /* from them: velocity and acceleration, value and columns of the gradient */
     gs4_real seen[2][4][4];
-    /* how far the particle is from the nearest body, and how far that bends away from a half space,
-     * see gs4i_sample_patch; before the step it is farther than `room` from all of them */
-    gs4_real d, bend, room;
-    int body;              /* the nearest one, -1: none is near */
-    int kind, whole, slot; /* GS4I_IMAGE_*; all its nodes exist; block of x */
+    int whole, slot; /* all its nodes exist; block of x */
 } gs4i_image_particle;
 
 /* The nodes of a slot near a sticky body where it is not flat, with four numbers each, of which two
@@ -9120,10 +9128,11 @@ typedef struct gs4i_patches {
 } gs4i_patches;
 
 typedef struct gs4i_image_particles {
-    /* one for each particle of the blocks near sticky bodies; 0: there are none */
-    int count;
-    /* gs4i_image_particle; per occupied block: its first one, or -1 (int32_t) */
-    gs4i_scratch all, of;
+    /* particles of the blocks near sticky bodies, 0: there are none; images */
+    int near, count;
+    /* gs4i_near_particle; per occupied block: its first one, or -1 (int32_t); gs4i_image_particle;
+     * per occupied block its first one, and one more at the end (int32_t) */
+    gs4i_scratch of_particles, of, all, first_of;
     /* int32_t: sorted by slot; per slot, where it begins; slots that have some, by colour */
     gs4i_scratch order, first, slots;
     int colour_first[9];
@@ -11173,16 +11182,14 @@ static void gs4i_begin_response(gs4i_response *r, const gs4_sim *sim, const gs4i
  * fill the space before it. Where it is too thin or too crooked for images, nodes are held:
  * gs4i_collider_hold. */
 
-/* What becomes of a particle near a sticky collider: nothing, an image, or held nodes. */
+/* What becomes of a particle near a sticky collider that has no image: nothing, or held nodes. */
 enum {
-    GS4I_NO_IMAGE,
-    GS4I_HAS_IMAGE,
-    GS4I_HOLDS_NODES
+    GS4I_NO_IMAGE = -1,
+    GS4I_HOLDS_NODES = -2
 };
 
-/* What is scattered; first of all marks. */
+/* What is scattered. */
 enum {
-    GS4I_IMAGE_MARKS,
     GS4I_IMAGE_MOMENTUM,
     GS4I_IMAGE_AFFINE,
     GS4I_IMAGE_FORCE
@@ -11463,7 +11470,7 @@ static void gs4i_load_patches(const gs4_sim *sim, int collider, int o, gs4_real 
 
 /* A particle is near body number `collider`, by what it has of the numbers of a patch. */
 static void gs4i_meet_particle(const gs4_sim *sim, int collider, const gs4_real four[4], gs4_vec3 n,
-                               gs4i_image_particle *g)
+                               gs4i_near_particle *g)
 {
     const gs4_real h = sim->grid.h,
                    /* thin bodies lie between nodes */
@@ -11479,7 +11486,7 @@ static void gs4i_meet_particle(const gs4_sim *sim, int collider, const gs4_real 
 }
 
 /* How far the particles of occupied block o are from a body. */
-static void gs4i_meet_body(const gs4_sim *sim, int collider, int o, gs4i_image_particle *g)
+static void gs4i_meet_body(const gs4_sim *sim, int collider, int o, gs4i_near_particle *g)
 {
     const gs4i_grid *grid = &sim->grid;
     const gs4i_frame frame = gs4i_tile_frame(grid, grid->occupied_block[o]);
@@ -11504,7 +11511,8 @@ static void gs4i_meet_body(const gs4_sim *sim, int collider, int o, gs4i_image_p
         for (b = 0; b < n; b++, g++) {
             gs4i_row w, dw;
             gs4_vec3 slope;
-            if (s.base[b] < 0) continue; /* it will be sorted first */
+            g->base = s.base[b];
+            if (g->base < 0) continue; /* it will be sorted first */
             if (kind == GS4I_SURFACE_FLAT) {
                 const gs4_vec3 p =
                     gs4i_vec3(GS4I_NTH(x[0], b), GS4I_NTH(x[1], b), GS4I_NTH(x[2], b));
@@ -11521,22 +11529,103 @@ static void gs4i_meet_body(const gs4_sim *sim, int collider, int o, gs4i_image_p
     }
 }
 
-/* The image of a particle at p. It can be had where the body is flat and thick enough: a point
- * one and a half cells behind the surface is as deep in the body, within a quarter of a cell. */
-static void gs4i_place_image_particle(const gs4_sim *sim, gs4_vec3 p, gs4i_image_particle *g)
+/* Where a point at p is reflected to. */
+GS4I_INLINE gs4_vec3 gs4i_reflected(const gs4i_near_particle *g, gs4_vec3 p)
 {
-    const gs4_real h = sim->grid.h, d = g->d;
-    gs4_vec3 n = gs4i_vec3(g->n[0], g->n[1], g->n[2]), foot, image, v;
-    const gs4_real length = gs4i_length(n);
-    const gs4i_collider *collider;
-    g->kind = GS4I_NO_IMAGE;
-    g->whole = 0;
+    const gs4_vec3 down = gs4i_scale(gs4i_vec3(g->n[0], g->n[1], g->n[2]), g->d);
+    return gs4i_sub(gs4i_sub(p, down), down);
+}
+
+/* Slot that the image of a particle at p is given to, or -1. A tile has room for a cell around its
+ * block. */
+static int gs4i_slot_of_image(const gs4i_grid *grid, const gs4i_near_particle *g, gs4_vec3 p)
+{
+    const gs4_vec3 at = gs4i_reflected(g, p);
+    const gs4_real image[3] = { at.x, at.y, at.z },
+                   nearer[3] = { at.x + grid->h * g->n[0], at.y + grid->h * g->n[1],
+                                 at.z + grid->h * g->n[2] };
+    const int slot = gs4i_slot_at(grid, image);
+    return slot < 0 ? gs4i_slot_at(grid, nearer) : slot;
+}
+
+/* Has a particle at p an image? It can be had where the body is flat and thick enough: a point one
+ * and a half cells behind the surface is as deep in the body, within a quarter of a cell. It is 0
+ * then for now. */
+static void gs4i_seek_image(const gs4i_grid *grid, gs4_vec3 p, gs4i_near_particle *g)
+{
+    const gs4_real h = grid->h, length = gs4i_length(gs4i_vec3(g->n[0], g->n[1], g->n[2]));
+    int c;
+    g->image = GS4I_NO_IMAGE;
     if (g->body < 0 || !(length > 0)) return;
-    collider = &sim->boundary.colliders[g->body];
-    n = gs4i_scale(n, 1 / length);
-    foot = gs4i_sub(p, gs4i_scale(n, d));
-    image = gs4i_sub(foot, gs4i_scale(n, d));
-    v = gs4i_collider_velocity(collider, foot);
+    for (c = 0; c < 3; c++) g->n[c] *= 1 / length;
+    if (g->d > -GS4I_C(0.5) * h && gs4i_abs(g->bend) < GS4I_IMAGE_BEND * h) {
+        if (gs4i_slot_of_image(grid, g, p) >= 0) g->image = 0;
+    } else if (g->d < (GS4I_STICKY_REACH + GS4I_IMAGE_NODES) * h)
+        /* farther away it sees next to nothing of nodes that would be held */
+        g->image = GS4I_HOLDS_NODES;
+}
+
+/* Particles of one block and their images; particle NULL where it is near no sticky body. */
+typedef struct gs4i_near_particles {
+    gs4i_near_particle *particle;
+    gs4i_image_particle *images; /* all */
+} gs4i_near_particles;
+
+GS4I_INLINE gs4i_near_particles gs4i_near_particles_of(const gs4_sim *sim, int o)
+{
+    const gs4i_image_particles *g = &sim->image_particles;
+    gs4i_near_particles near;
+    near.particle = NULL;
+    near.images = (gs4i_image_particle *)g->all.data;
+    if (g->near && ((const int32_t *)g->of.data)[o] >= 0)
+        near.particle =
+            (gs4i_near_particle *)g->of_particles.data + ((const int32_t *)g->of.data)[o];
+    return near;
+}
+
+/* Where the surface is from the particles of a block, which of them have images, and how many. */
+static void gs4i_find_near_particles(int index, void *context)
+{
+    const gs4_sim *sim = ((const gs4i_pass *)context)->sim;
+    const gs4i_grid *grid = &sim->grid;
+    gs4i_near_particle *g = gs4i_near_particles_of(sim, index).particle;
+    size_t i = (size_t)grid->first[index], end = (size_t)grid->first[index + 1];
+    int32_t *count = (int32_t *)sim->image_particles.first_of.data + index;
+    int k;
+    *count = 0;
+    if (!g) return;
+    for (k = 0; k < (int)(end - i); k++) {
+        g[k].d = g[k].room = GS4I_IMAGE_REACH * grid->h;
+        g[k].body = g[k].base = -1;
+    }
+    for (k = 0; k < sim->boundary.collider_count; k++)
+        if (gs4i_is_sticky(&sim->boundary.colliders[k])) gs4i_meet_body(sim, k, index, g);
+    for (; i < end; i += GS4I_BATCH) {
+        const int n = gs4i_batch_size(i, end);
+        gs4i_batch q;
+        gs4i_lanes x[3];
+        int b;
+        gs4i_load_batch(&sim->particles, i, n, sim->integrator.prediction, &q);
+        gs4i_predict_positions(&q, sim->integrator.prediction, x);
+        for (b = 0; b < n; b++, g++) {
+            const gs4_vec3 at = gs4i_vec3(GS4I_NTH(x[0], b), GS4I_NTH(x[1], b), GS4I_NTH(x[2], b));
+            g->room -= gs4i_length(gs4i_sub(
+                at, gs4i_vec3(GS4I_NTH(q.x[0], b), GS4I_NTH(q.x[1], b), GS4I_NTH(q.x[2], b))));
+            gs4i_seek_image(grid, at, g);
+            *count += g->image >= 0;
+        }
+    }
+}
+
+/* The image of a particle at p. */
+static void gs4i_place_image_particle(const gs4_sim *sim, gs4_vec3 p,
+                                      const gs4i_near_particle *near, gs4i_image_particle *g)
+{
+    const gs4i_collider *collider = &sim->boundary.colliders[near->body];
+    const gs4_real d = near->d;
+    const gs4_vec3 n = gs4i_vec3(near->n[0], near->n[1], near->n[2]),
+                   foot = gs4i_sub(p, gs4i_scale(n, d)), image = gs4i_reflected(near, p),
+                   v = gs4i_collider_velocity(collider, foot);
     g->x[0] = image.x;
     g->x[1] = image.y;
     g->x[2] = image.z;
@@ -11550,31 +11639,8 @@ static void gs4i_place_image_particle(const gs4_sim *sim, gs4_vec3 p, gs4i_image
     g->spin[1] = collider->is.angular_velocity.y;
     g->spin[2] = collider->is.angular_velocity.z;
     g->share = gs4i_max(gs4i_min(GS4I_IMAGE_NODES - d * sim->grid.inv_h, 1), 0);
-    if (d > -GS4I_C(0.5) * h && gs4i_abs(g->bend) < GS4I_IMAGE_BEND * h) {
-        const gs4_real nearer[3] = { image.x + h * n.x, image.y + h * n.y, image.z + h * n.z };
-        g->slot = gs4i_slot_at(&sim->grid, g->x);
-        /* a tile has room for a cell around its block */
-        if (g->slot < 0) g->slot = gs4i_slot_at(&sim->grid, nearer);
-        if (g->slot >= 0) g->kind = GS4I_HAS_IMAGE;
-        return;
-    }
-    /* of nodes that would be held it sees next to nothing */
-    if (d > (GS4I_STICKY_REACH + GS4I_IMAGE_NODES) * h) return;
-    g->x[0] = p.x;
-    g->x[1] = p.y;
-    g->x[2] = p.z;
-    g->slot = gs4i_slot_at(&sim->grid, g->x);
-    if (g->slot >= 0) g->kind = GS4I_HOLDS_NODES;
-}
-
-/* The image particles of occupied block o, NULL where it is near no sticky body; that of its
- * particle i is the (i - first)th. */
-GS4I_INLINE gs4i_image_particle *gs4i_image_particles_of(const gs4_sim *sim, int o)
-{
-    const gs4i_image_particles *g = &sim->image_particles;
-    return g->count && ((const int32_t *)g->of.data)[o] >= 0
-               ? (gs4i_image_particle *)g->all.data + ((const int32_t *)g->of.data)[o]
-               : NULL;
+    g->whole = 0;
+    g->slot = gs4i_slot_of_image(&sim->grid, near, p);
 }
 
 /* Columns of spin x (I - n n), how the body's velocity changes along its surface. */
@@ -11599,7 +11665,7 @@ static void gs4i_reflect_spin(gs4i_image_particle *g, const gs4_real own[6], gs4
                             own[2] + ahead * own[5] };
     gs4_real turn[3][3];
     int a, c;
-    if (!g->kind || (w[0] == 0 && w[1] == 0 && w[2] == 0)) return;
+    if (w[0] == 0 && w[1] == 0 && w[2] == 0) return;
     gs4i_surface_spin(g, turn);
     for (a = 0; a < 3; a++) {
         gs4_real e[3] = { 0, 0, 0 };
@@ -11617,29 +11683,23 @@ static void gs4i_place_image_particles(int index, void *context)
     gs4_sim *sim = ((const gs4i_pass *)context)->sim;
     const gs4i_particles *p = &sim->particles;
     const gs4_real ahead = sim->integrator.prediction.ahead;
-    gs4i_image_particle *g = gs4i_image_particles_of(sim, index);
+    gs4i_near_particle *near = gs4i_near_particles_of(sim, index).particle;
+    const int32_t *first_of = (const int32_t *)sim->image_particles.first_of.data + index;
+    gs4i_image_particle *g = (gs4i_image_particle *)sim->image_particles.all.data + *first_of;
+    int32_t number = *first_of;
     size_t i = (size_t)sim->grid.first[index], end = (size_t)sim->grid.first[index + 1];
-    int k;
-    if (!g) return;
-    for (k = 0; k < (int)(end - i); k++) {
-        g[k].d = g[k].room = GS4I_IMAGE_REACH * sim->grid.h;
-        g[k].body = -1;
-    }
-    for (k = 0; k < sim->boundary.collider_count; k++)
-        if (gs4i_is_sticky(&sim->boundary.colliders[k])) gs4i_meet_body(sim, k, index, g);
-    for (; i < end; i += GS4I_BATCH) {
+    for (; i < end && number < first_of[1]; i += GS4I_BATCH) {
         const int n = gs4i_batch_size(i, end);
         gs4i_batch q;
         gs4i_lanes x[3];
         int b, c;
         gs4i_load_batch(p, i, n, sim->integrator.prediction, &q);
         gs4i_predict_positions(&q, sim->integrator.prediction, x);
-        for (b = 0; b < n; b++, g++) {
-            const gs4_vec3 at = gs4i_vec3(GS4I_NTH(x[0], b), GS4I_NTH(x[1], b), GS4I_NTH(x[2], b)),
-                           before = gs4i_vec3(GS4I_NTH(q.x[0], b), GS4I_NTH(q.x[1], b),
-                                              GS4I_NTH(q.x[2], b));
-            g->room -= gs4i_length(gs4i_sub(at, before));
-            gs4i_place_image_particle(sim, at, g);
+        for (b = 0; b < n; b++, near++) {
+            if (near->image < 0) continue;
+            near->image = number++;
+            gs4i_place_image_particle(
+                sim, gs4i_vec3(GS4I_NTH(x[0], b), GS4I_NTH(x[1], b), GS4I_NTH(x[2], b)), near, g);
             g->x[3] = GS4I_NTH(q.x[3], b);
             memset(g->carried, 0, sizeof g->carried);
             for (c = 0; c < 3; c++)
@@ -11650,11 +11710,12 @@ static void gs4i_place_image_particles(int index, void *context)
                 gs4i_reflect_spin(
                     g, p->deformation + (size_t)p->deformation_reals * (i + (size_t)b) + 18, ahead,
                     sim->grid.h);
+            g++;
         }
     }
 }
 
-/* Sort what has a kind by slot, stably, and the slots by colour. */
+/* Sort images by slot, stably, and the slots by colour. */
 static int gs4i_sort_image_particles(gs4_sim *sim)
 {
     gs4i_image_particles *g = &sim->image_particles;
@@ -11669,8 +11730,7 @@ static int gs4i_sort_image_particles(gs4_sim *sim)
     int k, s, colour, n = 0;
     if (!order || !first || !slots) return gs4i_fail_memory(&sim->error);
     memset(first, 0, (size_t)(active + 1) * sizeof *first);
-    for (k = 0; k < g->count; k++)
-        if (all[k].kind) first[all[k].slot + 1]++;
+    for (k = 0; k < g->count; k++) first[all[k].slot + 1]++;
     for (colour = 0; colour < 8; colour++) {
         g->colour_first[colour] = n;
         for (s = 0; s < active; s++)
@@ -11679,29 +11739,21 @@ static int gs4i_sort_image_particles(gs4_sim *sim)
     }
     g->colour_first[8] = n;
     for (s = 0; s < active; s++) first[s + 1] += first[s];
-    for (k = 0; k < g->count; k++)
-        if (all[k].kind) order[first[all[k].slot]++] = k;
+    for (k = 0; k < g->count; k++) order[first[all[k].slot]++] = k;
     for (s = active; s > 0; s--) first[s] = first[s - 1];
     first[0] = 0;
     return GS4_OK;
 }
 
-/* Find the images of all particles where they are at the stage. */
-static int gs4i_find_image_particles(gs4_sim *sim)
+/* Count the particles of blocks near sticky bodies. */
+static int gs4i_count_near_particles(gs4_sim *sim)
 {
     const gs4i_grid *grid = &sim->grid;
     gs4i_image_particles *g = &sim->image_particles;
-    gs4i_pass pass;
     gs4i_face face;
-    int32_t *of;
-    int i, o, sticky = 0;
-    g->count = g->patches.count = 0;
-    for (i = 0; i < sim->boundary.collider_count; i++)
-        sticky |= gs4i_is_sticky(&sim->boundary.colliders[i]);
-    if (!sticky) return GS4_OK;
-    GS4I_TRY(gs4i_sample_patches(sim));
-    of = (int32_t *)gs4i_scratch_reserve(&sim->memory, &g->of, (size_t)grid->occupied * sizeof *of,
-                                         0);
+    int32_t *of = (int32_t *)gs4i_scratch_reserve(&sim->memory, &g->of,
+                                                  (size_t)grid->occupied * sizeof *of, 0);
+    int i, o;
     if (!of) return gs4i_fail_memory(&sim->error);
     for (o = 0; o < grid->occupied; o++) {
         of[o] = -1;
@@ -11709,18 +11761,52 @@ static int gs4i_find_image_particles(gs4_sim *sim)
             if (gs4i_is_sticky(&sim->boundary.colliders[i])
                 && gs4i_find_face(grid, &sim->boundary.colliders[i], grid->occupied_block[o], &face)
                        != GS4I_SURFACE_FAR)
-                of[o] = g->count;
-        if (of[o] >= 0) g->count += grid->first[o + 1] - grid->first[o];
+                of[o] = g->near;
+        if (of[o] >= 0) g->near += grid->first[o + 1] - grid->first[o];
     }
-    if (!g->count) return GS4_OK;
-    if (!gs4i_scratch_reserve(&sim->memory, &g->all, (size_t)g->count * sizeof(gs4i_image_particle),
-                              0)) {
-        g->count = 0;
+    return GS4_OK;
+}
+
+/* Find the images of all particles where they are at the stage. */
+static int gs4i_find_image_particles(gs4_sim *sim)
+{
+    gs4i_image_particles *g = &sim->image_particles;
+    const size_t blocks = (size_t)sim->grid.occupied + 1;
+    gs4i_pass pass;
+    int32_t *first_of;
+    int i, sticky = 0;
+    g->near = g->count = g->patches.count = 0;
+    for (i = 0; i < sim->boundary.collider_count; i++)
+        sticky |= gs4i_is_sticky(&sim->boundary.colliders[i]);
+    if (!sticky) return GS4_OK;
+    GS4I_TRY(gs4i_sample_patches(sim));
+    GS4I_TRY(gs4i_count_near_particles(sim));
+    if (!g->near) return GS4_OK;
+    first_of =
+        (int32_t *)gs4i_scratch_reserve(&sim->memory, &g->first_of, blocks * sizeof *first_of, 0);
+    if (!first_of
+        || !gs4i_scratch_reserve(&sim->memory, &g->of_particles,
+                                 (size_t)g->near * sizeof(gs4i_near_particle), 0)) {
+        g->near = 0;
         return gs4i_fail_memory(&sim->error);
     }
     memset(&pass, 0, sizeof pass);
     pass.sim = sim;
-    gs4i_parallel_for(&sim->tasks, grid->occupied, gs4i_place_image_particles, &pass);
+    gs4i_parallel_for(&sim->tasks, sim->grid.occupied, gs4i_find_near_particles, &pass);
+    for (i = 0; i < sim->grid.occupied; i++) {
+        const int32_t count = first_of[i];
+        first_of[i] = g->count;
+        g->count += count;
+    }
+    first_of[i] = g->count;
+    if (g->count
+        && !gs4i_scratch_reserve(&sim->memory, &g->all,
+                                 (size_t)g->count * sizeof(gs4i_image_particle), 0)) {
+        g->near = g->count = 0;
+        return gs4i_fail_memory(&sim->error);
+    }
+    if (!g->count) return GS4_OK;
+    gs4i_parallel_for(&sim->tasks, sim->grid.occupied, gs4i_place_image_particles, &pass);
     return gs4i_sort_image_particles(sim);
 }
 
@@ -11740,16 +11826,31 @@ static void gs4i_load_image_particles(gs4i_image_particle *all, const int32_t *o
     gs4i_stencils_at(s, &t->frame, x);
 }
 
-/* Mark the nodes that a particle reaches which has no image. */
-static void gs4i_mark_lacking_images(const gs4i_grid *grid, const gs4i_surroundings *t, int base)
+/* Mark the nodes that particles of a block reach which have no image. */
+static void gs4i_mark_lacking_images(int index, void *context)
 {
-    int i;
-    for (i = 0; i < 27; i++) {
-        const int64_t node = gs4i_surrounding_node(t, base % GS4I_TILE + i % 3,
-                                                   base / GS4I_TILE % GS4I_TILE + i / 3 % 3,
-                                                   base / (GS4I_TILE * GS4I_TILE) + i / 9);
-        if (node >= 0 && gs4i_has_jumps(grid, gs4i_slot_of((uint32_t)node)))
-            grid->flags[node] |= GS4I_LACKS_IMAGE;
+    const gs4i_pass *pass = (const gs4i_pass *)context;
+    const gs4i_grid *grid = &pass->sim->grid;
+    const int o = pass->blocks[index], count = grid->first[o + 1] - grid->first[o];
+    const gs4i_near_particle *near = gs4i_near_particles_of(pass->sim, o).particle;
+    uint64_t lack[GS4I_TILE] = { 0, 0, 0, 0, 0, 0, 0, 0 }, any = 0; /* bit 8 y + x of each z */
+    int i, row;
+    for (i = 0; near && i < count; i++, near++)
+        if (near->image == GS4I_HOLDS_NODES && near->base >= 0) {
+            const uint64_t seen = (uint64_t)0x070707u << near->base % 64;
+            int k;
+            for (k = 0; k < 3; k++) lack[near->base / 64 + k] |= seen;
+            any = 1;
+        }
+    for (row = 0; row < GS4I_TILE * GS4I_TILE && any; row++) {
+        ptrdiff_t at[3];
+        gs4i_tile_row(grid, o, row & 7, row >> 3, at);
+        for (i = 0; i < GS4I_TILE; i++) {
+            const uint32_t node = (uint32_t)(at[(i + 2) >> 2] / 4) + (uint32_t)((i + 2) & 3);
+            if (lack[row >> 3] >> (8 * (row & 7) + i) & 1
+                && gs4i_has_jumps(grid, gs4i_slot_of(node)))
+                grid->flags[node] |= GS4I_LACKS_IMAGE;
+        }
     }
 }
 
@@ -11806,10 +11907,7 @@ static void gs4i_scatter_image_block(const gs4i_pass *pass, int index, int what)
             gs4_real(*from)[4] = g[b]->carried;
             const size_t four = 4 * sizeof *tile;
             if (s.base[b] < 0) continue;
-            if (what == GS4I_IMAGE_MARKS && g[b]->kind == GS4I_HOLDS_NODES)
-                gs4i_mark_lacking_images(&sim->grid, &t, s.base[b]);
-            if (what == GS4I_IMAGE_MARKS) g[b]->whole = gs4i_is_whole(&t, s.base[b]);
-            if (what == GS4I_IMAGE_MARKS || g[b]->kind == GS4I_HOLDS_NODES) continue;
+            if (what != GS4I_IMAGE_FORCE) g[b]->whole = gs4i_is_whole(&t, s.base[b]);
             if (what == GS4I_IMAGE_MOMENTUM)
                 gs4i_scatter_quad(tile, &s, b, from[0]);
             else if (what == GS4I_IMAGE_FORCE) {
@@ -11831,14 +11929,8 @@ static void gs4i_scatter_image_block(const gs4i_pass *pass, int index, int what)
             }
         }
     }
-    if (what != GS4I_IMAGE_MARKS)
-        gs4i_add_to_surroundings(&sim->grid, &t, tile,
-                                 what == GS4I_IMAGE_FORCE ? sim->grid.force : sim->grid.momentum);
-}
-
-static void gs4i_mark_image_nodes(int index, void *context)
-{
-    gs4i_scatter_image_block((const gs4i_pass *)context, index, GS4I_IMAGE_MARKS);
+    gs4i_add_to_surroundings(&sim->grid, &t, tile,
+                             what == GS4I_IMAGE_FORCE ? sim->grid.force : sim->grid.momentum);
 }
 
 static void gs4i_scatter_image_momentum(int index, void *context)
@@ -11873,13 +11965,16 @@ static void gs4i_gather_image_block(const gs4i_pass *pass, int index, int what)
     const gs4_real *field = what ? sim->grid.force : gs4i_gradient_velocity(&sim->grid);
     gs4_real tile[GS4I_TILE_REALS], *to = tile;
     gs4i_surroundings t;
-    int x, y, z, k, b, c;
+    int x, y, z, k, b;
     gs4i_surroundings_of(&sim->grid, slot, &t);
     for (z = 0; z < GS4I_TILE; z++)
         for (y = 0; y < GS4I_TILE; y++)
-            for (x = 0; x < GS4I_TILE; x++, to += 4) {
+            for (x = 0; x < GS4I_TILE; x += 2, to += 8) { /* two nodes are of one block */
                 const int64_t node = gs4i_surrounding_node(&t, x, y, z);
-                for (c = 0; c < 4; c++) to[c] = node < 0 ? 0 : field[4 * node + c];
+                if (node < 0)
+                    memset(to, 0, 8 * sizeof *to);
+                else
+                    memcpy(to, field + 4 * node, 8 * sizeof *to);
             }
     memset(to, 0, 16 * sizeof *to);
     for (k = first[slot]; k < first[slot + 1]; k += GS4I_BATCH) {
@@ -11927,31 +12022,37 @@ static void gs4i_gather_image_particles(gs4_sim *sim, gs4_task_fn kernel)
     gs4i_parallel_for(&sim->tasks, pass.count, kernel, &pass);
 }
 
-/* Has a particle an odd part to take? */
-GS4I_INLINE int gs4i_is_odd(const gs4i_image_particle *g)
+/* The image by which a particle takes an odd part, NULL: it takes none. */
+GS4I_INLINE const gs4i_image_particle *gs4i_odd_image(const gs4i_near_particles *near, int i)
 {
-    return g->kind == GS4I_HAS_IMAGE && g->whole && g->share > 0;
+    const int image = near->particle[i].image;
+    const gs4i_image_particle *g = near->images + (image < 0 ? 0 : image);
+    return image >= 0 && g->whole && g->share > 0 ? g : NULL;
 }
 
 /* Replace the values that n particles gathered by their part that is odd about the surface, of
  * velocities (what 0) about the body's, by their shares: u = (u(x) - u(x'))/2 + v */
-static void gs4i_make_value_odd(const gs4i_image_particle *g, int n, int what, gs4i_gathered *u)
+static void gs4i_make_value_odd(const gs4i_near_particles *near, int n, int what, gs4i_gathered *u)
 {
     int b, c;
-    for (b = 0; b < n; b++, g++)
-        for (c = 0; c < 3 && gs4i_is_odd(g); c++)
+    for (b = 0; b < n; b++) {
+        const gs4i_image_particle *g = gs4i_odd_image(near, b);
+        for (c = 0; c < 3 && g; c++)
             u->value[4 * b + c] -= g->share
                                    * (GS4I_C(0.5) * (u->value[4 * b + c] + g->seen[what][0][c])
                                       - (what ? GS4I_C(0) : g->v[c]));
+    }
 }
 
 /* The same of gradients: grad u = (grad u(x) - grad u(x') R)/2 + spin x (I - n n). */
-static void gs4i_make_gradient_odd(const gs4i_image_particle *g, int n, int what, gs4i_gathered *u)
+static void gs4i_make_gradient_odd(const gs4i_near_particles *near, int n, int what,
+                                   gs4i_gathered *u)
 {
     int b, c, a;
-    for (b = 0; b < n; b++, g++) {
+    for (b = 0; b < n; b++) {
+        const gs4i_image_particle *g = gs4i_odd_image(near, b);
         gs4_real *column[3], turn[3][3] = { { 0, 0, 0 }, { 0, 0, 0 }, { 0, 0, 0 } }, across[3];
-        if (!gs4i_is_odd(g)) continue;
+        if (!g) continue;
         column[0] = u->dx + 4 * b;
         column[1] = u->dy + 4 * b;
         column[2] = u->dz + 4 * b;
@@ -11968,31 +12069,34 @@ static void gs4i_make_gradient_odd(const gs4i_image_particle *g, int n, int what
 }
 
 /* Both, of velocities. */
-static void gs4i_make_odd(const gs4i_image_particle *g, int n, gs4i_gathered *u)
+static void gs4i_make_odd(const gs4i_near_particles *near, int n, gs4i_gathered *u)
 {
-    gs4i_make_value_odd(g, n, 0, u);
-    gs4i_make_gradient_odd(g, n, 0, u);
+    gs4i_make_value_odd(near, n, 0, u);
+    gs4i_make_gradient_odd(near, n, 0, u);
 }
 
 /* The odd part of both, and of the gradients that were gathered. */
-static void gs4i_take_odd_parts(int solids, const gs4i_image_particle *image_particles, int n,
+static void gs4i_take_odd_parts(int solids, const gs4i_near_particles *near, int n,
                                 gs4i_gathered *u, gs4i_gathered *acc)
 {
-    gs4i_make_odd(image_particles, n, u);
-    gs4i_make_value_odd(image_particles, n, 1, acc);
-    if (solids) gs4i_make_gradient_odd(image_particles, n, 1, acc);
+    gs4i_make_odd(near, n, u);
+    gs4i_make_value_odd(near, n, 1, acc);
+    if (solids) gs4i_make_gradient_odd(near, n, 1, acc);
 }
 
 /* Is what the images of block o see of velocity no cause for alarm? Of a reflection of L the
  * trace is at most sum |L_ij|. See gs4i_is_safe. */
 static int gs4i_images_are_safe(const gs4_sim *sim, int o)
 {
-    const gs4i_image_particle *g = gs4i_image_particles_of(sim, o),
-                              *end = g ? g + (sim->grid.first[o + 1] - sim->grid.first[o]) : g;
-    for (; g < end; g++) {
+    const gs4i_image_particle *images = (const gs4i_image_particle *)sim->image_particles.all.data;
+    const int32_t *first_of = (const int32_t *)sim->image_particles.first_of.data + o;
+    int i;
+    for (i = sim->image_particles.count ? first_of[0] : 0;
+         sim->image_particles.count && i < first_of[1]; i++) {
+        const gs4i_image_particle *g = images + i;
         gs4_real moved = 0, all = 0;
         int a, c;
-        if (!gs4i_is_odd(g)) continue;
+        if (!(g->whole && g->share > 0)) continue;
         for (c = 0; c < 3; c++) {
             moved += gs4i_abs(g->seen[0][0][c]) + 2 * gs4i_abs(g->v[c]);
             for (a = 1; a < 4; a++) all += gs4i_abs(g->seen[0][a][c]);
@@ -12005,42 +12109,49 @@ static int gs4i_images_are_safe(const gs4_sim *sim, int o)
 }
 
 /* -A R, of the columns x, y, z of n particles, for their images. */
-static void gs4i_reflect_columns(gs4i_image_particle *g, int n, const gs4_real *x,
+static void gs4i_reflect_columns(const gs4i_near_particles *near, int n, const gs4_real *x,
                                  const gs4_real *y, const gs4_real *z, int to)
 {
     int b, c;
-    for (b = 0; b < n; b++, g++)
-        for (c = 0; c < 3; c++) {
+    for (b = 0; b < n; b++) {
+        gs4i_image_particle *g = near->images + near->particle[b].image;
+        for (c = 0; c < 3 && near->particle[b].image >= 0; c++) {
             const gs4_real across =
                 2 * (x[4 * b + c] * g->n[0] + y[4 * b + c] * g->n[1] + z[4 * b + c] * g->n[2]);
             g->carried[to][c] = across * g->n[0] - x[4 * b + c];
             g->carried[to + 1][c] = across * g->n[1] - y[4 * b + c];
             g->carried[to + 2][c] = across * g->n[2] - z[4 * b + c];
         }
+    }
 }
 
 /* Forces of the images of n particles; mass is odd, as its weight is, what else is beside them
  * even. */
-static void gs4i_reflect_forces(gs4i_image_particle *g, int n, int with_mass, const gs4i_forces *f)
+static void gs4i_reflect_forces(const gs4i_near_particles *near, int n, int with_mass,
+                                const gs4i_forces *f)
 {
     int b, c;
-    gs4i_reflect_columns(g, n, f->x, f->y, f->z, 0);
-    for (b = 0; b < n; b++)
+    gs4i_reflect_columns(near, n, f->x, f->y, f->z, 0);
+    for (b = 0; b < n; b++) {
+        gs4i_image_particle *g = near->images + near->particle[b].image;
+        if (near->particle[b].image < 0) continue;
         for (c = 0; c < 4; c++)
-            g[b].carried[3][c] = c < 3 || with_mass ? -f->weight[4 * b + c] : f->weight[4 * b + c];
-    for (b = 0; b < n; b++)
-        for (c = 0; c < 3; c++) g[b].carried[c][3] = 0;
+            g->carried[3][c] = c < 3 || with_mass ? -f->weight[4 * b + c] : f->weight[4 * b + c];
+        for (c = 0; c < 3; c++) g->carried[c][3] = 0;
+    }
 }
 
 /* Affine momentum of the images of n particles: 2 m v - P(x), and its change from node to node,
  * that of 2 m v along the surface included. */
-static void gs4i_reflect_affine(gs4i_image_particle *g, int n, const gs4i_stencils *s,
+static void gs4i_reflect_affine(const gs4i_near_particles *near, int n, const gs4i_stencils *s,
                                 const gs4i_affine_forces *f, gs4_real h)
 {
     int b, c, a;
-    gs4i_reflect_columns(g, n, f->x, f->y, f->z, 1);
-    for (b = 0; b < n; b++, g++) {
+    gs4i_reflect_columns(near, n, f->x, f->y, f->z, 1);
+    for (b = 0; b < n; b++) {
+        gs4i_image_particle *g = near->images + near->particle[b].image;
         gs4_real turn[3][3];
+        if (near->particle[b].image < 0) continue;
         gs4i_surface_spin(g, turn);
         for (c = 0; c < 3; c++) {
             const gs4_real at_x = f->middle[4 * b + c]
@@ -12056,11 +12167,12 @@ static void gs4i_reflect_affine(gs4i_image_particle *g, int n, const gs4i_stenci
 static void gs4i_free_image_particles(gs4i_memory *m, gs4i_image_particles *g)
 {
     gs4i_patches *p = &g->patches;
-    gs4i_scratch *const parts[11] = { &g->all,   &g->of,        &g->order, &g->first,
-                                      &g->slots, &p->of,        &p->all,   &p->distance,
-                                      &p->nodes, &p->colliders, &p->blocks };
+    gs4i_scratch *const parts[13] = { &g->of_particles, &g->first_of, &g->all,   &g->of,
+                                      &g->order,        &g->first,    &g->slots, &p->of,
+                                      &p->all,          &p->distance, &p->nodes, &p->colliders,
+                                      &p->blocks };
     int i;
-    for (i = 0; i < 11; i++) gs4i_free(m, parts[i]->data, parts[i]->bytes, 1);
+    for (i = 0; i < 13; i++) gs4i_free(m, parts[i]->data, parts[i]->bytes, 1);
     memset(g, 0, sizeof *g);
 }
 
@@ -12299,7 +12411,7 @@ static void gs4i_set_velocities(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     const int groups = gs4i_groups(sim);
     gs4i_parallel_for(&sim->tasks, groups, gs4i_clear_jumps, nodes);
-    gs4i_scatter_image_particles(sim, gs4i_mark_image_nodes);
+    if (sim->image_particles.near) gs4i_scatter(sim, gs4i_mark_lacking_images);
     gs4i_scatter_image_particles(sim, sim->particles.with_rates && !sim->particles.deformation_reals
                                           ? gs4i_scatter_image_momentum
                                           : gs4i_scatter_image_affine);
@@ -12567,7 +12679,7 @@ static void gs4i_scatter_stage(const gs4i_pass *pass, int index, gs4i_heat_pass 
     gs4i_report *report = &sim->reports[o];
     gs4i_response r;
     gs4_real nodes[GS4I_TILE_REALS], plain[GS4I_TILE_REALS], tile[GS4I_TILE_REALS];
-    gs4i_image_particle *images = gs4i_image_particles_of(sim, o);
+    gs4i_near_particles near = gs4i_near_particles_of(sim, o);
     int row = 0;
     size_t i = (size_t)g->first[o], end = (size_t)g->first[o + 1];
     gs4i_tile_load(g, o, report->rows, gs4i_gradient_velocity(g), nodes);
@@ -12593,7 +12705,7 @@ static void gs4i_scatter_stage(const gs4i_pass *pass, int index, gs4i_heat_pass 
             gs4i_gather_local(nodes + 4 * s.base[b], &s, b, &w, &d, &v);
             if (with_plain) gs4i_gather_value(plain + 4 * s.base[b], &s, b, &w, v.value);
         }
-        if (images) gs4i_make_odd(images, n, &v);
+        if (near.particle) gs4i_make_odd(&near, n, &v);
         if (p.with_subgrid)
             gs4i_find_subgrid(&p, i, n, &integrator, &q, v.value, subgrid);
         else
@@ -12604,9 +12716,9 @@ static void gs4i_scatter_stage(const gs4i_pass *pass, int index, gs4i_heat_pass 
         gs4i_stage_forces(&r, &q, L, &f);
         gs4i_weigh_batch(&r, &q, gravity, subgrid, &f);
         for (b = 0; b < n; b++) gs4i_scatter_force(tile, &s, b, &f);
-        if (images) {
-            gs4i_reflect_forces(images, n, !gravity, &f);
-            images += n;
+        if (near.particle) {
+            gs4i_reflect_forces(&near, n, !gravity, &f);
+            near.particle += n;
         }
         if (heat) gs4i_scatter_heat(sim, heat, &s, n);
     }
@@ -12771,15 +12883,14 @@ static int gs4i_may_touch(const gs4i_boundary *b, const gs4_real *x, int n, gs4_
 }
 
 /* May a particle that was at `from` be in a sticky body at x? */
-GS4I_INLINE int gs4i_may_stick(const gs4i_image_particle *g, const gs4_real *from,
-                               const gs4_real *x)
+GS4I_INLINE int gs4i_may_stick(const gs4i_near_particle *g, const gs4_real *from, const gs4_real *x)
 {
     const gs4_vec3 moved = gs4i_vec3(x[0] - from[0], x[1] - from[1], x[2] - from[2]);
     return !(g->room > 0 && gs4i_dot(moved, moved) < g->room * g->room);
 }
 
 /* Walls, colliders and emitters on each particle after the step. */
-static void gs4i_correct_contact(gs4_sim *sim, size_t i, int n, const gs4i_image_particle *images,
+static void gs4i_correct_contact(gs4_sim *sim, size_t i, int n, const gs4i_near_particle *near,
                                  gs4i_stored *o, gs4i_gathered *L, gs4i_report *report)
 {
     gs4_real *elastic = sim->particles.elastic_reals
@@ -12790,8 +12901,8 @@ static void gs4i_correct_contact(gs4_sim *sim, size_t i, int n, const gs4i_image
     for (b = 0; b < n; b++) {
         const gs4i_collider *emitter;
         if (!touches && gs4i_is_in_domain(&sim->grid, o->x + 4 * b)
-            && !(images
-                 && gs4i_may_stick(images + b, sim->particles.position + 4 * (i + (size_t)b),
+            && !(near
+                 && gs4i_may_stick(near + b, sim->particles.position + 4 * (i + (size_t)b),
                                    o->x + 4 * b)))
             continue;
         gs4i_put_back(&sim->boundary, &sim->grid, o->x + 4 * b, o->v + 4 * b);
@@ -12924,7 +13035,7 @@ typedef struct gs4i_correction_tiles {
 /* Gather for n particles; `u` keeps what came of the velocity. A batch with solids wants the
  * gradients of all. */
 GS4I_INLINE void gs4i_gather_corrections(const gs4i_correction_tiles *t, const gs4i_stencils *s,
-                                         int n, int solids, const gs4i_image_particle *images,
+                                         int n, int solids, const gs4i_near_particles *near,
                                          gs4i_gathered *u, gs4i_corrections *k)
 {
     gs4i_gathered acc, jump;
@@ -12937,7 +13048,7 @@ GS4I_INLINE void gs4i_gather_corrections(const gs4i_correction_tiles *t, const g
         gs4i_gather_rate(solids, t->acceleration + at, s, b, &w, &d, &acc);
         if (t->with_jumps) gs4i_gather_rate(solids, t->jumps + at, s, b, &w, &d, &jump);
     }
-    if (images) gs4i_take_odd_parts(solids, images, n, u, &acc);
+    if (near->particle) gs4i_take_odd_parts(solids, near, n, u, &acc);
     gs4i_to_lanes(u->value, n, k->U);
     gs4i_gradient_lanes(u->dx, u->dy, u->dz, n, k->L);
     gs4i_to_lanes(acc.value, n, k->A);
@@ -12968,7 +13079,7 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_heat
     const gs4i_integrator integrator = sim->integrator;
     const int o = pass->blocks[index], next = gs4i_next_block(pass, index);
     const gs4i_frame frame = gs4i_tile_frame(g, g->occupied_block[o]);
-    const gs4i_image_particle *images = gs4i_image_particles_of(sim, o);
+    gs4i_near_particles near = gs4i_near_particles_of(sim, o);
     gs4i_report *report = &sim->reports[o];
     gs4i_response r;
     gs4i_correction_tiles tiles;
@@ -12997,7 +13108,7 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_heat
             solids = gs4i_load_solid_constants(&r.constants, &r.solid);
         }
         gs4i_stage_batch(&p, i, n, integrator.prediction, &frame, &q, &s);
-        gs4i_gather_corrections(&tiles, &s, n, solids, images, &u, &k);
+        gs4i_gather_corrections(&tiles, &s, n, solids, &near, &u, &k);
         if (p.with_subgrid) {
             gs4i_prefetch_subgrid(&p, i + 4 * GS4I_BATCH);
             gs4i_to_lanes(p.subgrid + 4 * i, n, k.subgrid);
@@ -13007,13 +13118,13 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_heat
         gs4i_advance_response(&r, i, n, k.L, &k.rates, q.v[3], commit);
         if (!commit) {
             gs4i_validate_batch(&q, k.L, p.position + 4 * i, n, g->h, p.id + i, report);
-            if (images) images += n;
+            if (near.particle) near.particle += n;
             continue;
         }
         if (heat) gs4i_gather_heat(&r, &s, k.L, heat);
         gs4i_pack_batch(&q, 1, &out);
-        if (edge) gs4i_correct_contact(sim, i, n, images, &out, &u, report);
-        if (images) images += n;
+        if (edge) gs4i_correct_contact(sim, i, n, near.particle, &out, &u, report);
+        if (near.particle) near.particle += n;
         gs4i_see_motion(&r.seen, q.v, k.L);
         gs4i_store_batch(&p, i, n, &out);
     }
@@ -13135,7 +13246,7 @@ static void gs4i_scatter_affinely(const gs4i_pass *pass, int index, gs4i_heat_pa
     gs4i_report *report = &sim->reports[o];
     gs4i_response r;
     gs4_real tile[GS4I_TILE_REALS];
-    gs4i_image_particle *images = gs4i_image_particles_of(sim, o);
+    gs4i_near_particles near = gs4i_near_particles_of(sim, o);
     int row = 0;
     size_t i = (size_t)g->first[o], end = (size_t)g->first[o + 1];
     gs4i_report_clear(report);
@@ -13163,9 +13274,9 @@ static void gs4i_scatter_affinely(const gs4i_pass *pass, int index, gs4i_heat_pa
             report->rows |= gs4i_touched_rows(s.base[b]);
             gs4i_scatter_affine(tile, &s, b, &f);
         }
-        if (images) {
-            gs4i_reflect_affine(images, n, &s, &f, g->h);
-            images += n;
+        if (near.particle) {
+            gs4i_reflect_affine(&near, n, &s, &f, g->h);
+            near.particle += n;
         }
         if (heat) gs4i_scatter_heat(sim, heat, &s, n);
     }
@@ -13211,7 +13322,7 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, gs4i
     const int o = pass->blocks[index], next = gs4i_next_block(pass, index);
     const int edge = gs4i_at_edge(g, o) || gs4i_jumps_are_near(g, o);
     const gs4i_frame frame = gs4i_tile_frame(g, g->occupied_block[o]);
-    const gs4i_image_particle *images = gs4i_image_particles_of(sim, o);
+    gs4i_near_particles near = gs4i_near_particles_of(sim, o);
     gs4i_report *report = &sim->reports[o];
     gs4i_response r;
     gs4_real nodes[GS4I_TILE_REALS];
@@ -13236,18 +13347,18 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, gs4i
             gs4i_x_weights(&s, b, &w, &d);
             gs4i_gather_local(nodes + 4 * s.base[b], &s, b, &w, &d, &u);
         }
-        if (images) gs4i_make_odd(images, n, &u);
+        if (near.particle) gs4i_make_odd(&near, n, &u);
         gs4i_advect_batch(sim->integrator.dt, &u, n, &q, C);
         gs4i_advance_response(&r, i, n, C, NULL, q.v[3], commit);
         if (!commit) {
             gs4i_validate_batch(&q, C, p.position + 4 * i, n, g->h, p.id + i, report);
-            if (images) images += n;
+            if (near.particle) near.particle += n;
             continue;
         }
         if (heat) gs4i_gather_heat(&r, &s, C, heat);
         gs4i_pack_batch(&q, 0, &out);
-        if (edge) gs4i_correct_contact(sim, i, n, images, &out, &u, report);
-        if (images) images += n;
+        if (edge) gs4i_correct_contact(sim, i, n, near.particle, &out, &u, report);
+        if (near.particle) near.particle += n;
         gs4i_see_motion(&r.seen, q.v, C);
         gs4i_store_batch(&p, i, n, &out);
         memcpy(p.affine[0] + 4 * i, u.dx, 4 * (size_t)n * sizeof *u.dx);

@@ -840,7 +840,8 @@ static void contact_images(int integrator, double radius)
     double off = 0, beyond = -1;
     int images = 0, i;
     gs4_collider c;
-    const gs4i_image_particle *g;
+    const gs4i_near_particle *g;
+    const gs4i_image_particle *all;
     memset(&c, 0, sizeof c);
     c.shape = gs4_sdf(contact_ball, &ball, at(0, 0, 0), at(1.2, 1.2, 1.2));
     c.velocity = at(0.1, 0, 0);
@@ -848,16 +849,18 @@ static void contact_images(int integrator, double radius)
     CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1.2, 1.2, 1.2)), &fill), 0);
     memcpy(before, sim->particles.position, sizeof before); /* ids go up by one */
     CHECK_RESULT(sim, gs4_step(sim, (gs4_real)0.2 * gs4_stable_dt(sim)), 0);
-    g = (const gs4i_image_particle *)sim->image_particles.all.data;
-    CHECK(sim->image_particles.count == 13824);
-    for (i = 0; i < sim->image_particles.count; i++, g++) {
+    g = (const gs4i_near_particle *)sim->image_particles.of_particles.data;
+    all = (const gs4i_image_particle *)sim->image_particles.all.data;
+    CHECK(sim->image_particles.near == 13824);
+    for (i = 0; i < sim->image_particles.near; i++, g++) {
         const gs4_real *x = before + 4 * sim->particles.id[i];
         const double own = (double)gs4i_shape_distance(&ball, gs4i_vec3(x[0], x[1], x[2]));
         double image;
         if (g->room > 0) beyond = fmax(beyond, ((double)g->room - own) / CONTACT_H);
-        if (g->kind != GS4I_HAS_IMAGE || own < 0) continue;
+        if (g->image < 0 || own < 0) continue;
         images++;
-        image = (double)gs4i_shape_distance(&ball, gs4i_vec3(g->x[0], g->x[1], g->x[2]));
+        image = (double)gs4i_shape_distance(
+            &ball, gs4i_vec3(all[g->image].x[0], all[g->image].x[1], all[g->image].x[2]));
         if (own < radius * CONTACT_H) off = fmax(off, fabs(own + image) / CONTACT_H);
     }
     CHECK(images > 100);

@@ -1366,6 +1366,22 @@ static void test_files_other_desc(void)
     gs4_destroy(from);
 }
 
+/* Of descriptions that are else the same, too. */
+static void test_files_other_integrator(void)
+{
+    gs4_sim_desc d = scene_cube(8);
+    gs4_sim *from = files_scene(&d), *sim;
+    CHECK_RESULT(from, files_steps(from, 2), 0);
+    CHECK_RESULT(from, gs4_save(from, files_path("d.sav")), 0);
+    d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER;
+    sim = files_scene(&d);
+    FILES_REFUSED(gs4_load(sim, files_path("d.sav")), GS4_ERROR_FORMAT);
+    CHECK(strstr(gs4_last_error(sim), "description") != NULL);
+    remove(files_path("d.sav"));
+    gs4_destroy(sim);
+    gs4_destroy(from);
+}
+
 static gs4_real files_viscosity(gs4_real temperature, gs4_real rate, void *user)
 {
     (void)temperature;
@@ -1629,6 +1645,7 @@ static void run_files(void)
     RUN_ONCE(test_files_forged_anywhere);
     RUN(test_files_endless);
     RUN(test_files_other_desc);
+    RUN(test_files_other_integrator);
     RUN(test_files_padding);
     RUN(test_files_other_scene);
     files_end();

@@ -344,9 +344,10 @@
  *
  * ERRORS. Every call returns 0 or more for success and a negative gs4_result otherwise;
  * gs4_last_error has a sentence. Every field is checked, NaN included. A call that fails has
- * changed nothing, out of memory included; a step that is refused has not been taken, though
- * gs4_advance keeps those before it. Callbacks must not change the simulation that calls them:
- * such calls are refused. What is allowed but hardly meant is said through `log`, once.
+ * changed nothing but the order of particles, out of memory included; a step that is refused has
+ * not been taken, though gs4_advance keeps those before it. Callbacks, go_on of a budget too, must
+ * not change the simulation that calls them: such calls are refused. What is allowed but hardly
+ * meant is said through `log`, once.
  *
  * MEMORY. GS4: 65 bytes a particle in float (position, velocity, J and their rates, mass, id,
  * material, and 4 for sorting), 16 more unless flip_decay_time is INFINITY, 49 a cell near material
@@ -14359,7 +14360,7 @@ static void gs4i_restart(gs4_sim *sim)
     gs4i_particles *p = &sim->particles;
     const size_t n = (size_t)p->count;
     size_t i;
-    if (!sim->restart && p->with_rates) {
+    if (!sim->restart && p->with_rates && n > 0) {
         memset(p->rate, 0, 4 * n * sizeof *p->rate);
         memset(p->position_residual, 0, 4 * n * sizeof *p->position_residual);
         for (i = 0; i < n && p->elastic_reals; i++)
@@ -14661,8 +14662,8 @@ static int gs4i_fill_shape(gs4_sim *sim, const gs4_shape *shape, const gs4_fill 
 
 /* --- colliders and emitters ------------------------------------------------------------------- */
 
-/* Its id, or an error. */
-static int gs4i_add_collider(gs4_sim *sim, const gs4_collider *c, double spacing)
+/* A body that is not counted yet: its id, or an error. */
+static int gs4i_begin_collider(gs4_sim *sim, const gs4_collider *c, double spacing)
 {
     gs4i_boundary *b = &sim->boundary;
     gs4i_collider *colliders = (gs4i_collider *)gs4i_grow(
@@ -14670,9 +14671,21 @@ static int gs4i_add_collider(gs4_sim *sim, const gs4_collider *c, double spacing
     if (!colliders) return gs4i_fail_memory(&sim->error);
     b->colliders = colliders;
     GS4I_TRY(gs4i_make_collider(sim, &colliders[b->collider_count], c, spacing));
-    gs4i_note_speed(sim, gs4i_collider_speed(&colliders[b->collider_count], &sim->grid));
+    return b->collider_count;
+}
+
+static int gs4i_end_collider(gs4_sim *sim)
+{
+    gs4i_boundary *b = &sim->boundary;
+    gs4i_note_speed(sim, gs4i_collider_speed(&b->colliders[b->collider_count], &sim->grid));
     sim->limits_stale = 1;
     return b->collider_count++;
+}
+
+static int gs4i_add_collider(gs4_sim *sim, const gs4_collider *c, double spacing)
+{
+    const int id = gs4i_begin_collider(sim, c, spacing);
+    return id < 0 ? id : gs4i_end_collider(sim);
 }
 
 /* --- emitters --------------------------------------------------------------------------------- */
@@ -14896,7 +14909,7 @@ static int gs4i_add_emitter(gs4_sim *sim, const gs4_emitter *is)
                                          &sim->emitter_capacity, sizeof *emitters);
     if (!emitters) return gs4i_fail_memory(&sim->error);
     sim->emitters = emitters;
-    id = gs4i_add_collider(sim, &held, (double)is->fill.spacing);
+    id = gs4i_begin_collider(sim, &held, (double)is->fill.spacing);
     if (id < 0) return id;
     e = &sim->emitters[sim->emitter_count];
     memset(e, 0, sizeof *e);
@@ -14905,9 +14918,9 @@ static int gs4i_add_emitter(gs4_sim *sim, const gs4_emitter *is)
     result = gs4i_lay_rows(sim, e);
     if (result < 0) {
         gs4i_field_free(&sim->memory, &sim->boundary.colliders[id].field);
-        sim->boundary.collider_count--;
         return result;
     }
+    gs4i_end_collider(sim);
     sim->boundary.colliders[id].is_emitter = 1;
     sim->boundary.colliders[id].is_off = 1;
     sim->boundary.colliders[id].flow = is->fill.velocity;
@@ -18017,6 +18030,17 @@ static int gs4i_try_quietly(gs4_sim *sim, gs4_real dt)
     return result;
 }
 
+/* Whoever is asked must leave the simulation as it is. */
+static int gs4i_goes_on(gs4_sim *sim, const gs4_budget *budget)
+{
+    int result;
+    if (!budget->go_on) return 1;
+    sim->busy = 1;
+    result = budget->go_on(budget->user);
+    sim->busy = 0;
+    return result;
+}
+
 /* Steps until nothing of sim->time_left (s) is left, or of the budget. */
 static int gs4i_advance(gs4_sim *sim, const gs4_budget *budget)
 {
@@ -18051,7 +18075,7 @@ static int gs4i_advance(gs4_sim *sim, const gs4_budget *budget)
         taken++;
         if ((budget->steps > 0 && taken >= budget->steps)
             || (budget->seconds > 0 && now - start + (now - began) > budget->seconds)
-            || (budget->go_on && !budget->go_on(budget->user)))
+            || !gs4i_goes_on(sim, budget))
             break;
     }
     return GS4_OK;

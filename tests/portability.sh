@@ -9,8 +9,8 @@ set -u
 cd "$(dirname "$0")/.." || exit 1
 CC=${CC:-cc}
 
-quick='few_layout few_snippets few_warnings few_hashes'
-full='warnings tsan fused scenes hashes asan arm hashes_double wasm windows tiny musl i386 form layout names units snippets link frames examples'
+quick='few_layout few_snippets few_warnings few_hashes few_fuzz'
+full='warnings tsan fused scenes hashes asan fuzz arm hashes_double wasm windows tiny musl i386 form layout names units snippets link frames examples'
 
 # A transfer kernel may be longer than 60 lines; nothing else. This one is a transpose, spelled out.
 long_functions='gs4i_from_lanes'
@@ -380,6 +380,17 @@ asan() {
     fi
     have gcc && check "all tests" sanitized_main "gcc -fsanitize=address,undefined -fno-sanitize-recover=all" --full
 }
+
+# fuzzed BUILD FIRST COUNT: random scenes and calls
+fuzzed() { $1 -DGS4_PTHREADS -pthread -I. tests/fuzz.c -o "$tmp/fuzz" -lm && "$tmp/fuzz" $2 $3; }
+fuzz() {
+    check "calls each public function" sh -c 'for f in $(sed -n "s/^#define \(gs4_[a-z_]*\) gs4_[a-z_]*_f64$/\1/p" gs4mpm.h); do grep -q "$f(" tests/fuzz.c tests/random_scene.h || { echo "$f"; exit 1; }; done'
+    have gcc || return
+    build="gcc -O1 -g -w -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all"
+    check "in float" fuzzed "$build" 1 150
+    check "in double" fuzzed "$build -DGS4_DOUBLE" 1001 100
+}
+few_fuzz() { check "a few scenes" fuzzed "$CC -O0 -w" 1 10; }
 
 tsan() {
     have gcc || return

@@ -2157,8 +2157,17 @@ static gs4_real err_calling_viscosity(gs4_real temperature, gs4_real rate, void 
     return (gs4_real)0.1;
 }
 
+static int err_calling_go_on(void *user)
+{
+    err_calls_back *c = (err_calls_back *)user;
+    c->calls = c->refused = 0;
+    err_calling_viscosity(0, 0, user);
+    return 1;
+}
+
 static void test_errors_callback_calls(void)
 {
+    gs4_budget b = { 0, 0, NULL, NULL };
     const gs4_sim_desc d = err_desc();
     gs4_material m = err_material();
     err_calls_back c = { NULL, 0, 0 };
@@ -2172,8 +2181,36 @@ static void test_errors_callback_calls(void)
     c.sim = sim;
     CHECK_RESULT(sim, gs4_step(sim, (gs4_real)1e-4), 0);
     CHECK(c.calls > 1 && c.refused == 6);
+    c.calls = c.refused = 0;
+    b.go_on = err_calling_go_on;
+    b.user = &c;
+    CHECK_RESULT(sim, gs4_advance_within(sim, (gs4_real)1e-4, &b, NULL), 0);
+    CHECK(c.refused == 6);
     c.sim = NULL;
     CHECK_RESULT(sim, gs4_step(sim, (gs4_real)1e-4), 0);
+    gs4_destroy(sim);
+}
+
+/* An emitter that is refused has raised no default speed of sound, which its travel would. */
+static void test_errors_refused_emitter(void)
+{
+    const gs4_sim_desc d = err_desc();
+    gs4_material m = err_material();
+    gs4_emitter e;
+    gs4_sim *sim = NULL;
+    gs4_real before;
+    double value = 1e30;
+    m.sound_speed = 0;
+    CHECK(gs4_create(&d, &sim) == GS4_OK);
+    CHECK_RESULT(sim, gs4_step(sim, (gs4_real)1e-4), 0);
+    CHECK_RESULT(sim, gs4_set_gravity(sim, at(0, 0, -9)), 0); /* of a scene that is empty yet */
+    CHECK(gs4_add_material(sim, &m) == 0 && err_add_block(sim) == 64);
+    before = gs4_stable_dt(sim);
+    memset(&e, 0, sizeof e);
+    e.shape = gs4_sdf(err_bad_sdf, &value, at(0.3, 0.3, 0.3), at(0.6, 0.6, 0.6));
+    e.travel = at(300, 0, 0);
+    ERR_REFUSED(sim, gs4_add_emitter(sim, &e), GS4_ERROR_ARGUMENT, "inside out");
+    CHECK(gs4_stable_dt(sim) == before);
     gs4_destroy(sim);
 }
 
@@ -2306,6 +2343,7 @@ static void run_errors(void)
     RUN(test_errors_too_much);
     RUN_ONCE(test_errors_half_way);
     RUN_ONCE(test_errors_callback_calls);
+    RUN_ONCE(test_errors_refused_emitter);
     RUN(test_errors_traps);
     RUN(test_errors_limits);
     RUN(test_errors_stats);

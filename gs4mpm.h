@@ -30,8 +30,8 @@
  *         return 0;
  *     }
  *
- * WHAT IT DOES NOT DO, YET. Implicit and projection schemes are declared and refused with a
- * sentence. It has no surface tension, no two-way coupling to colliders, no domain beyond
+ * WHAT IT DOES NOT DO, YET. The semi-implicit scheme is declared and refused with a sentence; so
+ * are, with the partitioned scheme, heat, separating and periodic walls, and separating colliders. It has no surface tension, no two-way coupling to colliders, no domain beyond
  * 3992^3 cells.
  *
  * MAP. Sections carry a tag; grep -n '^/. ==== ' gs4mpm.h is the table of contents. A section uses
@@ -56,6 +56,8 @@
  *                                                    [[transfer]]  particles to nodes and back
  *                                                    [[sticky]]    image particles behind colliders
  *                                                    [[explicit]]  the scheme: S3 to S7
+ *                                                    [[staggered]] velocities on faces
+ *                                                    [[partitioned]] the scheme with a projection
  *                                                    [[conduction]] heat from node to node
  *                                                    [[scene]]     what is given to it; emitters
  *                                                    [[step]]      one step: gs4i_make_step
@@ -234,6 +236,23 @@
  * a velocity where a solid turns. What is missing strains it: without spin a stiff cube lost 20 %
  * of its kinetic energy in a quarter of a turn, with it 0.01 %.
  *
+ * THE PARTITIONED SCHEME has pressure from a solve, so that no step follows sound: for liquids of
+ * any bulk modulus, `incompressible` too. Velocities are on faces of cells, one component each, and
+ * particles give momentum affinely, m (v~ + C (x_f - x~)), C = grad u~ extrapolated to the stage.
+ *     acc = (forces of stress)/m + g - grad p/(w rho),   u~ = v_i + s (acc - ag)
+ *     p + s K div u~ = -K (J** - 1);   div u~ = 0 where K is infinite
+ * Cells are liquid where material fills more than 51.5 % of their kernel. p is 0 where the surface
+ * is: w is its distance from the centre of the liquid cell before it, in cells, found from how full
+ * both are. Beyond liquid three layers of faces have u~ and acc by linear extrapolation; particles
+ * without liquid around fly by themselves. Where K is infinite acc is split, as (u~ - v**)/s alone
+ * has what scattering and gathering do not invert, times 1/s, and does not converge in time:
+ *     (u~ - v**)/s = acc + grad phi/(w rho),  div acc = tr(L L),  L = grad u~
+ * acc makes rates and ag. theta = min(1/2, s U/h) of the rest, U the largest speed, moves particles
+ * alone. At last positions move by dt u_c, div u_c = e U/h, e how much too full a cell is (at a
+ * surface what is above a tenth), at most h/10: that keeps particles apart and gives no energy.
+ * Sticky colliders hold the faces whose centres are inside, to first order; slippery ones close the
+ * share of a face that is inside.
+ *
  * Symplectic Euler, the fast tier: one affine scatter with stress and one gather (MLS-MPM, APIC),
  * first order.
  *
@@ -306,6 +325,8 @@
  *                           GS4: om^2 of a material is 4/(1 + 3 x) times as large where that is
  *                           more than 1, x = mass of a cell of the lightest material over that of
  *                           the heaviest particle: one among lighter ones swings by itself
+ *                           partitioned: nu dt <= 0.4 h^2 (backward Euler 0.2), c dt <= h/2, c
+ *                           of elastic waves alone
  *     flow                  one cell a step along each axis, the fall within the step included,
  *                           and the rim of a collider that turns, where the domain can meet it
  *     strain, relaxation    |grad v| dt <= 1, of colliders too (sqrt(2) |w|),  dt <= 1000 lambda_b
@@ -358,6 +379,8 @@
  * 24). With a solid: 96 more (Euler 36). With heat: 17 more a particle, 32 more with a
  * flux_relaxation_time, 16 (or 32) a cell near material, and about 150 a cell of the box around all
  * material, where the solver works.
+ * Partitioned: 161 a particle, and about 240 a cell of the box around all material (double 311 and
+ * 400), solver included.
  * A mesh: about 400 (double 800) per cell face of its surface in the domain or within 10 cells of
  * it; where that is more than 1 GB it is refused. Its distance is sampled twice a cell within three
  * cells of the surface. A mesh that moves is sampled anew now and then, but for one that takes less
@@ -622,7 +645,7 @@ typedef struct gs4_material {
      * should bear the weight of the denser one, too. */
     gs4_real bulk_modulus; /* K = rho0 c0^2, Pa */
     gs4_real sound_speed;  /* c0, m/s */
-    int incompressible;    /* for partitioned and semi-implicit schemes: K is infinite */
+    int incompressible;    /* with GS4_PARTITIONED: non-zero: K is infinite */
 
     /* Solid phase, (6): below melting_temperature, or always where it never melts. Then `liquid`
      * is GS4_NEWTONIAN and `viscosity` damps the solid. */
@@ -645,15 +668,15 @@ typedef struct gs4_material {
 
 /* ==== [[sim]] description, scene, stepping, views, files ====================================== */
 
-/* This version has GS4_EXPLICIT; the others are refused. */
+/* This version has GS4_EXPLICIT and GS4_PARTITIONED; the other is refused. */
 typedef enum gs4_scheme {
     GS4_EXPLICIT = 0,
     GS4_PARTITIONED,
     GS4_SEMI_IMPLICIT
 } gs4_scheme;
 
-/* Second order in time; first order, of the schemes that are refused so far; first order with one
- * transfer each way, the fast tier of the explicit scheme. */
+/* Second order in time; first order, of GS4_PARTITIONED; first order with one transfer each way, the
+ * fast tier of GS4_EXPLICIT. */
 typedef enum gs4_integrator {
     GS4_INTEGRATOR_GS4 = 0,
     GS4_INTEGRATOR_BACKWARD_EULER,
@@ -4917,7 +4940,9 @@ GS4I_INLINE void gs4i_gradient_squared(gs4i_gradient L, gs4i_lanes squared)
 
 /* Flags of a node. Those of the last step belong to the state; the others are made anew. */
 enum {
-    GS4I_FOLDS = 7,   /* bit a: a mirror node of axis a whose wall is in contact */
+    /* bit a: a mirror node of axis a whose wall is in contact; of the partitioned scheme: the
+     * face of axis a remembers, which lasts as GS4I_REMEMBERS does */
+    GS4I_FOLDS = 7,
     GS4I_PRESSED = 8, /* material presses on the wall there */
     GS4I_IMAGED = 16, /* image particles behind a sticky collider reach it */
     GS4I_LACKS_IMAGE =
@@ -6087,6 +6112,7 @@ typedef struct gs4i_integrator {
     gs4_real volume_crossing; /* the same by the noise of J, 1/s; 0: that does not decay */
     gs4_real weight_crossing; /* of that rate what weight alone gives J, 1/s */
     gs4_real fast_decay;      /* c0 / h, 1/s: added to k where the grid sees little */
+    gs4_real affine_ratio;    /* of the change of C in the last step that is seen at the stage */
     gs4_real stopping;        /* 1/s: how fast friction stops a node; half of what (4) bears */
     /* 1/h^2; 1 / mass of a node in the midst of the lightest material, and of the densest */
     gs4_real inv_area, inv_node_mass, inv_densest_node_mass;
@@ -6140,6 +6166,8 @@ typedef struct gs4i_particles {
     gs4_real *rate;     /* 4: dv/dt, dJ/dt; NULL for symplectic Euler */
     /* 4 each: column j of the velocity gradient, dv_i/dx_j; NULL for GS4 */
     gs4_real *affine[3];
+    gs4_real *affine_before[3]; /* the same of the step before; partitioned */
+    int with_affine, with_affine_before;
     /* 12: non-local stress xx yy zz xy xz yz (Pa) and its rate; 6 for Euler; 0: the scene has
      * none */
     gs4_real *elastic;
@@ -6170,8 +6198,8 @@ typedef struct gs4i_particles {
 
 /* those of the state come first, then scratch */
 enum {
-    GS4I_ARRAYS = 17,
-    GS4I_STATE_ARRAYS = 15
+    GS4I_ARRAYS = 20,
+    GS4I_STATE_ARRAYS = 18
 };
 typedef struct gs4i_array {
     void **data;
@@ -6212,16 +6240,23 @@ static void gs4i_particle_arrays(gs4i_particles *p, gs4i_array out[GS4I_ARRAYS])
     out[13].size = 1;
     out[14].data = (void **)&p->deformation;
     out[14].size = (size_t)p->deformation_reals * sizeof(gs4_real);
-    out[15].data = (void **)&p->order;
-    out[15].size = sizeof(uint32_t);
-    out[16].data = (void **)&p->subgrid;
-    out[16].size = 4 * sizeof(gs4_real);
-    for (i = 0; i < GS4I_ARRAYS; i++) out[i].wanted = p->with_rates ? i > 2 : i != 5 && i != 6;
+    for (i = 0; i < 3; i++) {
+        out[15 + i].data = (void **)&p->affine_before[i];
+        out[15 + i].size = 4 * sizeof(gs4_real);
+    }
+    out[18].data = (void **)&p->order;
+    out[18].size = sizeof(uint32_t);
+    out[19].data = (void **)&p->subgrid;
+    out[19].size = 4 * sizeof(gs4_real);
+    for (i = 0; i < GS4I_ARRAYS; i++)
+        out[i].wanted = i < 3                ? p->with_affine
+                        : i >= 15 && i <= 17 ? p->with_affine_before
+                                             : p->with_rates || (i != 5 && i != 6);
     out[9].wanted = p->elastic_reals > 0;
     out[14].wanted = p->deformation_reals > 0;
     out[10].wanted = out[13].wanted = p->with_heat;
     out[11].wanted = out[12].wanted = p->with_flux;
-    out[16].wanted = p->with_subgrid;
+    out[19].wanted = p->with_subgrid;
 }
 
 static void gs4i_particles_free(gs4i_memory *m, gs4i_particles *p)
@@ -6533,7 +6568,8 @@ typedef struct gs4i_material_constants {
     gs4_real inv_density, tait; /* 1 / rho0; rho0 c0^2 / 7 */
     /* viscosity: the local part, F_v mu, or the consistency */
     gs4_real viscosity, sound_speed, density;
-    gs4_real lone; /* squared speeds of its waves count so often: see gs4i_lone_waves */
+    gs4_real lone;       /* squared speeds of its waves count so often: see gs4i_lone_waves */
+    gs4_real compliance; /* 1/K, 1/Pa, where a solve gives the pressure; 0 where none does */
     gs4_real local, temperature; /* F_v; K, where the scene has no heat: that of the air */
     /* non-local: G0; 1 / lambda_b; 2 lambda_b / lambda_0s; 2 / Q; all 0: none */
     gs4_real modulus, inv_lambda, stretch, nu, alpha;
@@ -9014,7 +9050,7 @@ static void gs4i_advance_solid(gs4i_response *r, gs4i_gradient L, gs4i_gathered_
         gs4i_load_deformation(gs4i_deformation_of(r), r->p->deformation_reals, r->n, &e);
         gs4i_correct_solid(&r->solid, &e, r->p->with_rates ? r->integrator : &euler, L, J, r->n,
                            &count);
-        if (r->p->with_rates) gs4i_correct_spin(&r->solid, &e, r->integrator, L, rates);
+        if (rates) gs4i_correct_spin(&r->solid, &e, r->integrator, L, rates);
     }
     if (count.failed)
         gs4i_see_bad(r->report, GS4I_BAD_DEFORMATION, r->p->id[r->i + (size_t)count.failed - 1]);
@@ -10705,6 +10741,29 @@ typedef struct gs4i_conduction {
     int boundary_is_isothermal; /* they or a wall */
 } gs4i_conduction;
 
+typedef struct gs4i_staggered {
+    gs4i_box box;
+    int from[3], to[3];            /* the domain, in cells of the box */
+    gs4_real *given[3], *taken[3]; /* quads */
+    gs4_real *seen[3];             /* v_i */
+    gs4_real *force[3], *reach[3]; /* of stress; c of [[poisson]] at faces */
+    /* with bodies: open share of a face; velocity and acceleration of what closes the rest */
+    gs4_real *open[3], *body[3];
+    uint8_t *held[3]; /* faces that a sticky body or an emitter holds */
+    uint8_t *known[3];
+    gs4_real *cell;                        /* quads, GS4I_CELL_FILL ... */
+    gs4_real *diagonal, *rhs, *pressure;   /* of [[poisson]] */
+    int compressible;                      /* some K is finite */
+    int is_safe;                           /* no particle needs a trial */
+    int is_viscous;                        /* sticky walls take hold of what moves along them */
+    int without_split, without_correction; /* for tests of what they are for */
+    uint8_t *kind;                         /* gs4_cell */
+    gs4i_solver solver;
+    double tolerance;
+    int iterations;  /* of this step */
+    double residual; /* the largest of this step */
+} gs4i_staggered;
+
 typedef enum gs4i_clock {
     GS4I_CLOCK_SORT,
     GS4I_CLOCK_SOLVE,
@@ -10721,6 +10780,7 @@ struct gs4_sim {
     gs4i_boundary boundary;
     gs4i_image_particles image_particles;
     gs4i_conduction conduction;
+    gs4i_staggered staggered;
     /* of each material; of its solid phase */
     gs4i_material_constants *constants, *solid_phase;
     int material_count, material_capacity, solid_phase_capacity;
@@ -12187,8 +12247,12 @@ static void gs4i_free_image_particles(gs4i_memory *m, gs4i_image_particles *g)
 
 typedef struct gs4i_scheme {
     gs4_task_fn scatter[2], trial[2], correct[2]; /* [1] with heat */
-    /* S4 to S6: acceleration and stage velocity of the nodes from forces */
-    void (*accelerate)(gs4_sim *sim, gs4i_node_pass *nodes);
+    gs4_task_fn remember;                         /* what nodes keep of accelerations */
+    /* before S3: room, and nothing on the nodes; after it: their velocities, with walls */
+    int (*clear)(gs4_sim *sim, gs4i_node_pass *nodes);
+    int (*set_velocities)(gs4_sim *sim, gs4i_node_pass *nodes);
+    /* S4 to S6: acceleration and stage velocity of the nodes */
+    int (*accelerate)(gs4_sim *sim, gs4i_node_pass *nodes);
     /* largest dt for waves of the speed c (m/s) and the kinematic viscosity nu (m^2/s) */
     double (*stable_dt)(const gs4_sim *sim, double c, double nu);
 } gs4i_scheme;
@@ -12408,10 +12472,19 @@ static void gs4i_deconvolve(gs4_sim *sim, gs4i_node_pass *nodes)
     gs4i_fill_mirror_nodes(&sim->boundary, &sim->grid, sim->grid.deconvolved);
 }
 
+/* Nothing on the nodes yet; image particles where they are now. */
+static int gs4i_clear_all_nodes(gs4_sim *sim, gs4i_node_pass *nodes)
+{
+    gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_clear_nodes, nodes);
+    return gs4i_find_image_particles(sim);
+}
+
 /* Velocities of the nodes, with walls and colliders; what contact took is left in the jumps. */
-static void gs4i_set_velocities(gs4_sim *sim, gs4i_node_pass *nodes)
+static int gs4i_set_velocities(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     const int groups = gs4i_groups(sim);
+    if (gs4i_place_jumps(&sim->memory, &sim->boundary, &sim->grid) != GS4_OK)
+        return gs4i_fail_memory(&sim->error);
     gs4i_parallel_for(&sim->tasks, groups, gs4i_clear_jumps, nodes);
     if (sim->image_particles.near) gs4i_scatter(sim, gs4i_mark_lacking_images);
     gs4i_scatter_image_particles(sim, sim->particles.with_rates && !sim->particles.deformation_reals
@@ -12426,6 +12499,7 @@ static void gs4i_set_velocities(gs4_sim *sim, gs4i_node_pass *nodes)
         gs4i_deconvolve(sim, nodes);
     }
     gs4i_gather_image_particles(sim, gs4i_gather_image_velocity);
+    return GS4_OK;
 }
 
 /* The deconvolved forces become the forces. */
@@ -12859,8 +12933,9 @@ GS4I_INLINE void gs4i_store_batch(const gs4i_particles *p, size_t i, int n, cons
 }
 
 /* Is any of n positions inside of a body, or may be? By the ball around their box. Sticky bodies
- * are left out: image particles know of them. */
-static int gs4i_may_touch(const gs4i_boundary *b, const gs4_real *x, int n, gs4_real h)
+ * are left out where image particles know of them. */
+static int gs4i_may_touch(const gs4i_boundary *b, const gs4_real *x, int n, gs4_real h,
+                          int with_sticky)
 {
     gs4_real low[3], high[3], prediction;
     gs4_vec3 midst;
@@ -12878,7 +12953,7 @@ static int gs4i_may_touch(const gs4i_boundary *b, const gs4_real *x, int n, gs4_
     prediction = gs4i_length(gs4i_vec3(high[0] - low[0], high[1] - low[1], high[2] - low[2]))
                  + GS4I_C(0.1) * h;
     for (i = 0; i < b->collider_count; i++)
-        if (!b->colliders[i].is_off && !gs4i_is_sticky(&b->colliders[i])
+        if (!b->colliders[i].is_off && (with_sticky || !gs4i_is_sticky(&b->colliders[i]))
             && !(gs4i_collider_distance(&b->colliders[i], midst) > prediction))
             return 1;
     return 0;
@@ -12898,7 +12973,8 @@ static void gs4i_correct_contact(gs4_sim *sim, size_t i, int n, const gs4i_near_
     gs4_real *elastic = sim->particles.elastic_reals
                             ? sim->particles.elastic + (size_t)sim->particles.elastic_reals * i
                             : NULL;
-    const int touches = gs4i_may_touch(&sim->boundary, o->x, n, sim->grid.h);
+    const int touches =
+        gs4i_may_touch(&sim->boundary, o->x, n, sim->grid.h, sim->desc.scheme != GS4_EXPLICIT);
     int b;
     for (b = 0; b < n; b++) {
         const gs4i_collider *emitter;
@@ -13156,7 +13232,7 @@ static void gs4i_trial_with_heat_task(int index, void *context)
 }
 
 /* S4 to S6. */
-static void gs4i_accelerate_explicitly(gs4_sim *sim, gs4i_node_pass *nodes)
+static int gs4i_accelerate_explicitly(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     const gs4i_boundary *b = &sim->boundary;
     const gs4i_grid *g = &sim->grid;
@@ -13169,6 +13245,7 @@ static void gs4i_accelerate_explicitly(gs4_sim *sim, gs4i_node_pass *nodes)
     gs4i_fill_mirror_nodes(b, g, gs4i_acceleration(g));
     gs4i_gather_image_particles(sim, gs4i_gather_image_velocity);
     gs4i_gather_image_particles(sim, gs4i_gather_image_acceleration);
+    return GS4_OK;
 }
 
 /* Largest eigenvalues of the discrete operators on particles, times h^2: of div grad as sound
@@ -13393,10 +13470,11 @@ static void gs4i_trial_euler_with_heat_task(int index, void *context)
 }
 
 /* Stress and weight are in the momentum already. */
-static void gs4i_accelerate_nothing(gs4_sim *sim, gs4i_node_pass *nodes)
+static int gs4i_accelerate_nothing(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     (void)sim;
     (void)nodes;
+    return GS4_OK;
 }
 
 /* Lone particles with their affine field: sum |grad w|^2 / w, times h^2. */
@@ -13411,19 +13489,1546 @@ static double gs4i_stable_euler_dt(const gs4_sim *sim, double c, double nu)
     return d + w > 0 ? 8 / (d + sqrt(d * d + 16 * w * w)) : (double)GS4I_HUGE;
 }
 
+/* ==== [[staggered]] velocities on faces ========================================================= *
+ *
+ * The grid of the partitioned scheme: a dense box (see [[box]]) around all blocks with nodes, those
+ * behind walls included. Velocities are at faces, each component at those across its axis; volumes
+ * and pressures in cells. Quadratic B-splines, each component with its own weights:
+ *
+ *          +--v--+--v--+          u  faces across x, place 1
+ *          u  p  u  p  u          v  faces across y, place 2
+ *          +--v--+--v--+          p  cells, place 0
+ *
+ * A face has two quads. What particles give to it, and what is made of that in place; and what
+ * particles take from it. */
+
+enum {
+    /* given: momentum -> v_i -> v**; m dv/dt -> P a -> ag; volume -> density; mass */
+    GS4I_FACE_VELOCITY = 0,
+    GS4I_FACE_RATE,
+    GS4I_FACE_DENSITY,
+    GS4I_FACE_MASS,
+    /* taken: u~; acc, then with feedback; that, then v_i; velocity of the volume correction */
+    GS4I_FACE_STAGE = 0,
+    GS4I_FACE_ACCELERATION,
+    GS4I_FACE_FEEDBACK,
+    GS4I_FACE_SEEN = GS4I_FACE_FEEDBACK,
+    GS4I_FACE_CORRECTION
+};
+
+/* What a face knows of its u~: nothing; the solve (1) or a wall (2) has given it; or it was
+ * extrapolated, in layer 3, 4, ... */
+enum {
+    GS4I_FACE_UNKNOWN = 0,
+    GS4I_FACE_SOLVED,
+    GS4I_FACE_AT_WALL,
+    GS4I_FACE_LAYER
+};
+#define GS4I_FACE_LAYERS 3
+
+/* Of a cell, four numbers: volume of material (m^3) -> its share of the cell; and weighed by it,
+ * then divided by it: 1/K (1/Pa), J** - 1. */
+enum {
+    GS4I_CELL_FILL = 0,
+    GS4I_CELL_COMPLIANCE,
+    GS4I_CELL_DILATION,
+    GS4I_CELL_SOLID /* share of its kernel that bodies take */
+};
+
+/* Weights of a particle along each axis, for numbers at centres [0] and at faces [1]. */
+typedef struct gs4i_face_weights {
+    int base[2][3];
+    gs4_real w[2][3][3], d[2][3][3]; /* d: 1/m */
+    gs4_real offset[2][3];           /* m, of the first place from the particle */
+} gs4i_face_weights;
+
+/* For a particle at x (m). 0 if it reaches beyond the box. */
+static int gs4i_face_weights_at(const gs4i_grid *g, const gs4i_box *box, const gs4_real x[3],
+                                gs4i_face_weights *s)
+{
+    const gs4_real origin[3] = { g->origin.x, g->origin.y, g->origin.z };
+    int a, t;
+    for (a = 0; a < 3; a++) {
+        const gs4_real at = (x[a] - origin[a]) * g->inv_h - GS4I_C(box->low[a]);
+        if (!(at >= 2 && at < GS4I_C(box->size[a] - 2))) return 0;
+        for (t = 0; t < 2; t++) {
+            const gs4_real here = t ? at : at - GS4I_C(0.5); /* places are at 0, 1, 2 ... */
+            const int base = (int)(here + GS4I_C(0.5)) - 1;
+            const gs4_real e = here - GS4I_C(base + 1); /* -1/2 to 1/2 */
+            s->base[t][a] = base;
+            s->offset[t][a] = (GS4I_C(base) - here) * g->h;
+            s->w[t][a][0] = GS4I_C(0.5) * (GS4I_C(0.5) - e) * (GS4I_C(0.5) - e);
+            s->w[t][a][1] = GS4I_C(0.75) - e * e;
+            s->w[t][a][2] = GS4I_C(0.5) * (GS4I_C(0.5) + e) * (GS4I_C(0.5) + e);
+            s->d[t][a][0] = (e - GS4I_C(0.5)) * g->inv_h;
+            s->d[t][a][1] = -2 * e * g->inv_h;
+            s->d[t][a][2] = (e + GS4I_C(0.5)) * g->inv_h;
+        }
+    }
+    return 1;
+}
+
+/* Loop over the 27 entries `at` of a place around a particle: w_x, w_y, w_z are weights[..][i]. */
+#define GS4I_FACES_AROUND(box, place, s, i, j, k, at)                            \
+    for (k = 0; k < 3; k++)                                                      \
+        for (j = 0; j < 3; j++)                                                  \
+            for (i = 0, at = gs4i_box_index(box, place, (s)->base[(place)&1][0], \
+                                            (s)->base[(place) >> 1 & 1][1] + j,  \
+                                            (s)->base[(place) >> 2 & 1][2] + k); \
+                 i < 3; i++, at++)
+
+/* Has any material stress beside the pressure? */
+static int gs4i_has_stress(const gs4_sim *sim)
+{
+    int i, any = sim->particles.elastic_reals || sim->particles.deformation_reals;
+    for (i = 0; i < sim->material_count; i++)
+        any |= sim->constants[i].viscosity > 0 || sim->constants[i].varies;
+    return any;
+}
+
+/* The box around all blocks with nodes, and its fields. */
+static int gs4i_begin_staggered(gs4_sim *sim)
+{
+    gs4i_staggered *f = &sim->staggered;
+    gs4i_box *box = &f->box;
+    const gs4i_grid *g = &sim->grid;
+    const int bodies = sim->boundary.collider_count > 0;
+    int s, a, high[3];
+    for (a = 0; a < 3; a++) {
+        box->low[a] = g->cells[a] + 4;
+        high[a] = -4;
+    }
+    for (s = 0; s < g->active; s++) {
+        int first[3];
+        gs4i_block_origin(g, g->block[s], first);
+        for (a = 0; a < 3; a++) {
+            if (first[a] < box->low[a]) box->low[a] = first[a];
+            if (first[a] + GS4I_BLOCK_SIDE > high[a]) high[a] = first[a] + GS4I_BLOCK_SIDE;
+        }
+    }
+    for (a = 0; a < 3; a++) {
+        box->size[a] = high[a] - box->low[a];
+        f->from[a] = box->low[a] < 0 ? -box->low[a] : 0;
+        f->to[a] = high[a] > g->cells[a] ? g->cells[a] - box->low[a] : box->size[a];
+    }
+    if (gs4i_box_reserve(&sim->memory, box,
+                         (size_t)(3 * (4 + 4 + 1 + 1 + 1) + 4 + 3 + (bodies ? 9 : 0))
+                                 * sizeof(gs4_real)
+                             + (bodies ? 7 : 4))
+        != GS4_OK)
+        return gs4i_fail_memory(&sim->error);
+    for (a = 0; a < 3; a++) {
+        f->given[a] = (gs4_real *)gs4i_box_take(box, 4 * sizeof(gs4_real));
+        f->taken[a] = (gs4_real *)gs4i_box_take(box, 4 * sizeof(gs4_real));
+    }
+    f->cell = (gs4_real *)gs4i_box_take(box, 4 * sizeof(gs4_real));
+    for (a = 0; a < 3; a++) {
+        f->body[a] = bodies ? (gs4_real *)gs4i_box_take(box, 2 * sizeof(gs4_real)) : NULL;
+        f->held[a] = NULL;
+    }
+    for (a = 0; a < 3; a++)
+        f->open[a] = bodies ? (gs4_real *)gs4i_box_take(box, sizeof(gs4_real)) : NULL;
+    for (a = 0; a < 3; a++) {
+        f->force[a] = (gs4_real *)gs4i_box_take(box, sizeof(gs4_real));
+        f->seen[a] = (gs4_real *)gs4i_box_take(box, sizeof(gs4_real));
+        f->reach[a] = (gs4_real *)gs4i_box_take(box, sizeof(gs4_real));
+    }
+    f->diagonal = (gs4_real *)gs4i_box_take(box, sizeof(gs4_real));
+    f->rhs = (gs4_real *)gs4i_box_take(box, sizeof(gs4_real));
+    f->pressure = (gs4_real *)gs4i_box_take(box, sizeof(gs4_real));
+    for (a = 0; a < 3; a++) f->known[a] = (uint8_t *)gs4i_box_take(box, 1);
+    for (a = 0; a < 3 && bodies; a++) f->held[a] = (uint8_t *)gs4i_box_take(box, 1);
+    f->kind = (uint8_t *)gs4i_box_take(box, 1);
+    for (a = 0; a < 3; a++) {
+        const size_t n = gs4i_box_count(box, 1 << a);
+        memset(f->given[a], 0, 4 * n * sizeof(gs4_real));
+        memset(f->taken[a], 0, 4 * n * sizeof(gs4_real));
+        memset(f->force[a], 0, n * sizeof(gs4_real));
+    }
+    memset(f->cell, 0, 4 * gs4i_box_count(box, GS4I_AT_CELL) * sizeof(gs4_real));
+    f->solver.memory = &sim->memory;
+    f->solver.tasks = &sim->tasks;
+    f->iterations = 0;
+    f->residual = 0;
+    f->compressible = 0;
+    f->is_viscous = gs4i_has_stress(sim);
+    for (a = 0; a < sim->material_count; a++) f->compressible |= sim->constants[a].compliance > 0;
+    return GS4_OK;
+}
+
+static void gs4i_free_staggered(gs4i_memory *m, gs4i_staggered *f)
+{
+    gs4i_box_free(m, &f->box);
+    f->solver.memory = m;
+    gs4i_solver_free(&f->solver);
+}
+
+/* --- walls ------------------------------------------------------------------------------------ */
+
+/* Parity of component c at a wall of this side: odd along the normal, and along a sticky wall. A
+ * liquid without viscosity does not feel that: odd there would be a source of energy. */
+static gs4_real gs4i_wall_parity(const gs4_sim *sim, int c, int side)
+{
+    return c == side / 2 || (sim->desc.walls[side] == GS4_WALL_STICK && sim->staggered.is_viscous)
+               ? GS4I_C(-1)
+               : GS4I_C(1);
+}
+
+/* Number of mirror planes of a place behind a wall; index of plane m, 1 ..., and of its image. */
+static int gs4i_mirror_planes(const gs4i_staggered *f, int place, int side, int m, int *behind,
+                              int *image)
+{
+    const int a = side / 2, on_face = place >> a & 1, n = gs4i_box_length(&f->box, place, a);
+    const int low = f->from[a] - 1 + on_face, high = f->to[a]; /* first inner - 1; last wall */
+    if (side & 1) {
+        *behind = on_face ? high + m : high - 1 + m;
+        *image = on_face ? high - m : high - m;
+    } else {
+        *behind = on_face ? low - m : low + 1 - m;
+        *image = on_face ? low + m : low + m;
+    }
+    return *behind >= 0 && *behind < n && *image >= 0 && *image < n;
+}
+
+/* Is there a wall that mirrors within the box? */
+static int gs4i_has_wall(const gs4_sim *sim, int side)
+{
+    const gs4i_staggered *f = &sim->staggered;
+    const int a = side / 2;
+    return sim->desc.walls[side] != GS4_WALL_OPEN
+           && (side & 1 ? f->to[a] < f->box.size[a] : f->from[a] > 0);
+}
+
+/* One entry behind a wall: its index, that of its image and of the wall's own face. */
+typedef struct gs4i_face_mirror {
+    size_t behind, image, wall;
+    gs4_real parity;
+    int is_normal; /* the component across the wall */
+} gs4i_face_mirror;
+typedef void (*gs4i_mirror_fn)(gs4_real *field, const gs4i_face_mirror *m);
+
+/* Apply `fn` to each entry behind the walls. Axis after axis: corners too. */
+static void gs4i_each_mirror(const gs4_sim *sim, int place, gs4_real *field, gs4i_mirror_fn fn)
+{
+    const gs4i_staggered *f = &sim->staggered;
+    const gs4i_box *box = &f->box;
+    int side, m, behind, image, at[3];
+    for (side = 0; side < 6; side++) {
+        const int a = side / 2, b = (a + 1) % 3, c = (a + 2) % 3;
+        gs4i_face_mirror one;
+        one.is_normal = place == 1 << a;
+        one.parity = place ? gs4i_wall_parity(sim, place >> 1, side) : GS4I_C(1);
+        if (!gs4i_has_wall(sim, side)) continue;
+        for (m = 1; m <= 4 && gs4i_mirror_planes(f, place, side, m, &behind, &image); m++)
+            for (at[c] = 0; at[c] < gs4i_box_length(box, place, c); at[c]++)
+                for (at[b] = 0; at[b] < gs4i_box_length(box, place, b); at[b]++) {
+                    at[a] = behind;
+                    one.behind = gs4i_box_index(box, place, at[0], at[1], at[2]);
+                    at[a] = image;
+                    one.image = gs4i_box_index(box, place, at[0], at[1], at[2]);
+                    at[a] = side & 1 ? f->to[a] : f->from[a];
+                    one.wall = one.is_normal ? gs4i_box_index(box, place, at[0], at[1], at[2]) : 0;
+                    fn(field, &one);
+                }
+    }
+}
+
+static void gs4i_fold_number(gs4_real *field, const gs4i_face_mirror *m)
+{
+    field[m->image] += m->parity * field[m->behind];
+    field[m->behind] = 0;
+}
+static void gs4i_fold_given(gs4_real *field, const gs4i_face_mirror *m)
+{
+    size_t k;
+    for (k = 0; k < 4; k++) {
+        field[4 * m->image + k] += (k <= GS4I_FACE_RATE ? m->parity : 1) * field[4 * m->behind + k];
+        field[4 * m->behind + k] = 0;
+    }
+}
+static void gs4i_fill_number(gs4_real *field, const gs4i_face_mirror *m)
+{
+    field[m->behind] = m->parity * field[m->image];
+}
+static void gs4i_fill_given(gs4_real *field, const gs4i_face_mirror *m)
+{
+    field[4 * m->behind] = m->parity * field[4 * m->image];
+}
+/* By their parity; but the feedback across a wall is not 0 on it, see gs4i_split_acceleration. */
+static void gs4i_fill_taken(gs4_real *field, const gs4i_face_mirror *m)
+{
+    size_t k;
+    for (k = 0; k < 4; k++) field[4 * m->behind + k] = m->parity * field[4 * m->image + k];
+    if (m->is_normal)
+        field[4 * m->behind + GS4I_FACE_ACCELERATION] +=
+            2 * field[4 * m->wall + GS4I_FACE_ACCELERATION];
+}
+
+/* --- S3 --------------------------------------------------------------------------------------- */
+
+/* C at the stage, from those of the last two: C + (C - before) times the ratio of steps; |C| dt at
+ * most 1/4, or a splash without viscosity blows up. */
+static void gs4i_stage_affine(const gs4_sim *sim, size_t i, gs4_real C[3][3])
+{
+    const gs4i_particles *p = &sim->particles;
+    const gs4_real dt = sim->integrator.dt, ratio = sim->integrator.affine_ratio;
+    gs4_real squared = 0, most = GS4I_C(0.0625) / (dt * dt);
+    int c, a;
+    for (a = 0; a < 3; a++)
+        for (c = 0; c < 3; c++) {
+            const gs4_real now = p->affine[a][4 * i + (size_t)c],
+                           before = p->affine_before[a][4 * i + (size_t)c];
+            C[c][a] = now + ratio * (now - before);
+            squared += C[c][a] * C[c][a];
+        }
+    if (squared <= most) return;
+    for (a = 0; a < 9; a++) C[a / 3][a % 3] *= GS4I_SQRT(most / squared);
+}
+
+/* Momentum m (v~ + C (x_f - x~)), m a, volume and mass of particles to faces; volume, and what
+ * compresses it, to cells. */
+static void gs4i_give_to_faces(gs4_sim *sim, size_t i, const gs4_real x[3], const gs4_real v[3])
+{
+    gs4i_staggered *f = &sim->staggered;
+    const gs4i_particles *p = &sim->particles;
+    const gs4i_material_constants *mat = gs4i_constants_of(sim, i);
+    const gs4_real m = p->position[4 * i + 3],
+                   J = p->velocity[4 * i + 3] + sim->integrator.before * p->rate[4 * i + 3],
+                   volume = m * mat->inv_density * J;
+    gs4i_face_weights s;
+    gs4_real C[3][3];
+    size_t at;
+    int c, j, k, n;
+    gs4i_stage_affine(sim, i, C);
+    gs4i_face_weights_at(&sim->grid, &f->box, x, &s);
+    for (c = 0; c < 3; c++) {
+        const int place = 1 << c, tx = c == 0, ty = c == 1, tz = c == 2;
+        const gs4_real base = v[c] + C[c][0] * s.offset[tx][0] + C[c][1] * s.offset[ty][1]
+                              + C[c][2] * s.offset[tz][2],
+                       h = sim->grid.h, a = p->rate[4 * i + (size_t)c];
+        GS4I_FACES_AROUND(&f->box, place, &s, n, j, k, at) {
+            const gs4_real w = s.w[tx][0][n] * s.w[ty][1][j] * s.w[tz][2][k];
+            gs4_real *to = f->given[c] + 4 * at;
+            to[GS4I_FACE_VELOCITY] +=
+                w * m
+                * (base + h * (C[c][0] * GS4I_C(n) + C[c][1] * GS4I_C(j) + C[c][2] * GS4I_C(k)));
+            to[GS4I_FACE_RATE] += w * m * a;
+            to[GS4I_FACE_DENSITY] += w * volume;
+            to[GS4I_FACE_MASS] += w * m;
+        }
+    }
+    GS4I_FACES_AROUND(&f->box, GS4I_AT_CELL, &s, n, j, k, at) {
+        const gs4_real w = s.w[0][0][n] * s.w[0][1][j] * s.w[0][2][k] * volume;
+        f->cell[4 * at + GS4I_CELL_FILL] += w;
+        f->cell[4 * at + GS4I_CELL_COMPLIANCE] += w * mat->compliance;
+        if (mat->compliance > 0) f->cell[4 * at + GS4I_CELL_DILATION] += w * (J - 1);
+    }
+}
+
+/* Positions and velocities of a batch at the stage, four numbers a particle. */
+static void gs4i_stage_of(const gs4i_particles *p, size_t i, int n, gs4i_prediction prediction,
+                          gs4i_batch *q, gs4_real x[4 * GS4I_BATCH], gs4_real v[4 * GS4I_BATCH])
+{
+    gs4i_lanes at[3], speed[3];
+    int b, c;
+    gs4i_load_batch(p, i, n, prediction, q);
+    gs4i_predict_positions(q, prediction, at);
+    for (c = 0; c < 3; c++)
+        GS4I_BATCH_LOOP(b) speed[c][b] = q->v[c][b] + prediction.ahead * q->a[c][b];
+    gs4i_from_lanes(at[0], at[1], at[2], q->x[3], x);
+    gs4i_from_lanes(speed[0], speed[1], speed[2], q->x[3], v);
+}
+
+/* Is x where the tile of its block has faces? They go half a cell further up than nodes. */
+static int gs4i_is_in_tile(const gs4i_grid *g, const int first[3], const gs4_real x[3])
+{
+    const gs4_real origin[3] = { g->origin.x, g->origin.y, g->origin.z };
+    int a;
+    for (a = 0; a < 3; a++) {
+        const gs4_real at = (x[a] - origin[a]) * g->inv_h - GS4I_C(first[a]);
+        if (!(at >= -1 && at < GS4I_C(GS4I_BLOCK_SIDE + 0.5))) return 0;
+    }
+    return 1;
+}
+
+static void gs4i_scatter_to_faces(int index, void *context)
+{
+    const gs4i_pass *pass = (const gs4i_pass *)context;
+    gs4_sim *sim = pass->sim;
+    const gs4i_particles p = sim->particles;
+    const int o = pass->blocks[index];
+    size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
+    int first[3];
+    gs4i_block_origin(&sim->grid, sim->grid.occupied_block[o], first);
+    gs4i_report_clear(&sim->reports[o]);
+    for (; i < end; i += GS4I_BATCH) {
+        const int n = gs4i_batch_size(i, end);
+        gs4i_batch q;
+        gs4_real x[4 * GS4I_BATCH], v[4 * GS4I_BATCH];
+        int b;
+        gs4i_stage_of(&p, i, n, sim->integrator.prediction, &q, x, v);
+        for (b = 0; b < n; b++)
+            if (gs4i_is_in_tile(&sim->grid, first, x + 4 * b))
+                gs4i_give_to_faces(sim, i + (size_t)b, x + 4 * b, v + 4 * b);
+            else
+                sim->reports[o].left_tile++;
+    }
+}
+
+/* --- faces ------------------------------------------------------------------------------------ */
+
+/* One plane of faces, or of cells, for gs4i_parallel_for: z runs over one more than cells. */
+typedef struct gs4i_staggered_pass {
+    gs4_sim *sim;
+    gs4_real lightest; /* kg: faces with less are empty */
+    int layer, what;   /* of extrapolation; which of the numbers taken */
+    gs4_real scale;
+} gs4i_staggered_pass;
+
+#define GS4I_EACH_FACE(f, c, z, at, i)                 \
+    if ((z) < gs4i_box_length(&(f)->box, 1 << (c), 2)) \
+        GS4I_BOX_PLANE(&(f)->box, 1 << (c), z, at, i)
+
+/* Is face `at` of axis c within the domain or on a wall of it? 2: on the wall. */
+static int gs4i_face_place(const gs4i_staggered *f, int c, const int at[3])
+{
+    int a;
+    for (a = 0; a < 3; a++)
+        if (at[a] < f->from[a] || at[a] >= f->to[a] + (a == c)) return 0;
+    return at[c] == f->from[c] || at[c] == f->to[c] ? 2 : 1;
+}
+
+/* v_i, P a and the density of the material, of one plane. */
+static void gs4i_face_velocities(int z, void *context)
+{
+    const gs4i_staggered_pass *pass = (const gs4i_staggered_pass *)context;
+    gs4i_staggered *f = &pass->sim->staggered;
+    int c, at[3];
+    size_t i;
+    for (c = 0; c < 3; c++)
+        GS4I_EACH_FACE(f, c, z, at, i) {
+            gs4_real *q = f->given[c] + 4 * i;
+            const gs4_real m = q[GS4I_FACE_MASS];
+            const gs4_real inverse = m > pass->lightest ? 1 / m : GS4I_C(0);
+            q[GS4I_FACE_VELOCITY] *= inverse;
+            q[GS4I_FACE_RATE] *= inverse;
+            q[GS4I_FACE_DENSITY] = inverse > 0 ? m / q[GS4I_FACE_DENSITY] : GS4I_C(0);
+        }
+}
+
+/* The face of axis c before a node: its remembered acceleration is number c there. */
+static const gs4_real *gs4i_remembered_of_face(const gs4_sim *sim, const int at[3], int c)
+{
+    const gs4i_grid *g = &sim->grid;
+    const gs4i_box *box = &sim->staggered.box;
+    int64_t node;
+    int a, x[3];
+    for (a = 0; a < 3; a++) {
+        x[a] = at[a] + box->low[a];
+        if (at[a] >= box->size[a]) return NULL;
+    }
+    node = gs4i_node_at(g, x[0], x[1], x[2]);
+    return node >= 0 && (g->flags[node] & 1 << c) ? gs4i_of_node(g->remembered, (uint32_t)node) + c
+                                                  : NULL;
+}
+
+/* ag, which faces without one take from the particles; v** = v_i - s ag; the first guess of u~:
+ * v** + s (forces of stress over mass + g). */
+static void gs4i_predict_faces(int z, void *context)
+{
+    const gs4i_staggered_pass *pass = (const gs4i_staggered_pass *)context;
+    gs4_sim *sim = pass->sim;
+    gs4i_staggered *f = &sim->staggered;
+    const gs4i_integrator *r = &sim->integrator;
+    const gs4_real gravity[3] = { sim->desc.gravity.x, sim->desc.gravity.y, sim->desc.gravity.z };
+    int c, at[3];
+    size_t i;
+    for (c = 0; c < 3; c++)
+        GS4I_EACH_FACE(f, c, z, at, i) {
+            gs4_real *q = f->given[c] + 4 * i, *t = f->taken[c] + 4 * i;
+            const gs4_real m = q[GS4I_FACE_MASS], *ag = gs4i_remembered_of_face(sim, at, c);
+            const gs4_real acc = (m > pass->lightest ? f->force[c][i] / m : GS4I_C(0)) + gravity[c];
+            if (ag && !f->compressible) q[GS4I_FACE_RATE] = *ag;
+            if (r->restart) q[GS4I_FACE_RATE] = 0;
+            f->seen[c][i] = q[GS4I_FACE_VELOCITY];
+            q[GS4I_FACE_VELOCITY] -= r->s * q[GS4I_FACE_RATE];
+            t[GS4I_FACE_STAGE] = q[GS4I_FACE_VELOCITY] + r->s * acc;
+            t[GS4I_FACE_ACCELERATION] = acc;
+            t[GS4I_FACE_FEEDBACK] = t[GS4I_FACE_CORRECTION] = 0;
+            f->known[c][i] = GS4I_FACE_UNKNOWN;
+        }
+}
+
+/* --- bodies ----------------------------------------------------------------------------------- */
+
+/* Area of a unit square where a distance is positive that is d at its corners, in turn, and linear
+ * along its edges. */
+static gs4_real gs4i_open_area(const gs4_real d[4])
+{
+    static const gs4_real corner[5][2] = { { 0, 0 }, { 1, 0 }, { 1, 1 }, { 0, 1 }, { 0, 0 } };
+    gs4_real x[8][2], area = 0;
+    int i, n = 0, k;
+    for (i = 0; i < 4; i++) {
+        const gs4_real here = d[i], next = d[(i + 1) & 3];
+        if (here > 0) {
+            x[n][0] = corner[i][0];
+            x[n++][1] = corner[i][1];
+        }
+        if ((here > 0) != (next > 0))
+            for (k = 0, n++; k < 2; k++)
+                x[n - 1][k] =
+                    corner[i][k] + here / (here - next) * (corner[i + 1][k] - corner[i][k]);
+    }
+    for (i = 0; i < n; i++) {
+        const gs4_real *a = x[i], *b = x[(i + 1) % n];
+        area += GS4I_C(0.5) * (a[0] * b[1] - b[0] * a[1]);
+    }
+    return area;
+}
+
+/* How much of face c before a node is outside of a slippery body. */
+static gs4_real gs4i_open_share(const gs4i_collider *b, gs4_vec3 centre, int c, gs4_real h)
+{
+    gs4_real d[4], x[3];
+    int i;
+    for (i = 0; i < 4; i++) {
+        x[0] = centre.x;
+        x[1] = centre.y;
+        x[2] = centre.z;
+        x[(c + 1) % 3] += (i == 0 || i == 3 ? -GS4I_C(0.5) : GS4I_C(0.5)) * h;
+        x[(c + 2) % 3] += (i < 2 ? -GS4I_C(0.5) : GS4I_C(0.5)) * h;
+        d[i] = gs4i_collider_distance(b, gs4i_vec3(x[0], x[1], x[2]));
+    }
+    return gs4i_open_area(d);
+}
+
+/* Share of a kernel (quadratic B-spline) behind a plane, whose distance from its centre is d cells. */
+static gs4_real gs4i_share_behind(gs4_real d)
+{
+    const gs4_real t = gs4i_min(gs4i_abs(d), GS4I_C(1.5)), u = GS4I_C(1.5) - t;
+    const gs4_real z =
+        t <= GS4I_C(0.5) ? GS4I_C(0.75) * t - t * t * t / 3 : GS4I_C(0.5) - u * u * u / 6;
+    return d < 0 ? GS4I_C(0.5) + z : GS4I_C(0.5) - z;
+}
+
+static gs4_real gs4i_axis_of(gs4_vec3 v, int c) { return c == 0 ? v.x : c == 1 ? v.y : v.z; }
+
+/* One body at one face: sticky ones and emitters hold it where its centre is inside, slippery ones
+ * close what is inside. */
+static void gs4i_body_at_face(gs4i_staggered *f, const gs4i_grid *g, const gs4i_collider *b,
+                              const int node[3], int c, size_t face)
+{
+    const gs4_vec3 centre = gs4i_place_position(g, node, 1 << c);
+    const gs4_vec3 turn = b->is.angular_velocity;
+    gs4_vec3 r;
+    gs4_real open;
+    if (b->is_emitter || gs4i_is_sticky(b))
+        open = gs4i_collider_distance(b, centre) < 0 ? GS4I_C(0) : GS4I_C(1);
+    else
+        open = gs4i_open_share(b, centre, c, g->h);
+    if (open >= f->open[c][face]) return;
+    f->open[c][face] = open < GS4I_C(0.01) ? GS4I_C(0) : open;
+    f->held[c][face] = b->is_emitter || gs4i_is_sticky(b);
+    r = gs4i_sub(centre, gs4i_vec3(GS4I_C(b->at[0]), GS4I_C(b->at[1]), GS4I_C(b->at[2])));
+    f->body[c][2 * face] = gs4i_axis_of(gs4i_collider_velocity(b, centre), c);
+    f->body[c][2 * face + 1] = gs4i_axis_of(gs4i_cross(turn, gs4i_cross(turn, r)), c);
+}
+
+/* All bodies on the faces and cells of one block with nodes. */
+static void gs4i_bodies_at_block(gs4_sim *sim, int slot)
+{
+    gs4i_staggered *f = &sim->staggered;
+    const gs4i_grid *g = &sim->grid;
+    int first[3], x[3], at[3], n, i, c;
+    gs4i_block_origin(g, g->block[slot], first);
+    for (n = 0; n < sim->boundary.collider_count; n++) {
+        const gs4i_collider *b = &sim->boundary.colliders[n];
+        if (b->is_off || !gs4i_collider_is_near(b, g, slot)) continue;
+        for (i = 0; i < GS4I_BLOCK_NODES; i++) {
+            size_t cell;
+            gs4i_node_coordinates(first, i, x);
+            for (c = 0; c < 3; c++) at[c] = x[c] - f->box.low[c];
+            cell = gs4i_box_index(&f->box, GS4I_AT_CELL, at[0], at[1], at[2]);
+            if (!b->is_emitter) {
+                const gs4_vec3 p = gs4i_place_position(g, x, GS4I_AT_CELL);
+                f->cell[4 * cell + GS4I_CELL_SOLID] =
+                    gs4i_max(f->cell[4 * cell + GS4I_CELL_SOLID],
+                             gs4i_share_behind(gs4i_collider_distance(b, p) * g->inv_h));
+            }
+            for (c = 0; c < 3; c++)
+                gs4i_body_at_face(f, g, b, x, c,
+                                  gs4i_box_index(&f->box, 1 << c, at[0], at[1], at[2]));
+        }
+    }
+}
+
+static void gs4i_bodies_at_group(int index, void *context)
+{
+    gs4_sim *sim = ((const gs4i_node_pass *)context)->sim;
+    int s;
+    for (s = index * GS4I_GROUP; s < gs4i_group_end(&sim->grid, index); s++)
+        gs4i_bodies_at_block(sim, s);
+}
+
+/* Where bodies are, and what they do to v_i. */
+static void gs4i_place_bodies(gs4_sim *sim, gs4i_node_pass *nodes)
+{
+    gs4i_staggered *f = &sim->staggered;
+    int c;
+    size_t i;
+    if (!f->open[0]) return;
+    for (c = 0; c < 3; c++)
+        for (i = 0; i < gs4i_box_count(&f->box, 1 << c); i++) {
+            f->open[c][i] = 1;
+            f->held[c][i] = 0;
+            f->body[c][2 * i] = f->body[c][2 * i + 1] = 0;
+        }
+    gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_bodies_at_group, nodes);
+    for (c = 0; c < 3; c++)
+        for (i = 0; i < gs4i_box_count(&f->box, 1 << c); i++)
+            if (f->held[c][i]) f->given[c][4 * i + GS4I_FACE_VELOCITY] = f->body[c][2 * i];
+}
+
+/* --- where the surface is --------------------------------------------------------------------- */
+
+/* Depth (cells) under the surface of a half space that fills a quadratic B-spline by 1/2 + z; negative
+ * outside. The inverse of z(t) = 3t/4 - t^3/3 for t <= 1/2, else 1/2 - (3/2 - t)^3/6; 3/2 beyond. */
+static gs4_real gs4i_depth_of_fill(gs4_real z)
+{
+    const gs4_real size = gs4i_abs(z);
+    gs4_real low = 0, high = GS4I_C(1.5);
+    int i;
+    for (i = 0; i < 30 && size < GS4I_C(0.5); i++) {
+        const gs4_real t = GS4I_C(0.5) * (low + high), u = GS4I_C(1.5) - t;
+        const gs4_real there =
+            t <= GS4I_C(0.5) ? GS4I_C(0.75) * t - t * t * t / 3 : GS4I_C(0.5) - u * u * u / 6;
+        if (there < size)
+            low = t;
+        else
+            high = t;
+    }
+    low = size < GS4I_C(0.5) ? GS4I_C(0.5) * (low + high) : high;
+    return z < 0 ? -low : low;
+}
+
+/* Cells are liquid from this depth on (cells), or the matrix would lose its digits to surfaces just
+ * above a centre; and how much of a kernel is full then, 3/4 of it more than a half. */
+#define GS4I_SHALLOW 0.02
+#define GS4I_LIQUID_FILL 0.515
+
+/* Distance of the surface from the liquid cell's centre, in cells: p is 0 there. */
+static gs4_real gs4i_surface_weight(gs4_real liquid, gs4_real air)
+{
+    const gs4_real in = gs4i_depth_of_fill(liquid - GS4I_C(0.5)),
+                   out = gs4i_depth_of_fill(air - GS4I_C(0.5));
+    return in / (in - out);
+}
+
+/* Liquid where material fills more than half of the kernel. */
+static void gs4i_classify_cells(int z, void *context)
+{
+    const gs4i_staggered_pass *pass = (const gs4i_staggered_pass *)context;
+    gs4i_staggered *f = &pass->sim->staggered;
+    const gs4i_grid *g = &pass->sim->grid;
+    const gs4_real per_cell = g->inv_h * g->inv_h * g->inv_h;
+    int at[3], a;
+    size_t i;
+    GS4I_BOX_PLANE(&f->box, GS4I_AT_CELL, z, at, i) {
+        gs4_real *q = f->cell + 4 * i;
+        if (q[GS4I_CELL_FILL] > 0) {
+            q[GS4I_CELL_COMPLIANCE] /= q[GS4I_CELL_FILL];
+            q[GS4I_CELL_DILATION] /= q[GS4I_CELL_FILL];
+        }
+        q[GS4I_CELL_FILL] *= per_cell;
+        if (q[GS4I_CELL_SOLID] > 0)
+            q[GS4I_CELL_FILL] /= gs4i_max(1 - q[GS4I_CELL_SOLID], GS4I_C(0.05));
+        f->kind[i] = q[GS4I_CELL_FILL] > GS4I_C(GS4I_LIQUID_FILL) ? GS4_CELL_LIQUID : GS4_CELL_AIR;
+        if (q[GS4I_CELL_SOLID] > GS4I_C(0.95)) f->kind[i] = GS4_CELL_SOLID;
+        f->diagonal[i] = q[GS4I_CELL_COMPLIANCE] / pass->sim->integrator.s;
+        f->pressure[i] = 0;
+        for (a = 0; a < 3; a++)
+            if ((at[a] < f->from[a] && pass->sim->desc.walls[2 * a] != GS4_WALL_OPEN)
+                || (at[a] >= f->to[a] && pass->sim->desc.walls[2 * a + 1] != GS4_WALL_OPEN))
+                f->kind[i] = GS4_CELL_SOLID;
+    }
+}
+
+/* A face that a wall or a body moves. */
+GS4I_INLINE void gs4i_hold_face(gs4i_staggered *f, int c, size_t face, gs4_real velocity,
+                                gs4_real acceleration)
+{
+    f->known[c][face] = GS4I_FACE_AT_WALL;
+    f->taken[c][4 * face + GS4I_FACE_STAGE] = velocity;
+    f->taken[c][4 * face + GS4I_FACE_ACCELERATION] = acceleration;
+}
+
+/* Which faces are unknowns, with c = open s/(w rho) of the pressure's matrix. */
+static void gs4i_classify_face(const gs4_sim *sim, gs4i_staggered *f, int c, const int at[3],
+                               size_t i)
+{
+    const gs4i_box *box = &f->box;
+    const gs4_real s = sim->integrator.s;
+    gs4_real *q = f->given[c] + 4 * i, w = 1;
+    size_t cell, before;
+    int kind, kind_before;
+    f->reach[c][i] = 0;
+    if (at[c] == 0 || at[c] == box->size[c]) return;
+    if ((at[c] == f->from[c] && gs4i_has_wall(sim, 2 * c))
+        || (at[c] == f->to[c] && gs4i_has_wall(sim, 2 * c + 1))) {
+        gs4i_hold_face(f, c, i, 0, 0);
+        return;
+    }
+    if (f->open[c] && f->held[c][i]) {
+        gs4i_hold_face(f, c, i, f->body[c][2 * i], f->body[c][2 * i + 1]);
+        return;
+    }
+    cell = gs4i_box_index(box, GS4I_AT_CELL, at[0], at[1], at[2]);
+    before = cell
+             - (c == 0   ? 1
+                : c == 1 ? (size_t)box->size[0]
+                         : (size_t)box->size[0] * (size_t)box->size[1]);
+    kind = f->kind[cell];
+    kind_before = f->kind[before];
+    if (f->open[c] && (kind == GS4_CELL_SOLID || kind_before == GS4_CELL_SOLID)) f->open[c][i] = 0;
+    if ((kind != GS4_CELL_LIQUID && kind_before != GS4_CELL_LIQUID) || kind == GS4_CELL_SOLID
+        || kind_before == GS4_CELL_SOLID || (f->open[c] && !(f->open[c][i] > 0)))
+        return;
+    if (kind != kind_before)
+        w = kind == GS4_CELL_LIQUID ? gs4i_surface_weight(f->cell[4 * cell], f->cell[4 * before])
+                                    : gs4i_surface_weight(f->cell[4 * before], f->cell[4 * cell]);
+    q[GS4I_FACE_DENSITY] *= w;
+    f->known[c][i] = GS4I_FACE_SOLVED;
+    f->reach[c][i] = s / q[GS4I_FACE_DENSITY] * (f->open[c] ? f->open[c][i] : 1);
+}
+
+static void gs4i_classify_faces(int z, void *context)
+{
+    const gs4i_staggered_pass *pass = (const gs4i_staggered_pass *)context;
+    gs4i_staggered *f = &pass->sim->staggered;
+    int c, at[3];
+    size_t i;
+    for (c = 0; c < 3; c++)
+        GS4I_EACH_FACE(f, c, z, at, i) gs4i_classify_face(pass->sim, f, c, at, i);
+}
+
+/* --- the solves ------------------------------------------------------------------------------- */
+
+/* Number `what` of a face, of which a body closes a part. */
+GS4I_INLINE gs4_real gs4i_flow_through(const gs4i_staggered *f, int what, int c, size_t face)
+{
+    const gs4_real own = f->taken[c][4 * face + (size_t)what];
+    if (!f->open[c] || !(f->open[c][face] < 1) || f->held[c][face]) return own;
+    return f->open[c][face] * own
+           + (what == GS4I_FACE_CORRECTION
+                  ? GS4I_C(0)
+                  : (1 - f->open[c][face])
+                        * f->body[c][2 * face + (what == GS4I_FACE_ACCELERATION)]);
+}
+
+/* Differences of number `what` of the six faces of a cell, times 1/h. */
+static gs4_real gs4i_face_divergence(const gs4i_staggered *f, int what, const int at[3],
+                                     gs4_real inv_h)
+{
+    size_t face[6];
+    gs4_real sum = 0;
+    int c;
+    gs4i_box_faces_of(&f->box, at, face);
+    for (c = 0; c < 3; c++)
+        sum += gs4i_flow_through(f, what, c, face[2 * c + 1])
+               - gs4i_flow_through(f, what, c, face[2 * c]);
+    return inv_h * sum;
+}
+
+/* tr(L L) at a cell, L the gradient of u~: the divergence of the acceleration of a flow that stays
+ * solenoidal. */
+static gs4_real gs4i_trace_of_square(const gs4i_staggered *f, const int at[3], gs4_real inv_h)
+{
+    gs4_real L[3][3], sum = 0;
+    int c, a;
+    for (c = 0; c < 3; c++) {
+        const int place = 1 << c;
+        const size_t low = gs4i_box_index(&f->box, place, at[0], at[1], at[2]);
+        const size_t nx = (size_t)gs4i_box_length(&f->box, place, 0),
+                     step[3] = { 1, nx, nx * (size_t)gs4i_box_length(&f->box, place, 1) };
+        const gs4_real *u = f->taken[c];
+        for (a = 0; a < 3; a++) {
+            const size_t up = low + step[c];
+            if (a == c)
+                L[c][a] = inv_h * (u[4 * up] - u[4 * low]);
+            else
+                L[c][a] = GS4I_C(0.25) * inv_h
+                          * ((u[4 * (low + step[a])] - u[4 * (low - step[a])])
+                             + (u[4 * (up + step[a])] - u[4 * (up - step[a])]));
+        }
+    }
+    for (c = 0; c < 3; c++)
+        for (a = 0; a < 3; a++) sum += L[c][a] * L[a][c];
+    return sum;
+}
+
+/* Right-hand sides: what the solve has to take from the divergence of a number of the faces. */
+static void gs4i_pressure_rhs(int z, void *context)
+{
+    const gs4i_staggered_pass *pass = (const gs4i_staggered_pass *)context;
+    gs4i_staggered *f = &pass->sim->staggered;
+    const gs4_real inv_h = pass->sim->grid.inv_h;
+    int at[3];
+    size_t i;
+    GS4I_BOX_PLANE(&f->box, GS4I_AT_CELL, z, at, i) {
+        f->pressure[i] = 0;
+        f->rhs[i] = 0;
+        if (f->kind[i] != GS4_CELL_LIQUID) continue;
+        f->rhs[i] = -gs4i_face_divergence(f, pass->what, at, inv_h);
+        if (pass->what == GS4I_FACE_ACCELERATION)
+            f->rhs[i] += gs4i_trace_of_square(f, at, inv_h);
+        else
+            f->rhs[i] -= f->cell[4 * i + GS4I_CELL_DILATION] / pass->sim->integrator.s;
+    }
+}
+
+/* Numbers of the unknown faces += scale c (p before - p behind)/h. */
+static void gs4i_apply_pressure(int z, void *context)
+{
+    const gs4i_staggered_pass *pass = (const gs4i_staggered_pass *)context;
+    gs4i_staggered *f = &pass->sim->staggered;
+    const gs4i_box *box = &f->box;
+    const gs4_real scale = pass->sim->integrator.s * pass->sim->grid.inv_h;
+    int c, at[3];
+    size_t i;
+    for (c = 0; c < 3; c++)
+        GS4I_EACH_FACE(f, c, z, at, i) {
+            size_t cell, before;
+            if (f->known[c][i] != GS4I_FACE_SOLVED) continue;
+            cell = gs4i_box_index(box, GS4I_AT_CELL, at[0], at[1], at[2]);
+            before = cell
+                     - (c == 0   ? 1
+                        : c == 1 ? (size_t)box->size[0]
+                                 : (size_t)box->size[0] * (size_t)box->size[1]);
+            f->taken[c][4 * i + (size_t)pass->what] -= scale
+                                                       / f->given[c][4 * i + GS4I_FACE_DENSITY]
+                                                       * (f->pressure[cell] - f->pressure[before]);
+        }
+}
+
+static int gs4i_setup_pressure(gs4_sim *sim)
+{
+    gs4i_staggered *f = &sim->staggered;
+    gs4_poisson_desc d;
+    int a, result;
+    memset(&d, 0, sizeof d);
+    for (a = 0; a < 3; a++) {
+        d.cells[a] = f->box.size[a];
+        d.coefficient[a] = f->reach[a];
+    }
+    d.cell_size = sim->grid.h;
+    d.kind = f->kind;
+    if (f->compressible) d.diagonal = f->diagonal;
+    d.threads = sim->desc.threads;
+    d.parallel_for = sim->desc.parallel_for;
+    result = gs4i_solver_setup(&f->solver, &d);
+    if (result == GS4_OK) return result;
+    if (result == GS4_ERROR_MEMORY) return gs4i_fail_memory(&sim->error);
+    return gs4i_fail_value(&sim->error, GS4_ERROR_UNSTABLE, f->solver.fault, f->solver.fault_value,
+                           " in the pressure of the step, which is not finite or absurd; the step "
+                           "was not taken; a smaller dt would do");
+}
+
+static int gs4i_solve_pressure(gs4_sim *sim)
+{
+    gs4i_staggered *f = &sim->staggered;
+    gs4_solve_stats stats;
+    int result;
+    memset(&stats, 0, sizeof stats);
+    result = gs4i_solver_solve(&f->solver, f->rhs, f->pressure, (double)sim->desc.solver_tolerance,
+                               sim->desc.solver_max_iterations, &stats);
+    f->iterations += stats.iterations;
+    f->residual = fmax(f->residual, stats.residual);
+    if (result == GS4_ERROR_NOT_CONVERGED)
+        return gs4i_fail_value(
+            &sim->error, result, "the pressure of the step did not converge: the residual is ",
+            stats.residual,
+            " of the divergence (solver_tolerance, solver_max_iterations); the step was not "
+            "taken; a larger tolerance, more iterations or a smaller dt would do");
+    if (result != GS4_OK)
+        return gs4i_fail_value(&sim->error, GS4_ERROR_UNSTABLE, f->solver.fault,
+                               f->solver.fault_value,
+                               " in the pressure of the step, which is not finite or absurd; the "
+                               "step was not taken; a smaller dt would do");
+    return GS4_OK;
+}
+
+/* The fastest face (m/s); infinity where something is not finite. */
+static gs4_real gs4i_fastest_face(const gs4i_staggered *f)
+{
+    gs4_real most = 0;
+    int c;
+    size_t i;
+    for (c = 0; c < 3; c++)
+        for (i = 0; i < gs4i_box_count(&f->box, 1 << c); i++)
+            if (f->known[c][i]) {
+                const gs4_real *t = f->taken[c] + 4 * i;
+                if (!gs4i_finite(t[0] + t[1] + t[2])) return GS4I_HUGE;
+                most = gs4i_max(most, gs4i_abs(t[GS4I_FACE_STAGE]));
+            }
+    return most;
+}
+
+/* Where no cell is air nothing may flow into the liquid in all, unless it compresses. */
+static int gs4i_check_inflow(gs4_sim *sim)
+{
+    const gs4i_staggered *f = &sim->staggered;
+    double inflow = 0, liquid = 0;
+    gs4_real fastest;
+    size_t i;
+    if (f->compressible) return GS4_OK;
+    for (i = 0; i < gs4i_box_count(&f->box, GS4I_AT_CELL); i++) {
+        if (f->kind[i] == GS4_CELL_AIR) return GS4_OK;
+        if (f->kind[i] == GS4_CELL_LIQUID) {
+            inflow += (double)f->rhs[i];
+            liquid++;
+        }
+    }
+    fastest = gs4i_fastest_face(f);
+    /* rounding gives 1e-6 of U/h; a piston that crosses a box of 1000 cells 1e-3 */
+    if (liquid < 1 || fabs(inflow) <= 1e-4 * liquid * (double)(fastest * sim->grid.inv_h))
+        return GS4_OK;
+    return gs4i_fail_value(&sim->error, GS4_ERROR_UNSTABLE,
+                           "the closed space is full of incompressible liquid, and its walls or "
+                           "colliders would take a share of ",
+                           inflow / liquid * (double)sim->integrator.dt,
+                           " of it in a step; the step was not taken; a bulk_modulus, an open wall "
+                           "or some air would do");
+}
+
+/* Take from number `what` of the faces a gradient over the density, so that its divergence is what
+ * gs4i_pressure_rhs says. */
+static int gs4i_project(gs4_sim *sim, int what)
+{
+    gs4i_staggered *f = &sim->staggered;
+    gs4i_staggered_pass pass;
+    memset(&pass, 0, sizeof pass);
+    pass.sim = sim;
+    pass.what = what;
+    pass.scale = 1;
+    gs4i_parallel_for(&sim->tasks, f->box.size[2], gs4i_pressure_rhs, &pass);
+    if (what == GS4I_FACE_STAGE) GS4I_TRY(gs4i_check_inflow(sim));
+    GS4I_TRY(gs4i_solve_pressure(sim));
+    gs4i_parallel_for(&sim->tasks, f->box.size[2] + 1, gs4i_apply_pressure, &pass);
+    return GS4_OK;
+}
+
+/* --- extrapolation ---------------------------------------------------------------------------- */
+
+/* Faces beside known ones, of one layer: 2 u1 - u2 along the directions with two, else the mean of
+ * those with one. */
+static void gs4i_extrapolate_layer(int z, void *context)
+{
+    const gs4i_staggered_pass *pass = (const gs4i_staggered_pass *)context;
+    gs4i_staggered *f = &pass->sim->staggered;
+    int c, at[3], a, side, k;
+    size_t i;
+    for (c = 0; c < 3; c++) {
+        const int place = 1 << c;
+        const size_t nx = (size_t)gs4i_box_length(&f->box, place, 0),
+                     step[3] = { 1, nx, nx * (size_t)gs4i_box_length(&f->box, place, 1) };
+        GS4I_EACH_FACE(f, c, z, at, i) {
+            gs4_real two[4] = { 0, 0, 0, 0 }, one[4] = { 0, 0, 0, 0 };
+            int twos = 0, ones = 0;
+            if (f->known[c][i] || !gs4i_face_place(f, c, at)) continue;
+            for (side = 0; side < 6; side++) {
+                const ptrdiff_t d =
+                    side & 1 ? (ptrdiff_t)step[side / 2] : -(ptrdiff_t)step[side / 2];
+                int near[3], far[3], n1, n2;
+                const gs4_real *u1, *u2;
+                for (a = 0; a < 3; a++) near[a] = far[a] = at[a];
+                near[side / 2] += side & 1 ? 1 : -1;
+                far[side / 2] += side & 1 ? 2 : -2;
+                if (!gs4i_face_place(f, c, near)) continue;
+                n1 = f->known[c][(ptrdiff_t)i + d];
+                if (!n1 || n1 >= pass->layer) continue;
+                u1 = f->taken[c] + 4 * ((ptrdiff_t)i + d);
+                for (k = 0; k < 4; k++) one[k] += u1[k];
+                ones++;
+                if (!gs4i_face_place(f, c, far)) continue;
+                n2 = f->known[c][(ptrdiff_t)i + 2 * d];
+                if (!n2 || n2 >= pass->layer) continue;
+                u2 = f->taken[c] + 4 * ((ptrdiff_t)i + 2 * d);
+                for (k = 0; k < 4; k++) two[k] += 2 * u1[k] - u2[k];
+                twos++;
+            }
+            if (!ones) continue;
+            for (k = 0; k < 4; k++)
+                f->taken[c][4 * i + (size_t)k] =
+                    twos ? two[k] / GS4I_C(twos) : one[k] / GS4I_C(ones);
+            f->known[c][i] = (uint8_t)pass->layer;
+        }
+    }
+}
+
+/* Number `what` from the known faces to those around and behind the walls. */
+static void gs4i_extrapolate(gs4_sim *sim, int restart)
+{
+    gs4i_staggered *f = &sim->staggered;
+    gs4i_staggered_pass pass;
+    int c;
+    size_t i;
+    memset(&pass, 0, sizeof pass);
+    pass.sim = sim;
+    if (restart)
+        for (c = 0; c < 3; c++)
+            for (i = 0; i < gs4i_box_count(&f->box, 1 << c); i++)
+                if (f->known[c][i] >= GS4I_FACE_LAYER) f->known[c][i] = GS4I_FACE_UNKNOWN;
+    for (pass.layer = GS4I_FACE_LAYER; pass.layer < GS4I_FACE_LAYER + GS4I_FACE_LAYERS;
+         pass.layer++)
+        gs4i_parallel_for(&sim->tasks, f->box.size[2] + 1, gs4i_extrapolate_layer, &pass);
+}
+
+/* ==== [[partitioned]] the partitioned scheme: forces, then a projection ======================== *
+ *
+ * What [[explicit]] is for stress, and pressure from a solve: u~ = v** + s acc has no divergence,
+ *
+ *     acc = (forces of stress)/m + g - grad p/(w rho),   v** = v_i - s ag                     (P1)
+ *
+ * p = 0 where the surface is: w is its distance from the liquid cell before it, in cells. That alone
+ * does not converge in time: (u~ - v**)/s has the gradient part of what particles gave, times 1/s,
+ * and scattering and gathering are not inverse, so it comes back every step. So acc is split:
+ *
+ *     (u~ - v**)/s = acc + (1/(w rho)) grad phi,   div acc = tr(L L), L = grad u~             (P2)
+ *
+ * acc makes the rates; feedback theta times the rest moves particles, and no node remembers it,
+ * theta = min(1/2, s U/h). Third, positions are corrected once a step so that material fills its
+ * cells: x += dt u_c, div u_c = what is too much there, times a rate. */
+
+/* Largest rates (1/s) of the correction of volume: 20 a stage, or a half a step. */
+#define GS4I_MOST_CORRECTION 0.5
+
+/* --- S4, S5 ----------------------------------------------------------------------------------- */
+
+/* What a particle takes from the faces around x. */
+typedef struct gs4i_face_sums {
+    gs4_real sum[3][4], slope[3][3]; /* of what is taken; dv_c/dx_a of number 0 */
+    gs4_real divergence;
+    int near_liquid;
+} gs4i_face_sums;
+
+GS4I_INLINE void gs4i_take_component(const gs4i_box *box, int c, const gs4_real *field,
+                                     const gs4i_face_weights *s, gs4i_face_sums *out)
+{
+    const int place = 1 << c, tx = c == 0, ty = c == 1, tz = c == 2;
+    size_t at;
+    int i, j, k, n;
+    for (n = 0; n < 4; n++) out->sum[c][n] = 0;
+    for (n = 0; n < 3; n++) out->slope[c][n] = 0;
+    GS4I_FACES_AROUND(box, place, s, i, j, k, at) {
+        const gs4_real x = s->w[tx][0][i], y = s->w[ty][1][j], z = s->w[tz][2][k];
+        const gs4_real *q = field + 4 * at;
+        for (n = 0; n < 4; n++) out->sum[c][n] += x * y * z * q[n];
+        out->slope[c][0] += s->d[tx][0][i] * y * z * q[0];
+        out->slope[c][1] += x * s->d[ty][1][j] * z * q[0];
+        out->slope[c][2] += x * y * s->d[tz][2][k] * q[0];
+    }
+}
+
+/* f_c = - sum over particles of V sigma_ca dw/dx_a. */
+static void gs4i_give_force(gs4_sim *sim, const gs4i_face_weights *s, const gs4_real *sigma)
+{
+    gs4i_staggered *f = &sim->staggered;
+    size_t at;
+    int c, i, j, k;
+    for (c = 0; c < 3; c++) {
+        const int place = 1 << c, tx = c == 0, ty = c == 1, tz = c == 2;
+        GS4I_FACES_AROUND(&f->box, place, s, i, j, k, at) {
+            const gs4_real x = s->w[tx][0][i], y = s->w[ty][1][j], z = s->w[tz][2][k];
+            f->force[c][at] += sigma[gs4i_place[c][0]] * s->d[tx][0][i] * y * z
+                               + sigma[gs4i_place[c][1]] * x * s->d[ty][1][j] * z
+                               + sigma[gs4i_place[c][2]] * x * y * s->d[tz][2][k];
+        }
+    }
+}
+
+/* Stress of the stage, in grad v_i, to faces. */
+static void gs4i_scatter_stress(int index, void *context)
+{
+    const gs4i_pass *pass = (const gs4i_pass *)context;
+    gs4_sim *sim = pass->sim;
+    gs4i_staggered *f = &sim->staggered;
+    const gs4i_particles p = sim->particles;
+    const int o = pass->blocks[index];
+    size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
+    gs4i_response r;
+    gs4i_begin_response(&r, sim, &p, &sim->integrator, &sim->reports[o], NULL);
+    for (; i < end; i += GS4I_BATCH) {
+        const int n = gs4i_batch_size(i, end);
+        gs4i_batch q;
+        gs4_real x[4 * GS4I_BATCH], v[4 * GS4I_BATCH];
+        gs4i_face_weights s[GS4I_BATCH];
+        gs4i_gathered slope;
+        gs4i_gradient L;
+        gs4i_symmetric sigma;
+        gs4i_lanes J, mu;
+        int b, c, a;
+        gs4i_stage_of(&p, i, n, sim->integrator.prediction, &q, x, v);
+        memset(&slope, 0, sizeof slope);
+        for (b = 0; b < n; b++) {
+            gs4i_face_sums sums;
+            gs4i_face_weights_at(&sim->grid, &f->box, x + 4 * b, &s[b]);
+            for (c = 0; c < 3; c++) {
+                gs4i_take_component(&f->box, c, f->given[c], &s[b], &sums);
+                slope.dx[4 * b + c] = sums.slope[c][0];
+                slope.dy[4 * b + c] = sums.slope[c][1];
+                slope.dz[4 * b + c] = sums.slope[c][2];
+            }
+        }
+        gs4i_gradient_lanes(slope.dx, slope.dy, slope.dz, n, L);
+        GS4I_BATCH_LOOP(b) J[b] = q.v[3][b] + sim->integrator.before * q.a[3][b];
+        gs4i_turn_to_batch(&r, i, n);
+        gs4i_stress(&r, L, J, sigma, mu);
+        gs4i_check_liquids(r.report, J, mu, p.id + i, n);
+        for (b = 0; b < n; b++) {
+            gs4_real one[6];
+            for (a = 0; a < 6; a++)
+                one[a] = -GS4I_NTH(q.x[3], b) * GS4I_NTH(r.constants.inv_density, b)
+                         * GS4I_NTH(J, b) * GS4I_NTH(sigma[a], b);
+            gs4i_give_force(sim, &s[b], one);
+        }
+    }
+    gs4i_report_liquids(r.report, &r.seen);
+}
+
+/* C as the faces see it now: where velocities were set by hand. */
+static void gs4i_find_affine_task(int index, void *context)
+{
+    const gs4i_pass *pass = (const gs4i_pass *)context;
+    gs4_sim *sim = pass->sim;
+    const gs4i_staggered *f = &sim->staggered;
+    const gs4i_particles p = sim->particles;
+    const int o = pass->blocks[index];
+    size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
+    for (; i < end; i += GS4I_BATCH) {
+        const int n = gs4i_batch_size(i, end);
+        gs4i_batch q;
+        gs4_real x[4 * GS4I_BATCH], v[4 * GS4I_BATCH];
+        int b, c, a;
+        gs4i_stage_of(&p, i, n, sim->integrator.prediction, &q, x, v);
+        for (b = 0; b < n; b++) {
+            gs4i_face_weights s;
+            gs4i_face_sums sums;
+            gs4i_face_weights_at(&sim->grid, &f->box, x + 4 * b, &s);
+            for (c = 0; c < 3; c++) {
+                gs4i_take_component(&f->box, c, f->given[c], &s, &sums);
+                for (a = 0; a < 3; a++)
+                    p.affine[a][4 * (i + (size_t)b) + (size_t)c] =
+                        p.affine_before[a][4 * (i + (size_t)b) + (size_t)c] = sums.slope[c][a];
+            }
+        }
+    }
+}
+
+/* --- what faces take from the solves ---------------------------------------------------------- */
+
+/* acc_raw = (u~ - v**)/s in place of acc, and once more as feedback. */
+static void gs4i_raw_acceleration(int z, void *context)
+{
+    const gs4i_staggered_pass *pass = (const gs4i_staggered_pass *)context;
+    gs4i_staggered *f = &pass->sim->staggered;
+    const gs4_real inv_s = 1 / pass->sim->integrator.s;
+    int c, at[3];
+    size_t i;
+    for (c = 0; c < 3; c++)
+        GS4I_EACH_FACE(f, c, z, at, i) {
+            gs4_real *t = f->taken[c] + 4 * i;
+            const gs4_real raw =
+                (t[GS4I_FACE_STAGE] - f->given[c][4 * i + GS4I_FACE_VELOCITY]) * inv_s;
+            if (f->known[c][i] == GS4I_FACE_SOLVED)
+                t[GS4I_FACE_ACCELERATION] = t[GS4I_FACE_FEEDBACK] = raw;
+            if (f->known[c][i] == GS4I_FACE_AT_WALL) t[GS4I_FACE_FEEDBACK] = raw;
+        }
+}
+
+/* The feedback theta (acc_raw - acc) in place of acc_raw. */
+static void gs4i_split_acceleration(int z, void *context)
+{
+    const gs4i_staggered_pass *pass = (const gs4i_staggered_pass *)context;
+    gs4i_staggered *f = &pass->sim->staggered;
+    int c, at[3];
+    size_t i;
+    for (c = 0; c < 3; c++)
+        GS4I_EACH_FACE(f, c, z, at, i) {
+            gs4_real *t = f->taken[c] + 4 * i;
+            t[GS4I_FACE_FEEDBACK] =
+                f->known[c][i] == GS4I_FACE_SOLVED || f->known[c][i] == GS4I_FACE_AT_WALL
+                    ? pass->scale * (t[GS4I_FACE_FEEDBACK] - t[GS4I_FACE_ACCELERATION])
+                    : GS4I_C(0);
+        }
+}
+
+/* What particles take: acc with its feedback, and v_i in place of that; ag + (acc - ag)/alpha_m in
+ * place of ag. */
+static void gs4i_finish_taken(int z, void *context)
+{
+    const gs4i_staggered_pass *pass = (const gs4i_staggered_pass *)context;
+    gs4i_staggered *f = &pass->sim->staggered;
+    int c, at[3];
+    size_t i;
+    for (c = 0; c < 3; c++)
+        GS4I_EACH_FACE(f, c, z, at, i) {
+            gs4_real *t = f->taken[c] + 4 * i, *ag = f->given[c] + 4 * i + GS4I_FACE_RATE;
+            *ag += (t[GS4I_FACE_ACCELERATION] - *ag) * pass->sim->integrator.inv_alpha_m;
+            t[GS4I_FACE_ACCELERATION] += t[GS4I_FACE_FEEDBACK];
+            t[GS4I_FACE_SEEN] = f->seen[c][i];
+        }
+}
+
+/* Correction of volume: how much too full a cell is, at most a half, times the rate; where air is
+ * near, only what is too much. */
+static void gs4i_excess_of_volume(int z, void *context)
+{
+    const gs4i_staggered_pass *pass = (const gs4i_staggered_pass *)context;
+    gs4i_staggered *f = &pass->sim->staggered;
+    const gs4i_box *box = &f->box;
+    int at[3], x, y, k;
+    size_t i;
+    GS4I_BOX_PLANE(box, GS4I_AT_CELL, z, at, i) {
+        gs4_real e;
+        int air = 0;
+        f->pressure[i] = f->rhs[i] = 0;
+        if (f->kind[i] != GS4_CELL_LIQUID) continue;
+        for (k = -1; k <= 1; k++)
+            for (y = -1; y <= 1; y++)
+                for (x = -1; x <= 1; x++)
+                    air |=
+                        f->kind[gs4i_box_index(box, GS4I_AT_CELL, at[0] + x, at[1] + y, at[2] + k)]
+                        == GS4_CELL_AIR;
+        e = gs4i_max(GS4I_C(-0.5), gs4i_min(f->cell[4 * i + GS4I_CELL_FILL] - 1, GS4I_C(0.5)));
+        /* a dead band, or noise at the surface would be rectified */
+        f->rhs[i] = pass->scale * (air ? gs4i_max(e - GS4I_C(0.1), 0) : e);
+    }
+}
+
+static int gs4i_correct_volume(gs4_sim *sim, gs4_real fastest)
+{
+    gs4i_staggered *f = &sim->staggered;
+    gs4i_staggered_pass pass;
+    const gs4_real dt = sim->integrator.dt;
+    memset(&pass, 0, sizeof pass);
+    pass.sim = sim;
+    pass.what = GS4I_FACE_CORRECTION;
+    pass.scale = gs4i_min(fastest * sim->grid.inv_h, GS4I_C(GS4I_MOST_CORRECTION) / dt);
+    gs4i_parallel_for(&sim->tasks, f->box.size[2], gs4i_excess_of_volume, &pass);
+    GS4I_TRY(gs4i_solve_pressure(sim));
+    pass.scale = 1;
+    gs4i_parallel_for(&sim->tasks, f->box.size[2] + 1, gs4i_apply_pressure, &pass);
+    return GS4_OK;
+}
+
+/* --- the parts of the step -------------------------------------------------------------------- */
+
+static int gs4i_clear_faces(gs4_sim *sim, gs4i_node_pass *nodes)
+{
+    (void)nodes;
+    return gs4i_begin_staggered(sim);
+}
+
+/* v_i on faces and volumes in cells, walls included. */
+static int gs4i_finish_faces(gs4_sim *sim, gs4i_node_pass *nodes)
+{
+    gs4i_staggered *f = &sim->staggered;
+    gs4i_staggered_pass pass;
+    int c;
+    memset(&pass, 0, sizeof pass);
+    pass.sim = sim;
+    pass.lightest = nodes->lightest;
+    for (c = 0; c < 3; c++) gs4i_each_mirror(sim, 1 << c, f->given[c], gs4i_fold_given);
+    gs4i_each_mirror(sim, GS4I_AT_CELL, f->cell, gs4i_fold_given);
+    gs4i_parallel_for(&sim->tasks, f->box.size[2] + 1, gs4i_face_velocities, &pass);
+    return GS4_OK;
+}
+
+/* div u~ of liquid cells, for J, where the right-hand side was. The largest. */
+static gs4_real gs4i_find_divergence(gs4_sim *sim)
+{
+    gs4i_staggered *f = &sim->staggered;
+    gs4_real most = 0;
+    int z, at[3];
+    size_t i;
+    for (z = 0; z < f->box.size[2]; z++)
+        GS4I_BOX_PLANE(&f->box, GS4I_AT_CELL, z, at, i) {
+            f->rhs[i] = 0;
+            if (f->kind[i] != GS4_CELL_LIQUID) continue;
+            f->rhs[i] = gs4i_face_divergence(f, GS4I_FACE_STAGE, at, sim->grid.inv_h);
+            most = gs4i_max(most, gs4i_abs(f->rhs[i]));
+        }
+    gs4i_each_mirror(sim, GS4I_AT_CELL, f->rhs, gs4i_fill_number);
+    return most;
+}
+
+/* acc is what pressure leaves of the rate of u~; or, split, (P2). */
+static int gs4i_finish_acceleration(gs4_sim *sim, gs4_real fastest)
+{
+    gs4i_staggered *f = &sim->staggered;
+    gs4i_staggered_pass pass;
+    int c;
+    memset(&pass, 0, sizeof pass);
+    pass.sim = sim;
+    gs4i_parallel_for(&sim->tasks, f->box.size[2] + 1, gs4i_raw_acceleration, &pass);
+    if (!f->compressible && !f->without_split) {
+        gs4i_extrapolate(sim, 0);
+        for (c = 0; c < 3; c++) gs4i_each_mirror(sim, 1 << c, f->taken[c], gs4i_fill_taken);
+        GS4I_TRY(gs4i_project(sim, GS4I_FACE_ACCELERATION));
+        pass.scale = gs4i_min(GS4I_C(0.5), sim->integrator.s * fastest * sim->grid.inv_h);
+    }
+    gs4i_parallel_for(&sim->tasks, f->box.size[2] + 1, gs4i_split_acceleration, &pass);
+    return GS4_OK;
+}
+
+/* S4 to S6. */
+static int gs4i_accelerate_by_projection(gs4_sim *sim, gs4i_node_pass *nodes)
+{
+    gs4i_staggered *f = &sim->staggered;
+    const int planes = f->box.size[2], has_stress = gs4i_has_stress(sim);
+    const double start = gs4i_now(sim);
+    gs4i_staggered_pass pass;
+    gs4_real fastest, most = 0;
+    int c;
+    memset(&pass, 0, sizeof pass);
+    pass.sim = sim;
+    pass.lightest = nodes->lightest;
+    gs4i_place_bodies(sim, nodes);
+    if (has_stress) {
+        for (c = 0; c < 3; c++) gs4i_each_mirror(sim, 1 << c, f->given[c], gs4i_fill_given);
+        gs4i_scatter(sim, gs4i_scatter_stress);
+        for (c = 0; c < 3; c++) gs4i_each_mirror(sim, 1 << c, f->force[c], gs4i_fold_number);
+    }
+    gs4i_parallel_for(&sim->tasks, planes + 1, gs4i_predict_faces, &pass);
+    gs4i_parallel_for(&sim->tasks, planes, gs4i_classify_cells, &pass);
+    gs4i_parallel_for(&sim->tasks, planes + 1, gs4i_classify_faces, &pass);
+    GS4I_TRY(gs4i_setup_pressure(sim));
+    GS4I_TRY(gs4i_project(sim, GS4I_FACE_STAGE));
+    fastest = gs4i_fastest_face(f);
+    GS4I_TRY(gs4i_finish_acceleration(sim, fastest));
+    if (!f->without_correction) GS4I_TRY(gs4i_correct_volume(sim, fastest));
+    if (f->compressible) most = gs4i_find_divergence(sim);
+    gs4i_extrapolate(sim, 1);
+    gs4i_parallel_for(&sim->tasks, planes + 1, gs4i_finish_taken, &pass);
+    for (c = 0; c < 3; c++) gs4i_each_mirror(sim, 1 << c, f->taken[c], gs4i_fill_taken);
+    f->is_safe = !sim->particles.elastic_reals && !sim->particles.deformation_reals
+                 && fastest * sim->integrator.dt < sim->grid.h
+                 && most * sim->integrator.dt < GS4I_C(GS4I_SAFE_STRAIN);
+    sim->seconds[GS4I_CLOCK_SOLVE] += gs4i_now(sim) - start;
+    return GS4_OK;
+}
+
+/* --- S7 --------------------------------------------------------------------------------------- */
+
+/* What faces say to a batch. Particles without liquid around fly by themselves. */
+typedef struct gs4i_face_corrections {
+    gs4i_lanes U[4], A[4], shift[4]; /* sum w u~; sum w (acc + feedback); u_c */
+    gs4i_lanes subgrid[4];           /* V - v~ */
+    gs4i_gradient L;                 /* of u~ */
+    gs4i_lanes div;
+} gs4i_face_corrections;
+
+static void gs4i_gather_from_faces(const gs4_sim *sim, const gs4i_batch *q, int n,
+                                   const gs4_real *x, const gs4_real *v, gs4i_gathered *slope,
+                                   gs4i_face_corrections *k)
+{
+    const gs4i_staggered *f = &sim->staggered;
+    const gs4i_integrator *r = &sim->integrator;
+    const gs4_real gravity[3] = { sim->desc.gravity.x, sim->desc.gravity.y, sim->desc.gravity.z };
+    gs4_real U[4 * GS4I_BATCH], A[4 * GS4I_BATCH], shift[4 * GS4I_BATCH], seen[4 * GS4I_BATCH];
+    int b, c;
+    memset(U, 0, sizeof U);
+    memset(A, 0, sizeof A);
+    memset(shift, 0, sizeof shift);
+    memset(seen, 0, sizeof seen);
+    memset(slope, 0, sizeof *slope);
+    memset(k->div, 0, sizeof k->div);
+    for (b = 0; b < n; b++) {
+        const gs4_real most = GS4I_C(0.1) * sim->grid.h / r->dt;
+        gs4i_face_weights s;
+        gs4i_face_sums sums;
+        size_t at;
+        int i, j, l, near_liquid = 0;
+        gs4i_face_weights_at(&sim->grid, &f->box, x + 4 * b, &s);
+        GS4I_FACES_AROUND(&f->box, GS4I_AT_CELL, &s, i, j, l, at) {
+            near_liquid |= f->kind[at] == GS4_CELL_LIQUID;
+            if (f->compressible)
+                GS4I_NTH(k->div, b) += s.w[0][0][i] * s.w[0][1][j] * s.w[0][2][l] * f->rhs[at];
+        }
+        for (c = 0; c < 3; c++) {
+            const int e = 4 * b + c;
+            if (!near_liquid) {
+                U[e] = GS4I_NTH_CONST(q->v[c], b) + r->before * GS4I_NTH_CONST(q->a[c], b)
+                       + r->s * gravity[c];
+                A[e] = gravity[c];
+                continue;
+            }
+            gs4i_take_component(&f->box, c, f->taken[c], &s, &sums);
+            U[e] = sums.sum[c][GS4I_FACE_STAGE];
+            A[e] = sums.sum[c][GS4I_FACE_ACCELERATION];
+            seen[e] = sums.sum[c][GS4I_FACE_SEEN] - v[e];
+            shift[e] = gs4i_max(-most, gs4i_min(sums.sum[c][GS4I_FACE_CORRECTION], most));
+            slope->dx[e] = sums.slope[c][0];
+            slope->dy[e] = sums.slope[c][1];
+            slope->dz[e] = sums.slope[c][2];
+        }
+    }
+    gs4i_to_lanes(U, n, k->U);
+    gs4i_to_lanes(A, n, k->A);
+    gs4i_to_lanes(shift, n, k->shift);
+    gs4i_to_lanes(seen, n, k->subgrid);
+    gs4i_gradient_lanes(slope->dx, slope->dy, slope->dz, n, k->L);
+}
+
+/* Velocity by rule (4), with decay of what the grid does not see, implicit in itself; position with
+ * the grid's velocity, and where volume wants it; J by the divergence. */
+static void gs4i_correct_by_faces(gs4i_integrator r, const gs4i_face_corrections *k, gs4i_batch *q)
+{
+    int b, c;
+    for (c = 0; c < 3; c++)
+        GS4I_BATCH_LOOP(b) {
+            const gs4i_wide v = q->v[c][b], a = q->a[c][b], move = q->move[c][b];
+            const gs4i_wide stage_a = k->A[c][b] + r.stable_decay * k->subgrid[c][b];
+            const gs4i_wide da = (stage_a - a) * r.inv_alpha_m,
+                            change = (k->U[c][b] - move) * r.inv_alpha_m;
+            q->v[c][b] = (v + r.dt * a) + r.gamma * r.dt * da;
+            q->a[c][b] = a + da;
+            if (r.decayed_at_once > 0) q->v[c][b] += r.decayed_at_once * k->subgrid[c][b];
+            q->x[c][b] =
+                ((q->x[c][b] + r.dt * move) + r.gamma * r.dt * change) + r.dt * k->shift[c][b];
+            q->move[c][b] = (q->v[c][b] - (move + change)) - r.next_shift * q->a[c][b];
+        }
+    GS4I_BATCH_LOOP(b) {
+        const gs4i_wide J = q->v[3][b], Jr = q->a[3][b];
+        const gs4i_wide dJ = ((J + r.prediction.ahead * Jr) * k->div[b] - Jr)
+                             / (r.alpha_m - r.alpha_f * r.gamma * r.dt * k->div[b]);
+        q->v[3][b] = (J + r.dt * Jr) + r.gamma * r.dt * dJ;
+        q->a[3][b] = Jr + dJ;
+    }
+}
+
+static void gs4i_correct_from_faces(const gs4i_pass *pass, int index, int commit)
+{
+    gs4_sim *sim = pass->sim;
+    const gs4i_grid *g = &sim->grid;
+    const gs4i_particles p = sim->particles;
+    const gs4i_integrator integrator = sim->integrator;
+    const int o = pass->blocks[index];
+    gs4i_report *report = &sim->reports[o];
+    gs4i_response r;
+    size_t i = (size_t)g->first[o], end = (size_t)g->first[o + 1];
+    if (!commit && sim->staggered.is_safe) return;
+    gs4i_begin_response(&r, sim, &p, &integrator, report, NULL);
+    for (; i < end; i += GS4I_BATCH) {
+        const int n = gs4i_batch_size(i, end);
+        gs4i_batch q;
+        gs4_real x[4 * GS4I_BATCH], v[4 * GS4I_BATCH];
+        gs4i_gathered slope;
+        gs4i_face_corrections k;
+        gs4i_stored out;
+        int a;
+        gs4i_stage_of(&p, i, n, integrator.prediction, &q, x, v);
+        gs4i_gather_from_faces(sim, &q, n, x, v, &slope, &k);
+        gs4i_correct_by_faces(integrator, &k, &q);
+        gs4i_advance_response(&r, i, n, k.L, NULL, q.v[3], commit);
+        if (!commit) {
+            gs4i_validate_batch(&q, k.L, p.position + 4 * i, n, g->h, p.id + i, report);
+            continue;
+        }
+        gs4i_pack_batch(&q, 1, &out);
+        gs4i_correct_contact(sim, i, n, NULL, &out, &slope, report);
+        gs4i_see_motion(&r.seen, q.v, k.L);
+        gs4i_store_batch(&p, i, n, &out);
+        for (a = 0; a < 3; a++) {
+            const gs4_real *now = a == 0 ? slope.dx : a == 1 ? slope.dy : slope.dz;
+            memcpy(p.affine_before[a] + 4 * i, integrator.restart ? now : p.affine[a] + 4 * i,
+                   4 * (size_t)n * sizeof *now);
+            memcpy(p.affine[a] + 4 * i, now, 4 * (size_t)n * sizeof *now);
+        }
+    }
+    if (commit) gs4i_report_motion(report, &r.seen);
+}
+
+static void gs4i_correct_from_faces_task(int index, void *context)
+{
+    gs4i_correct_from_faces((const gs4i_pass *)context, index, 1);
+}
+static void gs4i_trial_from_faces_task(int index, void *context)
+{
+    gs4i_correct_from_faces((const gs4i_pass *)context, index, 0);
+}
+
+/* ag of the faces before a node, where they know theirs. */
+static void gs4i_remember_faces(int index, void *context)
+{
+    const gs4i_node_pass *pass = (const gs4i_node_pass *)context;
+    const gs4i_grid *g = &pass->sim->grid;
+    const gs4i_staggered *f = &pass->sim->staggered;
+    int s, i, c;
+    for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
+        int first[3], at[3];
+        gs4i_block_origin(g, g->block[s], first);
+        for (i = 0; i < GS4I_BLOCK_NODES; i++) {
+            const uint32_t node = gs4i_first_node(s) + (uint32_t)i;
+            gs4_real *ag = gs4i_of_node(g->remembered, node);
+            int known = 0;
+            gs4i_node_coordinates(first, i, at);
+            for (c = 0; c < 3; c++) at[c] -= f->box.low[c];
+            for (c = 0; c < 3; c++) {
+                const size_t face = gs4i_box_index(&f->box, 1 << c, at[0], at[1], at[2]);
+                ag[c] = 0;
+                if (f->known[c][face] == GS4I_FACE_UNKNOWN) continue;
+                ag[c] = f->given[c][4 * face + GS4I_FACE_RATE];
+                known |= 1 << c;
+            }
+            ag[3] = 0;
+            g->flags[node] = (uint8_t)(known | (known ? GS4I_REMEMBERS : 0));
+        }
+    }
+}
+
+/* Viscosity and elasticity stay explicit: nu dt/h^2 at most 0.4, of backward Euler 0.2; waves of
+ * elasticity half a cell a step. */
+static double gs4i_stable_partitioned_dt(const gs4_sim *sim, double c, double nu)
+{
+    const double h = (double)sim->grid.h,
+                 most = sim->desc.integrator == GS4_INTEGRATOR_GS4 ? 0.4 : 0.2;
+    double dt = (double)GS4I_HUGE;
+    if (nu > 0) dt = fmin(dt, most * h * h / nu);
+    if (c > 0) dt = fmin(dt, 0.5 * h / c);
+    return dt;
+}
+
 /* The scheme of a simulation. Nothing else asks which it is. */
 static const gs4i_scheme *gs4i_scheme_of(const gs4_sim *sim)
 {
     static const gs4i_scheme gs4 = { { gs4i_scatter_momentum, gs4i_scatter_momentum },
                                      { gs4i_trial_task, gs4i_trial_with_heat_task },
                                      { gs4i_correct_task, gs4i_correct_with_heat_task },
+                                     gs4i_remember_accelerations,
+                                     gs4i_clear_all_nodes,
+                                     gs4i_set_velocities,
                                      gs4i_accelerate_explicitly,
                                      gs4i_stable_explicit_dt };
     static const gs4i_scheme euler = { { gs4i_scatter_euler, gs4i_scatter_euler_and_heat },
                                        { gs4i_trial_euler_task, gs4i_trial_euler_with_heat_task },
                                        { gs4i_gather_euler_task, gs4i_gather_euler_with_heat_task },
+                                       NULL,
+                                       gs4i_clear_all_nodes,
+                                       gs4i_set_velocities,
                                        gs4i_accelerate_nothing,
                                        gs4i_stable_euler_dt };
+    static const gs4i_scheme partitioned = {
+        { gs4i_scatter_to_faces, gs4i_scatter_to_faces },
+        { gs4i_trial_from_faces_task, gs4i_trial_from_faces_task },
+        { gs4i_correct_from_faces_task, gs4i_correct_from_faces_task },
+        gs4i_remember_faces,
+        gs4i_clear_faces,
+        gs4i_finish_faces,
+        gs4i_accelerate_by_projection,
+        gs4i_stable_partitioned_dt
+    };
+    if (sim->desc.scheme == GS4_PARTITIONED) return &partitioned;
     return sim->desc.integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER ? &euler : &gs4;
 }
 
@@ -13988,9 +15593,14 @@ static void gs4i_set_constants(gs4_sim *sim)
         gs4i_material_constants *l = &sim->constants[i];
         const double c0 =
             gs4i_sound_speed_of(&sim->desc, &l->is, sim->top_speed, gs4i_extreme_density(sim, 1));
-        l->lone = gs4i_lone_waves(sim, &l->is);
-        l->sound_speed = GS4I_C(c0);
-        l->tait = gs4i_tait_of(&l->is, c0);
+        l->sound_speed = l->tait = l->compliance = 0;
+        l->lone = 1;
+        if (sim->desc.scheme == GS4_EXPLICIT) {
+            l->lone = gs4i_lone_waves(sim, &l->is);
+            l->sound_speed = GS4I_C(c0);
+            l->tait = gs4i_tait_of(&l->is, c0);
+        } else if (!l->is.incompressible)
+            l->compliance = GS4I_C(1 / ((double)l->is.density * c0 * c0));
         gs4i_set_material_constants(l, sim->desc.ambient_temperature);
         sim->solid_phase[i] = *l;
         gs4i_set_solid_phase(&sim->solid_phase[i]);
@@ -14238,6 +15848,7 @@ static int gs4i_add_particle(gs4_sim *sim, gs4_vec3 x, gs4_vec3 v, gs4_real mass
         memset(p->position_residual + 4 * i, 0, 4 * sizeof(gs4i_half));
     }
     for (k = 0; k < 3 && p->affine[k]; k++) memset(p->affine[k] + 4 * i, 0, 4 * real);
+    for (k = 0; k < 3 && p->affine_before[k]; k++) memset(p->affine_before[k] + 4 * i, 0, 4 * real);
     if (p->elastic_reals)
         memset(p->elastic + (size_t)p->elastic_reals * i, 0, (size_t)p->elastic_reals * real);
     if (p->deformation_reals) gs4i_undeform(p, i, 1);
@@ -14262,6 +15873,8 @@ static void gs4i_fill_one(gs4_sim *sim, const gs4_real at[3], gs4_vec3 centre, c
     if (!gs4i_add_particle(sim, x, v, mass, f)) return;
     for (k = 0; k < 3 && sim->particles.affine[k]; k++)
         memcpy(sim->particles.affine[k] + 4 * i, C[k], sizeof C[k]);
+    for (k = 0; k < 3 && sim->particles.affine_before[k]; k++)
+        memcpy(sim->particles.affine_before[k] + 4 * i, C[k], sizeof C[k]);
     if (sim->particles.deformation_reals && !sim->needs_spin)
         gs4i_set_spin(&sim->particles, i,
                       gs4i_constants_of(sim, i)->shear_modulus > 0 ? w : gs4i_vec3(0, 0, 0));
@@ -15340,7 +16953,8 @@ static void gs4i_see_colliders(const gs4_sim *sim, gs4i_report *r)
 static void gs4i_follow_speed(const gs4_sim *sim, gs4_real top_speed, gs4i_batch_constants *l)
 {
     int b;
-    for (b = 0; b < GS4I_BATCH && top_speed > sim->top_speed; b++) {
+    for (b = 0; b < GS4I_BATCH && top_speed > sim->top_speed && sim->desc.scheme == GS4_EXPLICIT;
+         b++) {
         const double c0 =
             gs4i_sound_speed_of(&sim->desc, &l->of[b]->is, top_speed, gs4i_extreme_density(sim, 1));
         GS4I_NTH(l->wave_speed, b) = GS4I_C(c0) * GS4I_SQRT(l->of[b]->lone);
@@ -15456,6 +17070,10 @@ static gs4i_integrator gs4i_make_integrator(const gs4_sim *sim, gs4_real dt)
     k.dt = dt;
     k.restart = sim->restart;
     gs4i_family(&k, r, s, k.restart);
+    if (sim->desc.integrator == GS4_INTEGRATOR_BACKWARD_EULER) k.alpha_m = k.alpha_f = k.gamma = 1;
+    k.affine_ratio = k.restart || sim->desc.integrator != GS4_INTEGRATOR_GS4 || !(sim->last_dt > 0)
+                         ? GS4I_C(0)
+                         : dt / GS4I_C(sim->last_dt);
     k.prediction.ahead = with_rates ? k.alpha_f * dt : GS4I_C(0);
     k.prediction.shift = k.restart ? GS4I_C(0) : sim->shift;
     k.next_shift = (k.gamma - GS4I_C(0.5)) * dt;
@@ -15550,8 +17168,7 @@ static int gs4i_rasterise(gs4_sim *sim, gs4i_node_pass *nodes)
     int tries;
     for (tries = 0; tries < 2; tries++) {
         if (sim->needs_sort || tries) GS4I_TRY(gs4i_bin(sim));
-        gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_clear_nodes, nodes);
-        GS4I_TRY(gs4i_find_image_particles(sim));
+        GS4I_TRY(gs4i_scheme_of(sim)->clear(sim, nodes));
         gs4i_scatter(sim, gs4i_scheme_of(sim)->scatter[sim->particles.with_heat]);
         if (!gs4i_all_reports(sim).left_tile) return GS4_OK;
     }
@@ -15565,10 +17182,7 @@ static int gs4i_rasterise(gs4_sim *sim, gs4i_node_pass *nodes)
 static int gs4i_scatter_momenta(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     GS4I_TRY(gs4i_rasterise(sim, nodes));
-    if (gs4i_place_jumps(&sim->memory, &sim->boundary, &sim->grid) != GS4_OK)
-        return gs4i_fail_memory(&sim->error);
-    gs4i_set_velocities(sim, nodes);
-    return GS4_OK;
+    return gs4i_scheme_of(sim)->set_velocities(sim, nodes);
 }
 
 /* Is what the particles have seen so far acceptable, and is dt still within the limit that
@@ -15647,6 +17261,25 @@ static int gs4i_find_spin(gs4_sim *sim, gs4i_node_pass *nodes)
     return result;
 }
 
+/* The same for the velocity gradients of particles that give momentum affinely: 16 times bring them
+ * to 3e-5 of what they converge to, or their change in the first steps would be an error of first
+ * order in time. */
+static int gs4i_find_affine(gs4_sim *sim, gs4i_node_pass *nodes)
+{
+    const gs4_real ahead = sim->integrator.prediction.ahead;
+    gs4i_staggered *f = &sim->staggered;
+    int pass, c, result = GS4_OK;
+    sim->integrator.prediction.ahead = 0;
+    for (pass = 0; pass < 16 && result == GS4_OK; pass++) {
+        result = gs4i_scatter_momenta(sim, nodes);
+        if (result != GS4_OK) break;
+        for (c = 0; c < 3; c++) gs4i_each_mirror(sim, 1 << c, f->given[c], gs4i_fill_given);
+        gs4i_gather(sim, gs4i_find_affine_task);
+    }
+    sim->integrator.prediction.ahead = ahead;
+    return result;
+}
+
 /* Rule (4) for this step, meshes where they are now, and room for what emitters will give. */
 static int gs4i_begin_step(gs4_sim *sim, gs4_real dt, gs4i_node_pass *nodes)
 {
@@ -15669,15 +17302,17 @@ static int gs4i_begin_step(gs4_sim *sim, gs4_real dt, gs4i_node_pass *nodes)
 static int gs4i_scatter_state(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     if (sim->needs_sort) GS4I_TRY(gs4i_bin(sim));
-    if (sim->needs_spin && sim->particles.deformation_reals && sim->particles.with_rates)
-        GS4I_TRY(gs4i_find_spin(sim, nodes));
+    if (sim->needs_spin && sim->particles.with_rates)
+        GS4I_TRY(sim->particles.with_affine         ? gs4i_find_affine(sim, nodes)
+                 : sim->particles.deformation_reals ? gs4i_find_spin(sim, nodes)
+                                                    : GS4_OK);
     return gs4i_scatter_momenta(sim, nodes);
 }
 
 /* S4 to S6: acc_i and u_i of the nodes, by the scheme; then the limit of dt where they are. */
 static int gs4i_accelerate(gs4_sim *sim, gs4i_node_pass *nodes)
 {
-    gs4i_scheme_of(sim)->accelerate(sim, nodes);
+    GS4I_TRY(gs4i_scheme_of(sim)->accelerate(sim, nodes));
     return gs4i_check_stage(sim);
 }
 
@@ -15686,7 +17321,8 @@ static int gs4i_accelerate(gs4_sim *sim, gs4i_node_pass *nodes)
 static int gs4i_validate(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     gs4i_report r;
-    gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_node_spreads, nodes);
+    if (sim->desc.scheme == GS4_EXPLICIT)
+        gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_node_spreads, nodes);
     gs4i_gather(sim, gs4i_scheme_of(sim)->trial[sim->particles.with_heat]);
     r = gs4i_all_reports(sim);
     return r.bad ? gs4i_fail_bad(sim, &r) : gs4i_check_distances(sim);
@@ -15695,8 +17331,8 @@ static int gs4i_validate(gs4_sim *sim, gs4i_node_pass *nodes)
 /* S7: particles see what nodes have, and nodes remember. Nothing can fail any more. */
 static void gs4i_correct_particles(gs4_sim *sim, gs4i_node_pass *nodes)
 {
-    if (sim->grid.remembered)
-        gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_remember_accelerations, nodes);
+    const gs4i_scheme *scheme = gs4i_scheme_of(sim);
+    if (scheme->remember) gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), scheme->remember, nodes);
     gs4i_gather(sim, gs4i_scheme_of(sim)->correct[sim->particles.with_heat]);
 }
 
@@ -16092,7 +17728,7 @@ static GS4I_COLD int gs4i_write_raw(gs4_sim *sim, const char *path)
 typedef struct gs4i_head {
     char magic[8];
     uint32_t version, real_size, byte_order, head_size, material_size, collider_size, emitter_size;
-    int32_t cells[3], integrator, walls[6];
+    int32_t cells[3], scheme, integrator, walls[6];
     double cell_size, origin[3], gravity[3], rho[2], decay, heat[7];
     int32_t isothermal[7], deconvolved; /* walls, air */
     double time, last_dt;
@@ -16121,6 +17757,7 @@ static GS4I_COLD void gs4i_head_of(const gs4_sim *sim, gs4i_head *h)
     h->emitter_size = sizeof(gs4i_emitter);
     for (i = 0; i < 3; i++) h->cells[i] = d->cells[i];
     for (i = 0; i < 6; i++) h->walls[i] = (int32_t)d->walls[i];
+    h->scheme = (int32_t)d->scheme;
     h->integrator = (int32_t)d->integrator;
     h->deconvolved = d->sharp_gradients != 0;
     h->cell_size = (double)d->cell_size;
@@ -16220,7 +17857,8 @@ static int gs4i_check_head(gs4_sim *sim, const gs4i_head *h)
                          "the checkpoint was made by another build (version, precision, byte order "
                          "or platform)");
     if (memcmp(h->cells, own.cells, sizeof h->cells) || memcmp(h->walls, own.walls, sizeof h->walls)
-        || h->integrator != own.integrator || h->deconvolved != own.deconvolved
+        || h->scheme != own.scheme || h->integrator != own.integrator
+        || h->deconvolved != own.deconvolved
         || memcmp(&h->cell_size, &own.cell_size, sizeof h->cell_size)
         || memcmp(h->origin, own.origin, sizeof h->origin)
         || memcmp(h->gravity, own.gravity, sizeof h->gravity)
@@ -16434,6 +18072,8 @@ static int gs4i_particle_is_sound(const gs4_sim *sim, const gs4i_head *h, size_t
     /* the largest that gs4_add_points takes */
     sound = sound && x[3] <= 9 * h1 * h1 * h1 * sim->constants[p->material[i]].density;
     for (k = 0; k < 3 && p->affine[k]; k++) sound &= gs4i_are_sane(p->affine[k] + 4 * i, 3);
+    for (k = 0; k < 3 && p->affine_before[k]; k++)
+        sound &= gs4i_are_sane(p->affine_before[k] + 4 * i, 3);
     if (p->with_rates) {
         sound &= gs4i_are_rates(p->rate + 4 * i, 4);
         for (k = 0; k < 4; k++)
@@ -16543,6 +18183,7 @@ static GS4I_COLD void gs4i_release_state(gs4_sim *sim)
     gs4i_free(m, sim->reports, (size_t)sim->report_capacity, sizeof(gs4i_report));
     gs4i_free_image_particles(m, &sim->image_particles);
     gs4i_free_conduction(m, &sim->conduction);
+    gs4i_free_staggered(m, &sim->staggered);
 }
 
 /* A copy that has no particles and no nodes yet, but says what they will carry. */
@@ -16555,6 +18196,8 @@ static void gs4i_copy_without_state(const gs4_sim *sim, const gs4i_head *h, gs4_
     memset(&next->particles, 0, sizeof next->particles);
     next->particles.with_rates = p->with_rates;
     next->particles.with_subgrid = p->with_subgrid;
+    next->particles.with_affine = p->with_affine;
+    next->particles.with_affine_before = p->with_affine_before;
     next->particles.elastic_reals = h->elastic_reals;
     next->particles.deformation_reals = h->deformation_reals;
     next->particles.with_heat = p->with_heat;
@@ -16938,16 +18581,37 @@ static int gs4i_check_euler(gs4i_error *e, const gs4_sim_desc *d)
                              "(APIC), leave it 0");
 }
 
+/* What the partitioned scheme has no use for, or not yet. */
+static int gs4i_check_partitioned(gs4i_error *e, const gs4_sim_desc *d)
+{
+    int w;
+    GS4I_TRY(gs4i_require(e, d->integrator != GS4_INTEGRATOR_SYMPLECTIC_EULER,
+                          "integrator: symplectic Euler belongs to the explicit scheme; use "
+                          "GS4_INTEGRATOR_GS4 or GS4_INTEGRATOR_BACKWARD_EULER"));
+    GS4I_TRY(gs4i_require(e, !d->sharp_gradients,
+                          "sharp_gradients: the partitioned scheme has none, leave it 0"));
+    if (d->integrator == GS4_INTEGRATOR_BACKWARD_EULER)
+        GS4I_TRY(gs4i_check_absent(e, "rho_inf", d->rho_inf,
+                                   "backward Euler has no such parameter, leave it 0"));
+    for (w = 0; w < 6; w++)
+        GS4I_TRY(gs4i_require(
+            e, d->walls[w] != GS4_WALL_SEPARATE && d->walls[w] != GS4_WALL_PERIODIC,
+            "walls: the partitioned scheme of this version has neither separating nor periodic "
+            "ones; use GS4_WALL_STICK, GS4_WALL_SLIP or GS4_WALL_OPEN"));
+    return GS4_OK;
+}
+
 static int gs4i_check_numerics(gs4i_error *e, const gs4_sim_desc *d)
 {
-    GS4I_TRY(gs4i_require(e, d->scheme == GS4_EXPLICIT,
-                          "scheme: this version has the explicit scheme only; use GS4_EXPLICIT"));
-    GS4I_TRY(gs4i_require(e, d->integrator != GS4_INTEGRATOR_BACKWARD_EULER,
-                          "integrator: backward Euler belongs to the implicit schemes; use "
-                          "GS4_INTEGRATOR_GS4 or GS4_INTEGRATOR_SYMPLECTIC_EULER"));
+    GS4I_TRY(gs4i_require_between(e, GS4_EXPLICIT, GS4_PARTITIONED, "scheme is ", (int)d->scheme,
+                                  "; this version has GS4_EXPLICIT and GS4_PARTITIONED"));
     GS4I_TRY(gs4i_require_between(e, GS4_INTEGRATOR_GS4, GS4_INTEGRATOR_SYMPLECTIC_EULER,
                                   "integrator is ", (int)d->integrator,
                                   "; it is none of gs4_integrator"));
+    GS4I_TRY(gs4i_require(
+        e, d->integrator != GS4_INTEGRATOR_BACKWARD_EULER || d->scheme != GS4_EXPLICIT,
+        "integrator: backward Euler belongs to the implicit schemes; use GS4_INTEGRATOR_GS4 or "
+        "GS4_INTEGRATOR_SYMPLECTIC_EULER"));
     GS4I_TRY(gs4i_check(e, "rho_inf", d->rho_inf, GS4I_FRACTION));
     GS4I_TRY(gs4i_check(e, "rho_inf_spurious", d->rho_inf_spurious, GS4I_FRACTION));
     GS4I_TRY(gs4i_require_value(e, d->rho_inf_spurious <= d->rho_inf, "rho_inf_spurious is ",
@@ -16956,6 +18620,7 @@ static int gs4i_check_numerics(gs4i_error *e, const gs4_sim_desc *d)
                           "rho_inf_spurious: with both rho near 1 (Crank-Nicolson) the explicit "
                           "scheme has no stable step; rho_inf * rho_inf_spurious must not be above "
                           "0.98"));
+    if (d->scheme == GS4_PARTITIONED) GS4I_TRY(gs4i_check_partitioned(e, d));
     if (d->integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER) GS4I_TRY(gs4i_check_euler(e, d));
     /* infinity is welcome */
     GS4I_TRY(gs4i_require_value(
@@ -17027,6 +18692,7 @@ static int gs4i_check_desc(gs4i_error *e, const gs4_sim_desc *d)
 typedef struct gs4i_scene {
     gs4_real cell_size, temperature; /* m; of the air */
     int is_deconvolved, has_heat;
+    gs4_scheme scheme;
     const gs4i_material_constants *materials; /* that are there already */
     int count;
 } gs4i_scene;
@@ -17038,6 +18704,7 @@ static gs4i_scene gs4i_scene_of(const gs4_sim *sim)
     s.temperature = sim->desc.ambient_temperature;
     s.is_deconvolved = sim->desc.sharp_gradients;
     s.has_heat = sim->particles.with_heat;
+    s.scheme = sim->desc.scheme;
     s.materials = sim->constants;
     s.count = sim->material_count;
     return s;
@@ -17287,8 +18954,17 @@ static GS4I_COLD int gs4i_check_material(gs4i_error *e, const gs4i_scene *scene,
                                 "bulk_modulus is ", (double)m->bulk_modulus,
                                 ", which is not density * sound_speed^2; give one of the two"));
     GS4I_TRY(gs4i_check_scales(e, scene->cell_size, m));
-    GS4I_TRY(gs4i_check_absent(e, "incompressible", GS4I_C(m->incompressible),
-                               "the explicit scheme is weakly compressible, leave it 0"));
+    if (scene->scheme == GS4_EXPLICIT)
+        GS4I_TRY(gs4i_check_absent(e, "incompressible", GS4I_C(m->incompressible),
+                                   "the explicit scheme is weakly compressible, leave it 0"));
+    else {
+        GS4I_TRY(gs4i_require(e, !m->incompressible || !(m->bulk_modulus > 0 || m->sound_speed > 0),
+                              "incompressible: bulk_modulus and sound_speed are infinite then, "
+                              "leave them 0"));
+        GS4I_TRY(gs4i_require(e, !gs4i_has_heat(m),
+                              "conductivity: the partitioned scheme of this version has no heat; "
+                              "use GS4_EXPLICIT"));
+    }
     return gs4i_check_heat(e, scene, m);
 }
 
@@ -17327,6 +19003,9 @@ static int gs4i_check_collider(gs4_sim *sim, gs4_collider *c)
         GS4I_TRY(gs4i_check_thickness(e, &c->shape, (double)sim->grid.h));
     GS4I_TRY(gs4i_require(e, (int)c->contact >= 0 && c->contact <= GS4_WALL_SEPARATE,
                           "contact of a collider must be stick, slip or separate"));
+    GS4I_TRY(gs4i_require(e, c->contact != GS4_WALL_SEPARATE || sim->desc.scheme == GS4_EXPLICIT,
+                          "contact: the partitioned scheme of this version has no separating "
+                          "colliders; use stick or slip"));
     GS4I_TRY(gs4i_check(e, "friction", c->friction, GS4I_NOT_NEGATIVE));
     GS4I_TRY(gs4i_require(e, c->friction == 0 || c->contact == GS4_WALL_SEPARATE,
                           "friction is for contact GS4_WALL_SEPARATE, leave it 0"));
@@ -17411,8 +19090,12 @@ static int gs4i_init(gs4_sim *sim)
     g->origin = d->origin;
     sim->boundary.h = g->h;
     memcpy(sim->boundary.walls, d->walls, sizeof d->walls);
-    sim->particles.with_rates = d->integrator == GS4_INTEGRATOR_GS4;
-    sim->particles.with_subgrid = sim->particles.with_rates && gs4i_finite(d->flip_decay_time);
+    sim->particles.with_rates = d->integrator != GS4_INTEGRATOR_SYMPLECTIC_EULER;
+    sim->particles.with_affine = !sim->particles.with_rates || d->scheme != GS4_EXPLICIT;
+    sim->particles.with_affine_before = d->scheme != GS4_EXPLICIT;
+    sim->particles.with_subgrid =
+        sim->particles.with_rates && d->scheme == GS4_EXPLICIT && gs4i_finite(d->flip_decay_time);
+
     sim->restart = sim->needs_sort = sim->limits_stale = 1;
     g->table = (int32_t *)gs4i_alloc(&sim->memory, g->table_count, sizeof *g->table);
     if (!g->table) {
@@ -18225,7 +19908,8 @@ GS4_API gs4_stats gs4_get_stats(gs4_sim *sim)
     s.memory_bytes = sim->memory.bytes;
     s.min_volume_ratio = s.max_volume_ratio = 1;
     s.heat_iterations = sim->conduction.system.iterations;
-    s.solver_residual = sim->conduction.system.residual;
+    s.solver_residual = fmax(sim->conduction.system.residual, sim->staggered.residual);
+    s.pressure_iterations = sim->staggered.iterations;
     for (i = 0; i < (size_t)sim->particles.count; i++) {
         const gs4_real *x = sim->particles.position + 4 * i, *v = sim->particles.velocity + 4 * i;
         const double m = (double)x[3], J = (double)v[3],
@@ -18277,6 +19961,8 @@ GS4_API uint64_t gs4_state_hash(const gs4_sim *sim)
         h = gs4i_hash_bytes(h ^ p->material[i], p->velocity + 4 * i, 4 * sizeof(gs4_real));
         for (k = 0; k < 3 && p->affine[k]; k++)
             h = gs4i_hash_bytes(h, p->affine[k] + 4 * i, 3 * sizeof(gs4_real));
+        for (k = 0; k < 3 && p->affine_before[k]; k++)
+            h = gs4i_hash_bytes(h, p->affine_before[k] + 4 * i, 3 * sizeof(gs4_real));
         if (p->with_rates) {
             h = gs4i_hash_bytes(h, p->rate + 4 * i, 4 * sizeof(gs4_real));
             h = gs4i_hash_bytes(h, p->position_residual + 4 * i, 4 * sizeof(gs4i_half));
@@ -18858,6 +20544,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  * Emitters: the velocity of a filling is relative to the emitter, which travels from its start on.
  * Densities: the stable step of GS4 sees heavy particles among light ones, default speeds of sound
  * the densest material. J may be up to 256, before 16.
+ * New: the partitioned scheme, for liquids of any bulk modulus; checkpoints know the scheme.
  * Coulomb friction holds without a creep. New: poses, gs4_advance_within, gs4_set_gravity,
  * gs4_set_viscosity, gs4_remove_particles; Herschel-Bulkley liquids and presets of such, with which
  * gs4_material has new members: checkpoints written before cannot be read. A step that gs4_advance

@@ -17,6 +17,7 @@
 #include "test_poisson.c"
 #include "test_symmetry.c"
 #include "test_contact.c"
+#include "test_partitioned.c"
 #include "test_mesh.c"
 #include "test_reference.c"
 
@@ -87,6 +88,7 @@ int main(int count, char **values)
     run_poisson();
     run_symmetry();
     run_contact();
+    run_partitioned();
     run_mesh();
     RUN_ONCE(test_reference);
     RUN_ONCE(test_stability);

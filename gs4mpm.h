@@ -31,7 +31,8 @@
  *     }
  *
  * WHAT IT DOES NOT DO, YET. The semi-implicit scheme is declared and refused with a sentence; so
- * are, with the partitioned scheme, heat, separating and periodic walls, and separating colliders. It has no surface tension, no two-way coupling to colliders, no domain beyond
+ * are, with the partitioned scheme, heat, separating and periodic walls, and separating colliders.
+ * It has no surface tension, no two-way coupling to colliders, no domain beyond
  * 3992^3 cells.
  *
  * MAP. Sections carry a tag; grep -n '^/. ==== ' gs4mpm.h is the table of contents. A section uses
@@ -675,8 +676,8 @@ typedef enum gs4_scheme {
     GS4_SEMI_IMPLICIT
 } gs4_scheme;
 
-/* Second order in time; first order, of GS4_PARTITIONED; first order with one transfer each way, the
- * fast tier of GS4_EXPLICIT. */
+/* Second order in time; first order, of GS4_PARTITIONED; first order with one transfer each way,
+ * the fast tier of GS4_EXPLICIT. */
 typedef enum gs4_integrator {
     GS4_INTEGRATOR_GS4 = 0,
     GS4_INTEGRATOR_BACKWARD_EULER,
@@ -12661,13 +12662,10 @@ GS4I_INLINE void gs4i_prefetch_subgrid(const gs4i_particles *p, size_t i)
         GS4I_PREFETCH(p->subgrid + 4 * i + b);
 }
 
-/* V - v~ of n particles, of which V = sum w v_i was gathered. Their momenta sum up to none. Fourth
- * number: how much faster than others they decay as noise, |V - v~|/h (1/s). */
-GS4I_INLINE void gs4i_find_subgrid(const gs4i_particles *p, size_t i, int n,
-                                   const gs4i_integrator *r, const gs4i_batch *q, const gs4_real *V,
-                                   gs4i_lanes subgrid[4])
+/* V - v~ of n particles, V = sum w v_i; and, where noise decays by itself, how much faster. */
+GS4I_INLINE void gs4i_subgrid_of(const gs4i_integrator *r, const gs4i_batch *q, const gs4_real *V,
+                                 int n, gs4i_lanes subgrid[4])
 {
-    gs4_real out[4 * GS4I_BATCH];
     int b, c;
     gs4i_to_lanes(V, n, subgrid);
     for (c = 0; c < 3; c++)
@@ -12680,6 +12678,16 @@ GS4I_INLINE void gs4i_find_subgrid(const gs4i_particles *p, size_t i, int n,
             GS4I_NTH(subgrid[3], b) = r->crossing * GS4I_SQRT(GS4I_NTH(subgrid[3], b));
         GS4I_BATCH_LOOP(b) gs4i_faster(r, r->decay, r->stable_decay, &subgrid[3][b]);
     }
+}
+
+/* V - v~ of n particles, of which V = sum w v_i was gathered. Their momenta sum up to none. Fourth
+ * number: how much faster than others they decay as noise, |V - v~|/h (1/s). */
+GS4I_INLINE void gs4i_find_subgrid(const gs4i_particles *p, size_t i, int n,
+                                   const gs4i_integrator *r, const gs4i_batch *q, const gs4_real *V,
+                                   gs4i_lanes subgrid[4])
+{
+    gs4_real out[4 * GS4I_BATCH];
+    gs4i_subgrid_of(r, q, V, n, subgrid);
     gs4i_from_lanes(subgrid[0], subgrid[1], subgrid[2], subgrid[3], out);
     gs4i_prefetch_subgrid(p, i + 4 * GS4I_BATCH);
     memcpy(p->subgrid + 4 * i, out, 4 * (size_t)n * sizeof *out);
@@ -13489,7 +13497,7 @@ static double gs4i_stable_euler_dt(const gs4_sim *sim, double c, double nu)
     return d + w > 0 ? 8 / (d + sqrt(d * d + 16 * w * w)) : (double)GS4I_HUGE;
 }
 
-/* ==== [[staggered]] velocities on faces ========================================================= *
+/* ==== [[staggered]] velocities on faces ======================================================== *
  *
  * The grid of the partitioned scheme: a dense box (see [[box]]) around all blocks with nodes, those
  * behind walls included. Velocities are at faces, each component at those across its axis; volumes
@@ -13586,17 +13594,14 @@ static int gs4i_has_stress(const gs4_sim *sim)
     return any;
 }
 
-/* The box around all blocks with nodes, and its fields. */
-static int gs4i_begin_staggered(gs4_sim *sim)
+/* The box around all blocks with nodes. */
+static void gs4i_fit_staggered(gs4i_staggered *f, const gs4i_grid *g)
 {
-    gs4i_staggered *f = &sim->staggered;
     gs4i_box *box = &f->box;
-    const gs4i_grid *g = &sim->grid;
-    const int bodies = sim->boundary.collider_count > 0;
     int s, a, high[3];
     for (a = 0; a < 3; a++) {
-        box->low[a] = g->cells[a] + 4;
-        high[a] = -4;
+        box->low[a] = g->cells[a] + GS4I_BLOCK_SIDE;
+        high[a] = -GS4I_BLOCK_SIDE;
     }
     for (s = 0; s < g->active; s++) {
         int first[3];
@@ -13611,47 +13616,62 @@ static int gs4i_begin_staggered(gs4_sim *sim)
         f->from[a] = box->low[a] < 0 ? -box->low[a] : 0;
         f->to[a] = high[a] > g->cells[a] ? g->cells[a] - box->low[a] : box->size[a];
     }
-    if (gs4i_box_reserve(&sim->memory, box,
-                         (size_t)(3 * (4 + 4 + 1 + 1 + 1) + 4 + 3 + (bodies ? 9 : 0))
-                                 * sizeof(gs4_real)
-                             + (bodies ? 7 : 4))
-        != GS4_OK)
-        return gs4i_fail_memory(&sim->error);
+}
+
+/* Its fields, the largest first; those of bodies only where there are some. */
+static void gs4i_take_staggered(gs4i_staggered *f, int bodies)
+{
+    gs4i_box *box = &f->box;
+    const size_t real = sizeof(gs4_real);
+    int a;
     for (a = 0; a < 3; a++) {
-        f->given[a] = (gs4_real *)gs4i_box_take(box, 4 * sizeof(gs4_real));
-        f->taken[a] = (gs4_real *)gs4i_box_take(box, 4 * sizeof(gs4_real));
+        f->given[a] = (gs4_real *)gs4i_box_take(box, 4 * real);
+        f->taken[a] = (gs4_real *)gs4i_box_take(box, 4 * real);
     }
-    f->cell = (gs4_real *)gs4i_box_take(box, 4 * sizeof(gs4_real));
+    f->cell = (gs4_real *)gs4i_box_take(box, 4 * real);
+    for (a = 0; a < 3; a++) f->body[a] = bodies ? (gs4_real *)gs4i_box_take(box, 2 * real) : NULL;
     for (a = 0; a < 3; a++) {
-        f->body[a] = bodies ? (gs4_real *)gs4i_box_take(box, 2 * sizeof(gs4_real)) : NULL;
-        f->held[a] = NULL;
+        f->open[a] = bodies ? (gs4_real *)gs4i_box_take(box, real) : NULL;
+        f->force[a] = (gs4_real *)gs4i_box_take(box, real);
+        f->seen[a] = (gs4_real *)gs4i_box_take(box, real);
+        f->reach[a] = (gs4_real *)gs4i_box_take(box, real);
     }
-    for (a = 0; a < 3; a++)
-        f->open[a] = bodies ? (gs4_real *)gs4i_box_take(box, sizeof(gs4_real)) : NULL;
+    f->diagonal = (gs4_real *)gs4i_box_take(box, real);
+    f->rhs = (gs4_real *)gs4i_box_take(box, real);
+    f->pressure = (gs4_real *)gs4i_box_take(box, real);
     for (a = 0; a < 3; a++) {
-        f->force[a] = (gs4_real *)gs4i_box_take(box, sizeof(gs4_real));
-        f->seen[a] = (gs4_real *)gs4i_box_take(box, sizeof(gs4_real));
-        f->reach[a] = (gs4_real *)gs4i_box_take(box, sizeof(gs4_real));
+        f->known[a] = (uint8_t *)gs4i_box_take(box, 1);
+        f->held[a] = bodies ? (uint8_t *)gs4i_box_take(box, 1) : NULL;
     }
-    f->diagonal = (gs4_real *)gs4i_box_take(box, sizeof(gs4_real));
-    f->rhs = (gs4_real *)gs4i_box_take(box, sizeof(gs4_real));
-    f->pressure = (gs4_real *)gs4i_box_take(box, sizeof(gs4_real));
-    for (a = 0; a < 3; a++) f->known[a] = (uint8_t *)gs4i_box_take(box, 1);
-    for (a = 0; a < 3 && bodies; a++) f->held[a] = (uint8_t *)gs4i_box_take(box, 1);
     f->kind = (uint8_t *)gs4i_box_take(box, 1);
+}
+
+/* Room for a step, with nothing on the faces. */
+static int gs4i_begin_staggered(gs4_sim *sim)
+{
+    gs4i_staggered *f = &sim->staggered;
+    const int bodies = sim->boundary.collider_count > 0;
+    /* per face of each axis: given, taken, force, seen, reach; per cell: 4 and 3 */
+    const size_t bytes =
+        (size_t)(3 * (4 + 4 + 3) + 4 + 3 + (bodies ? 9 : 0)) * sizeof(gs4_real) + (bodies ? 7 : 4);
+    int a;
+    gs4i_fit_staggered(f, &sim->grid);
+    if (gs4i_box_reserve(&sim->memory, &f->box, bytes) != GS4_OK)
+        return gs4i_fail_memory(&sim->error);
+    gs4i_take_staggered(f, bodies);
     for (a = 0; a < 3; a++) {
-        const size_t n = gs4i_box_count(box, 1 << a);
+        const size_t n = gs4i_box_count(&f->box, 1 << a);
         memset(f->given[a], 0, 4 * n * sizeof(gs4_real));
         memset(f->taken[a], 0, 4 * n * sizeof(gs4_real));
         memset(f->force[a], 0, n * sizeof(gs4_real));
     }
-    memset(f->cell, 0, 4 * gs4i_box_count(box, GS4I_AT_CELL) * sizeof(gs4_real));
+    memset(f->cell, 0, 4 * gs4i_box_count(&f->box, GS4I_AT_CELL) * sizeof(gs4_real));
     f->solver.memory = &sim->memory;
     f->solver.tasks = &sim->tasks;
     f->iterations = 0;
     f->residual = 0;
-    f->compressible = 0;
     f->is_viscous = gs4i_has_stress(sim);
+    f->compressible = 0;
     for (a = 0; a < sim->material_count; a++) f->compressible |= sim->constants[a].compliance > 0;
     return GS4_OK;
 }
@@ -14002,7 +14022,7 @@ static gs4_real gs4i_open_share(const gs4i_collider *b, gs4_vec3 centre, int c, 
     return gs4i_open_area(d);
 }
 
-/* Share of a kernel (quadratic B-spline) behind a plane, whose distance from its centre is d cells. */
+/* Share of a kernel (quadratic B-spline) behind a plane that is d cells from its centre. */
 static gs4_real gs4i_share_behind(gs4_real d)
 {
     const gs4_real t = gs4i_min(gs4i_abs(d), GS4I_C(1.5)), u = GS4I_C(1.5) - t;
@@ -14091,8 +14111,9 @@ static void gs4i_place_bodies(gs4_sim *sim, gs4i_node_pass *nodes)
 
 /* --- where the surface is --------------------------------------------------------------------- */
 
-/* Depth (cells) under the surface of a half space that fills a quadratic B-spline by 1/2 + z; negative
- * outside. The inverse of z(t) = 3t/4 - t^3/3 for t <= 1/2, else 1/2 - (3/2 - t)^3/6; 3/2 beyond. */
+/* Depth (cells) under the surface of a half space that fills a quadratic B-spline by 1/2 + z;
+ * negative outside. The inverse of z(t) = 3t/4 - t^3/3 for t <= 1/2, else 1/2 - (3/2 - t)^3/6; 3/2
+ * beyond. */
 static gs4_real gs4i_depth_of_fill(gs4_real z)
 {
     const gs4_real size = gs4i_abs(z);
@@ -14111,9 +14132,8 @@ static gs4_real gs4i_depth_of_fill(gs4_real z)
     return z < 0 ? -low : low;
 }
 
-/* Cells are liquid from this depth on (cells), or the matrix would lose its digits to surfaces just
- * above a centre; and how much of a kernel is full then, 3/4 of it more than a half. */
-#define GS4I_SHALLOW 0.02
+/* A cell is liquid whose kernel is full to this share: where its centre is 0.02 cells deep. With
+ * less the matrix would lose its digits to surfaces just above centres. */
 #define GS4I_LIQUID_FILL 0.515
 
 /* Distance of the surface from the liquid cell's centre, in cells: p is 0 there. */
@@ -14489,9 +14509,9 @@ static void gs4i_extrapolate(gs4_sim *sim, int restart)
  *
  *     acc = (forces of stress)/m + g - grad p/(w rho),   v** = v_i - s ag                     (P1)
  *
- * p = 0 where the surface is: w is its distance from the liquid cell before it, in cells. That alone
- * does not converge in time: (u~ - v**)/s has the gradient part of what particles gave, times 1/s,
- * and scattering and gathering are not inverse, so it comes back every step. So acc is split:
+ * p = 0 where the surface is: w is its distance from the liquid cell before it, in cells. That
+ * alone does not converge in time: (u~ - v**)/s has the gradient part of what particles gave, times
+ * 1/s, and scattering and gathering are not inverse, so it comes back every step. So acc is split:
  *
  *     (u~ - v**)/s = acc + (1/(w rho)) grad phi,   div acc = tr(L L), L = grad u~             (P2)
  *
@@ -14823,7 +14843,7 @@ static int gs4i_accelerate_by_projection(gs4_sim *sim, gs4i_node_pass *nodes)
 /* What faces say to a batch. Particles without liquid around fly by themselves. */
 typedef struct gs4i_face_corrections {
     gs4i_lanes U[4], A[4], shift[4]; /* sum w u~; sum w (acc + feedback); u_c */
-    gs4i_lanes subgrid[4];           /* V - v~ */
+    gs4i_lanes subgrid[4];           /* V - v~; how much faster it decays as noise */
     gs4i_gradient L;                 /* of u~ */
     gs4i_lanes div;
 } gs4i_face_corrections;
@@ -14840,7 +14860,7 @@ static void gs4i_gather_from_faces(const gs4_sim *sim, const gs4i_batch *q, int 
     memset(U, 0, sizeof U);
     memset(A, 0, sizeof A);
     memset(shift, 0, sizeof shift);
-    memset(seen, 0, sizeof seen);
+    memcpy(seen, v, 4 * (size_t)n * sizeof *v);
     memset(slope, 0, sizeof *slope);
     memset(k->div, 0, sizeof k->div);
     for (b = 0; b < n; b++) {
@@ -14866,7 +14886,7 @@ static void gs4i_gather_from_faces(const gs4_sim *sim, const gs4i_batch *q, int 
             gs4i_take_component(&f->box, c, f->taken[c], &s, &sums);
             U[e] = sums.sum[c][GS4I_FACE_STAGE];
             A[e] = sums.sum[c][GS4I_FACE_ACCELERATION];
-            seen[e] = sums.sum[c][GS4I_FACE_SEEN] - v[e];
+            seen[e] = sums.sum[c][GS4I_FACE_SEEN];
             shift[e] = gs4i_max(-most, gs4i_min(sums.sum[c][GS4I_FACE_CORRECTION], most));
             slope->dx[e] = sums.slope[c][0];
             slope->dy[e] = sums.slope[c][1];
@@ -14876,7 +14896,7 @@ static void gs4i_gather_from_faces(const gs4_sim *sim, const gs4i_batch *q, int 
     gs4i_to_lanes(U, n, k->U);
     gs4i_to_lanes(A, n, k->A);
     gs4i_to_lanes(shift, n, k->shift);
-    gs4i_to_lanes(seen, n, k->subgrid);
+    gs4i_subgrid_of(r, q, seen, n, k->subgrid);
     gs4i_gradient_lanes(slope->dx, slope->dy, slope->dz, n, k->L);
 }
 
@@ -14888,7 +14908,8 @@ static void gs4i_correct_by_faces(gs4i_integrator r, const gs4i_face_corrections
     for (c = 0; c < 3; c++)
         GS4I_BATCH_LOOP(b) {
             const gs4i_wide v = q->v[c][b], a = q->a[c][b], move = q->move[c][b];
-            const gs4i_wide stage_a = k->A[c][b] + r.stable_decay * k->subgrid[c][b];
+            const gs4i_wide stage_a =
+                k->A[c][b] + (r.stable_decay + k->subgrid[3][b]) * k->subgrid[c][b];
             const gs4i_wide da = (stage_a - a) * r.inv_alpha_m,
                             change = (k->U[c][b] - move) * r.inv_alpha_m;
             q->v[c][b] = (v + r.dt * a) + r.gamma * r.dt * da;
@@ -20390,14 +20411,16 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 
 #undef GS4I_BACKSLASHES
 #undef GS4I_BATCH_LOOP
+#undef GS4I_BIAS
 #undef GS4I_BLOCK_NODES
-#undef GS4I_BLOCK_SIDE
 #undef GS4I_BLOCK_REACH
+#undef GS4I_BLOCK_SIDE
 #undef GS4I_BOX_PLANE
 #undef GS4I_C
 #undef GS4I_CHOOSE
 #undef GS4I_CHOOSE_INT
 #undef GS4I_CHUNK
+#undef GS4I_COLD
 #undef GS4I_CONDUCTS
 #undef GS4I_DECONVOLVED_EIGENVALUES
 #undef GS4I_DEFAULT_ITERATIONS
@@ -20407,23 +20430,26 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_DIFFERENCE
 #undef GS4I_DIVERGENCE_BOUND
 #undef GS4I_EACH
+#undef GS4I_EACH_FACE
 #undef GS4I_EPSILON
 #undef GS4I_EULER_SOUND_EIGENVALUE
 #undef GS4I_EULER_VISCOUS_EIGENVALUE
+#undef GS4I_EXPONENT_BITS
+#undef GS4I_FACES_AROUND
+#undef GS4I_FACE_LAYERS
 #undef GS4I_FIELD_AHEAD
 #undef GS4I_FIELD_BLOCK
 #undef GS4I_FIELD_MARGIN
 #undef GS4I_FIELD_MOST
 #undef GS4I_FIELD_WHOLE
+#undef GS4I_FRACTION_BITS
 #undef GS4I_GRAPHS
 #undef GS4I_GREATER
 #undef GS4I_HUGE
 #undef GS4I_IMAGE_BEND
 #undef GS4I_IMAGE_NODES
 #undef GS4I_IMAGE_REACH
-#undef GS4I_COLD
 #undef GS4I_INLINE
-#undef GS4I_LEAST_CONDUCTIVITY
 #undef GS4I_IS_LIQUID
 #undef GS4I_IS_OPEN
 #undef GS4I_J_HIGH
@@ -20431,20 +20457,23 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_LANE
 #undef GS4I_LANES
 #undef GS4I_LEADER
+#undef GS4I_LEAST_CONDUCTIVITY
 #undef GS4I_LIGHT_NODE
+#undef GS4I_LIQUID_FILL
 #undef GS4I_LOAD
 #undef GS4I_LONG_ROWS
 #undef GS4I_LOWEST_BITS
 #undef GS4I_MAD
+#undef GS4I_MANY_SUBSTEPS
 #undef GS4I_MAX_PARTICLES
 #undef GS4I_MAX_STEPS
-#undef GS4I_MANY_SUBSTEPS
 #undef GS4I_MIXING
 #undef GS4I_MORE_SWEEPS
-#undef GS4I_NEGLIGIBLE_FACE
+#undef GS4I_MOST_CORRECTION
 #undef GS4I_MOST_STRAIN
 #undef GS4I_MOST_STRETCH
 #undef GS4I_MUL
+#undef GS4I_NEGLIGIBLE_FACE
 #undef GS4I_NEVER_MELTS
 #undef GS4I_NODES_REACH
 #undef GS4I_NODE_REALS
@@ -20457,6 +20486,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_PAIRS
 #undef GS4I_PREFETCH
 #undef GS4I_RESTRICT
+#undef GS4I_ROOT_BITS
 #undef GS4I_ROW_DIFFERENCE
 #undef GS4I_ROW_LOAD
 #undef GS4I_ROW_MAD
@@ -20495,15 +20525,11 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_VISCOUS_EIGENVALUE
 #undef GS4I_VISITED
 #undef GS4I_WALL_MIXING
+#undef GS4I_WHOLE
+#undef GS4I_WHOLE_BITS
 #undef GS4I_WIDE_MAX
 #undef GS4I_WIDE_MIN
 #undef GS4I_WIDTH
-#undef GS4I_FRACTION_BITS
-#undef GS4I_EXPONENT_BITS
-#undef GS4I_WHOLE
-#undef GS4I_WHOLE_BITS
-#undef GS4I_ROOT_BITS
-#undef GS4I_BIAS
 
 #endif /* GS4MPM_IMPLEMENTATION */
 

@@ -252,7 +252,7 @@ static void test_errors_desc(void)
         ERR_FIELD(gs4_sim_desc, cell_size, "cell_size", ERR_REAL),
         ERR_VEC(gs4_sim_desc, origin, "origin"),
         ERR_VEC(gs4_sim_desc, gravity, "gravity"),
-        ERR_FIELD(gs4_sim_desc, scheme, "scheme", ERR_LATER_INT),
+        ERR_FIELD(gs4_sim_desc, scheme, "scheme", ERR_INT),
         ERR_FIELD(gs4_sim_desc, rho_inf, "rho_inf", ERR_REAL),
         ERR_FIELD(gs4_sim_desc, rho_inf_spurious, "rho_inf_spurious", ERR_REAL),
         ERR_FIELD(gs4_sim_desc, flip_decay_time, "flip_decay_time", ERR_REAL),

@@ -17264,7 +17264,12 @@ static void gs4i_finish(gs4_sim *sim)
  * forgets it again. */
 static void gs4i_forget_spin(gs4_sim *sim)
 {
+    const size_t bytes = 4 * (size_t)sim->particles.count * sizeof(gs4_real);
     int i;
+    for (i = 0; i < 3 && sim->particles.with_affine_before && sim->particles.count; i++) {
+        memset(sim->particles.affine[i], 0, bytes);
+        memset(sim->particles.affine_before[i], 0, bytes);
+    }
     for (i = 0; i < sim->particles.count && sim->particles.deformation_reals; i++)
         gs4i_set_spin(&sim->particles, (size_t)i, gs4i_vec3(0, 0, 0));
 }
@@ -18024,10 +18029,10 @@ static int gs4i_are_sane(const gs4_real *v, int n)
     return sane;
 }
 
-/* Rates have more room: what changes in 1e-9 s. */
+/* Rates, gradients and fluxes have more room: what changes in 1e-18 s or m. */
 static int gs4i_are_rates(const gs4_real *v, int n)
 {
-    const gs4_real most = GS4I_HUGE * GS4I_C(1e9);
+    const gs4_real most = GS4I_HUGE * GS4I_C(1e18);
     int i, sane = 1;
     for (i = 0; i < n; i++) sane &= v[i] < most && v[i] > -most;
     return sane;
@@ -18050,7 +18055,7 @@ static int gs4i_head_is_sound(const gs4i_head *h)
                                  h->limits.max_viscosity, h->limits.max_sound,
                                  h->limits.max_stiffness };
     int i, sound = 1;
-    for (i = 0; i < 6; i++) sound &= times[i] >= 0 && times[i] < (double)GS4I_HUGE;
+    for (i = 0; i < 6; i++) sound &= times[i] >= 0 && times[i] <= (double)GS4I_HUGE;
     for (i = 0; i < 7; i++) sound &= limits[i] >= 0 && gs4i_finite(limits[i]);
     return sound && (h->restart | h->needs_sort | h->limits_stale | h->needs_spin) >> 1 == 0
            && (h->min_mass > 0 || h->particles == 0) && h->max_mass >= h->min_mass;
@@ -18092,9 +18097,9 @@ static int gs4i_particle_is_sound(const gs4_sim *sim, const gs4i_head *h, size_t
                    && (double)x[3] <= h->max_mass;
     /* the largest that gs4_add_points takes */
     sound = sound && x[3] <= 9 * h1 * h1 * h1 * sim->constants[p->material[i]].density;
-    for (k = 0; k < 3 && p->affine[k]; k++) sound &= gs4i_are_sane(p->affine[k] + 4 * i, 3);
+    for (k = 0; k < 3 && p->affine[k]; k++) sound &= gs4i_are_rates(p->affine[k] + 4 * i, 3);
     for (k = 0; k < 3 && p->affine_before[k]; k++)
-        sound &= gs4i_are_sane(p->affine_before[k] + 4 * i, 3);
+        sound &= gs4i_are_rates(p->affine_before[k] + 4 * i, 3);
     if (p->with_rates) {
         sound &= gs4i_are_rates(p->rate + 4 * i, 4);
         for (k = 0; k < 4; k++)
@@ -18104,13 +18109,14 @@ static int gs4i_particle_is_sound(const gs4_sim *sim, const gs4i_head *h, size_t
         sound &= gs4i_are_sane(p->elastic + (size_t)p->elastic_reals * i, 6)
                  && gs4i_are_rates(p->elastic + (size_t)p->elastic_reals * i, p->elastic_reals);
     if (p->deformation_reals)
-        sound &=
-            gs4i_are_sane(p->deformation + (size_t)p->deformation_reals * i, p->deformation_reals);
+        sound &= gs4i_are_sane(p->deformation + (size_t)p->deformation_reals * i, 9)
+                 && gs4i_are_rates(p->deformation + (size_t)p->deformation_reals * i,
+                                   p->deformation_reals);
     if (p->with_heat)
         sound &= gs4i_are_sane(p->heat + 4 * i, 1) && gs4i_are_rates(p->heat + 4 * i, 4)
                  && p->heat[4 * i + 1] >= 0 && p->heat[4 * i + 1] <= 1 && p->liquid[i] <= 1;
     if (p->with_flux)
-        sound &= gs4i_are_sane(p->flux + 4 * i, 3) && gs4i_are_rates(p->flux_rate + 4 * i, 3);
+        sound &= gs4i_are_rates(p->flux + 4 * i, 3) && gs4i_are_rates(p->flux_rate + 4 * i, 3);
     return sound;
 }
 
@@ -18240,6 +18246,7 @@ static void gs4i_copy_without_state(const gs4_sim *sim, const gs4i_head *h, gs4_
     next->report_capacity = 0;
     memset(&next->image_particles, 0, sizeof next->image_particles);
     memset(&next->conduction, 0, sizeof next->conduction);
+    memset(&next->staggered, 0, sizeof next->staggered);
     next->conduction.with_viscous_heating = sim->conduction.with_viscous_heating;
 }
 

@@ -495,6 +495,7 @@ static void test_partitioned_bits(void)
     b = partitioned_splash(1);
 #endif
     CHECK_RESULT(a, gs4_save(a, "gs4mpm-test-partitioned.state"), GS4_OK);
+    CHECK_RESULT(b, gs4_advance(b, (gs4_real)0.02), GS4_OK); /* it has a past of its own */
     CHECK_RESULT(b, gs4_load(b, "gs4mpm-test-partitioned.state"), GS4_OK);
     remove("gs4mpm-test-partitioned.state");
     CHECK(gs4_state_hash(a) == gs4_state_hash(b));
@@ -592,6 +593,30 @@ static void test_partitioned_refusals(void)
     gs4_destroy(sim);
 }
 
+/* A solve that does not converge is said, and the state stays: also what a first step finds. */
+static void test_partitioned_not_converged(void)
+{
+    gs4_sim_desc d = partitioned_cube(16);
+    const gs4_material m = partitioned_liquid(0);
+    gs4_fill f = scene_fill(at(0.3, -1, 0));
+    gs4_sim *sim;
+    gs4_edit v;
+    uint64_t before;
+    d.solver_max_iterations = 1;
+    d.solver_tolerance = (gs4_real)1e-12;
+    d.gravity = at(0, -1, 0);
+    CHECK_RESULT(NULL, gs4_create(&d, &sim), GS4_OK);
+    f.material = gs4_add_material(sim, &m);
+    gs4_add_particles(sim, gs4_sphere(at(0.5, 0.3, 0.5), (gs4_real)0.28), &f);
+    v = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
+    v.data[0] = 2;
+    before = gs4_state_hash(sim);
+    CHECK_RESULT(sim, gs4_step(sim, (gs4_real)0.001), GS4_ERROR_NOT_CONVERGED);
+    CHECK(strstr(gs4_last_error(sim), "converge") != NULL);
+    CHECK(gs4_state_hash(sim) == before);
+    gs4_destroy(sim);
+}
+
 static void run_partitioned(void)
 {
     RUN(test_partitioned_flight);
@@ -605,5 +630,6 @@ static void run_partitioned(void)
     RUN_FULL(test_partitioned_symmetry);
     RUN(test_partitioned_piston);
     RUN(test_partitioned_bits);
+    RUN(test_partitioned_not_converged);
     RUN(test_partitioned_refusals);
 }

@@ -201,9 +201,10 @@
  *
  * Both vanish where flow is smooth, faster than the error of the transfers. The force returns what
  * the decay takes, so momentum stays, and motion that the grid sees comes back to its particles.
- * The last term leaves alone what weight makes of J. J does not decay in scenes with solids,
- * sharp_gradients or a material of more than twice, or less than half, the density or stiffness
- * (rho0 c0^2) of the first, and in none where flip_decay_time is given. A cylinder 8 cells across,
+ * The last term leaves alone what weight makes of J. Neither decays so in scenes with solids, whose
+ * bounces would lose by it, nor where flip_decay_time is given; nor does J with sharp_gradients or
+ * a material of more than twice, or less than half, the density or stiffness (rho0 c0^2) of the
+ * first. A cylinder 8 cells across,
  * 0.3 s after it fell flat at 1.7 m/s: rms and fastest of its particles over that; a ball of 12
  * cells that spins by a radian; a drop of 20 cells on a floor, widths at four times over reference:
  *     flip_decay_time       default       0.5 s         0.05 s        0.005 s       INFINITY
@@ -12085,12 +12086,18 @@ static void gs4i_gather_image_particles(gs4_sim *sim, gs4_task_fn kernel)
     gs4i_parallel_for(&sim->tasks, pass.count, kernel, &pass);
 }
 
+/* The image of particle i of a block, NULL: it has none. */
+GS4I_INLINE gs4i_image_particle *gs4i_image_of(const gs4i_near_particles *near, int i)
+{
+    const int image = near->particle[i].image;
+    return image < 0 ? NULL : near->images + image;
+}
+
 /* The image by which a particle takes an odd part, NULL: it takes none. */
 GS4I_INLINE const gs4i_image_particle *gs4i_odd_image(const gs4i_near_particles *near, int i)
 {
-    const int image = near->particle[i].image;
-    const gs4i_image_particle *g = near->images + (image < 0 ? 0 : image);
-    return image >= 0 && g->whole && g->share > 0 ? g : NULL;
+    const gs4i_image_particle *g = gs4i_image_of(near, i);
+    return g && g->whole && g->share > 0 ? g : NULL;
 }
 
 /* Replace the values that n particles gathered by their part that is odd about the surface, of
@@ -12152,10 +12159,10 @@ static void gs4i_take_odd_parts(int solids, const gs4i_near_particles *near, int
 static int gs4i_images_are_safe(const gs4_sim *sim, int o)
 {
     const gs4i_image_particle *images = (const gs4i_image_particle *)sim->image_particles.all.data;
-    const int32_t *first_of = (const int32_t *)sim->image_particles.first_of.data + o;
+    const int32_t *first_of = (const int32_t *)sim->image_particles.first_of.data;
     int i;
-    for (i = sim->image_particles.count ? first_of[0] : 0;
-         sim->image_particles.count && i < first_of[1]; i++) {
+    for (i = sim->image_particles.count ? first_of[o] : 0;
+         sim->image_particles.count && i < first_of[o + 1]; i++) {
         const gs4i_image_particle *g = images + i;
         gs4_real moved = 0, all = 0;
         int a, c;
@@ -12177,8 +12184,8 @@ static void gs4i_reflect_columns(const gs4i_near_particles *near, int n, const g
 {
     int b, c;
     for (b = 0; b < n; b++) {
-        gs4i_image_particle *g = near->images + near->particle[b].image;
-        for (c = 0; c < 3 && near->particle[b].image >= 0; c++) {
+        gs4i_image_particle *g = gs4i_image_of(near, b);
+        for (c = 0; c < 3 && g; c++) {
             const gs4_real across =
                 2 * (x[4 * b + c] * g->n[0] + y[4 * b + c] * g->n[1] + z[4 * b + c] * g->n[2]);
             g->carried[to][c] = across * g->n[0] - x[4 * b + c];
@@ -12196,8 +12203,8 @@ static void gs4i_reflect_forces(const gs4i_near_particles *near, int n, int with
     int b, c;
     gs4i_reflect_columns(near, n, f->x, f->y, f->z, 0);
     for (b = 0; b < n; b++) {
-        gs4i_image_particle *g = near->images + near->particle[b].image;
-        if (near->particle[b].image < 0) continue;
+        gs4i_image_particle *g = gs4i_image_of(near, b);
+        if (!g) continue;
         for (c = 0; c < 4; c++)
             g->carried[3][c] = c < 3 || with_mass ? -f->weight[4 * b + c] : f->weight[4 * b + c];
         for (c = 0; c < 3; c++) g->carried[c][3] = 0;
@@ -12212,9 +12219,9 @@ static void gs4i_reflect_affine(const gs4i_near_particles *near, int n, const gs
     int b, c, a;
     gs4i_reflect_columns(near, n, f->x, f->y, f->z, 1);
     for (b = 0; b < n; b++) {
-        gs4i_image_particle *g = near->images + near->particle[b].image;
+        gs4i_image_particle *g = gs4i_image_of(near, b);
         gs4_real turn[3][3];
-        if (near->particle[b].image < 0) continue;
+        if (!g) continue;
         gs4i_surface_spin(g, turn);
         for (c = 0; c < 3; c++) {
             const gs4_real at_x = f->middle[4 * b + c]
@@ -13820,7 +13827,8 @@ static void gs4i_give_to_faces(gs4_sim *sim, size_t i, const gs4_real x[3], cons
     size_t at;
     int c, j, k, n;
     gs4i_stage_affine(sim, i, C);
-    gs4i_face_weights_at(&sim->grid, &f->box, x, &s);
+    memset(&s, 0, sizeof s);
+    if (!gs4i_face_weights_at(&sim->grid, &f->box, x, &s)) return;
     for (c = 0; c < 3; c++) {
         const int place = 1 << c, tx = c == 0, ty = c == 1, tz = c == 2;
         const gs4_real base = v[c] + C[c][0] * s.offset[tx][0] + C[c][1] * s.offset[ty][1]
@@ -14591,7 +14599,8 @@ static void gs4i_scatter_stress(int index, void *context)
         memset(&slope, 0, sizeof slope);
         for (b = 0; b < n; b++) {
             gs4i_face_sums sums;
-            gs4i_face_weights_at(&sim->grid, &f->box, x + 4 * b, &s[b]);
+            if (!gs4i_face_weights_at(&sim->grid, &f->box, x + 4 * b, &s[b]))
+                memset(&s[b], 0, sizeof s[b]);
             for (c = 0; c < 3; c++) {
                 gs4i_take_component(&f->box, c, f->given[c], &s[b], &sums);
                 slope.dx[4 * b + c] = sums.slope[c][0];
@@ -14633,7 +14642,7 @@ static void gs4i_find_affine_task(int index, void *context)
         for (b = 0; b < n; b++) {
             gs4i_face_weights s;
             gs4i_face_sums sums;
-            gs4i_face_weights_at(&sim->grid, &f->box, x + 4 * b, &s);
+            if (!gs4i_face_weights_at(&sim->grid, &f->box, x + 4 * b, &s)) continue;
             for (c = 0; c < 3; c++) {
                 gs4i_take_component(&f->box, c, f->given[c], &s, &sums);
                 for (a = 0; a < 3; a++)
@@ -14869,7 +14878,7 @@ static void gs4i_gather_from_faces(const gs4_sim *sim, const gs4i_batch *q, int 
         gs4i_face_sums sums;
         size_t at;
         int i, j, l, near_liquid = 0;
-        gs4i_face_weights_at(&sim->grid, &f->box, x + 4 * b, &s);
+        if (!gs4i_face_weights_at(&sim->grid, &f->box, x + 4 * b, &s)) continue;
         GS4I_FACES_AROUND(&f->box, GS4I_AT_CELL, &s, i, j, l, at) {
             near_liquid |= f->kind[at] == GS4_CELL_LIQUID;
             if (f->compressible)
@@ -17072,11 +17081,11 @@ static void gs4i_set_decay(gs4i_integrator *k, const gs4_sim *sim)
     y = most / gs4i_max(most + k->decay, GS4I_TINY); /* 1 / (1 + x) */
     k->stable_decay = k->decay * y / (1 - y + y * y);
     k->inv_stable = 1 / most;
-    k->crossing = by_noise ? sim->grid.inv_h : GS4I_C(0);
-    k->volume_crossing = by_noise && !sim->particles.deformation_reals
-                                 && !sim->grid.with_deconvolution && gs4i_materials_are_alike(sim)
-                             ? k->fast_decay
-                             : GS4I_C(0);
+    k->crossing = by_noise && !sim->particles.deformation_reals ? sim->grid.inv_h : GS4I_C(0);
+    k->volume_crossing =
+        k->crossing > 0 && !sim->grid.with_deconvolution && gs4i_materials_are_alike(sim)
+            ? k->fast_decay
+            : GS4I_C(0);
     k->weight_crossing = k->volume_crossing > 0
                              ? gs4i_length(sim->desc.gravity) / (k->volume_crossing * sim->grid.h)
                              : GS4I_C(0);

@@ -366,7 +366,7 @@ static double ref_decay(const ref_sim *s, double *at_once)
 /* How much faster particles decay as noise. */
 static double ref_noise(const ref_sim *s, const double *d, double k)
 {
-    if (s->d.flip_decay_time != 0) return 0;
+    if (s->d.flip_decay_time != 0 || s->solids) return 0;
     return ref_stable(s, k + sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / s->h)
            - ref_stable(s, k);
 }

@@ -374,8 +374,8 @@
  *
  * MEMORY. GS4: 65 bytes a particle in float (position, velocity, J and their rates, mass, id,
  * material, and 4 for sorting), 16 more unless flip_decay_time is INFINITY, 49 a cell near material
- * (sharp_gradients: 69), 16 more near walls and colliders, 4 per 64 cells of the domain; 36
- * (double: 64) more for each particle within 8 cells of a sticky collider, 260 (double: 508) for
+ * (sharp_gradients: 69), 16 more near walls and colliders, 4 per 64 cells of the domain; 40
+ * (double: 72) more for each particle within 8 cells of a sticky collider, 264 (double: 516) for
  * each with an image, within three cells, and 20 (double: 40) a cell where such a collider is not
  * flat. Symplectic Euler: 89 and 33. A scene with a viscoelastic liquid: 48 more a particle (Euler
  * 24). With a solid: 96 more (Euler 36). With heat: 17 more a particle, 32 more with a

@@ -11692,7 +11692,9 @@ static void gs4i_find_near_particles(int index, void *context)
  * beside one of 4 cells that slides, now .97 to 1.03). */
 GS4I_INLINE gs4_real gs4i_image_part(const gs4i_near_particle *g)
 {
-    const gs4_real t = gs4i_max(1 - g->d * g->curvature, 0);
+    /* lap d of what is flat but sampled, as meshes are, has noise */
+    const gs4_real k = g->d * g->curvature, sure = gs4i_max(gs4i_abs(k) - GS4I_C(0.1), 0);
+    const gs4_real t = gs4i_max(1 - (k < 0 ? -sure : sure), 0);
     return gs4i_min(t * t, 4);
 }
 

@@ -387,8 +387,8 @@ fuzz() {
     check "calls each public function" sh -c 'for f in $(sed -n "s/^#define \(gs4_[a-z_]*\) gs4_[a-z_]*_f64$/\1/p" gs4mpm.h); do grep -q "$f(" tests/fuzz.c tests/random_scene.h || { echo "$f"; exit 1; }; done'
     have gcc || return
     build="gcc -O1 -g -w -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all"
-    check "in float" fuzzed "$build" 1 150
-    check "in double" fuzzed "$build -DGS4_DOUBLE" 1001 100
+    check "in float" fuzzed "$build" 1 80
+    check "in double" fuzzed "$build -DGS4_DOUBLE" 1101 50
 }
 few_fuzz() { check "a few scenes" fuzzed "$CC -O0 -w" 1 10; }
 

@@ -10763,7 +10763,6 @@ typedef struct gs4i_staggered {
     int without_split, without_correction; /* for tests of what they are for */
     uint8_t *kind;                         /* gs4_cell */
     gs4i_solver solver;
-    double tolerance;
     int iterations;  /* of this step */
     double residual; /* the largest of this step */
 } gs4i_staggered;
@@ -13810,6 +13809,13 @@ static void gs4i_fill_taken(gs4_real *field, const gs4i_face_mirror *m)
             2 * field[4 * m->wall + GS4I_FACE_ACCELERATION];
 }
 
+/* The same for the faces of all axes. */
+static void gs4i_mirror_faces(const gs4_sim *sim, gs4_real *const field[3], gs4i_mirror_fn fn)
+{
+    int c;
+    for (c = 0; c < 3; c++) gs4i_each_mirror(sim, 1 << c, field[c], fn);
+}
+
 /* --- S3 --------------------------------------------------------------------------------------- */
 
 /* C at the stage, from those of the last two: C + (C - before) times the ratio of steps; |C| dt at
@@ -14200,6 +14206,15 @@ static void gs4i_classify_cells(int z, void *context)
     }
 }
 
+/* The cells behind and before a face of axis c that is not at an end of the box. */
+GS4I_INLINE size_t gs4i_cells_of_face(const gs4i_box *box, int c, const int at[3], size_t *before)
+{
+    const size_t row = (size_t)box->size[0],
+                 cell = gs4i_box_index(box, GS4I_AT_CELL, at[0], at[1], at[2]);
+    *before = cell - (c == 0 ? 1 : c == 1 ? row : row * (size_t)box->size[1]);
+    return cell;
+}
+
 /* A face that a wall or a body moves. */
 GS4I_INLINE void gs4i_hold_face(gs4i_staggered *f, int c, size_t face, gs4_real velocity,
                                 gs4_real acceleration)
@@ -14229,11 +14244,7 @@ static void gs4i_classify_face(const gs4_sim *sim, gs4i_staggered *f, int c, con
         gs4i_hold_face(f, c, i, f->body[c][2 * i], f->body[c][2 * i + 1]);
         return;
     }
-    cell = gs4i_box_index(box, GS4I_AT_CELL, at[0], at[1], at[2]);
-    before = cell
-             - (c == 0   ? 1
-                : c == 1 ? (size_t)box->size[0]
-                         : (size_t)box->size[0] * (size_t)box->size[1]);
+    cell = gs4i_cells_of_face(box, c, at, &before);
     kind = f->kind[cell];
     kind_before = f->kind[before];
     if (f->open[c] && (kind == GS4_CELL_SOLID || kind_before == GS4_CELL_SOLID)) f->open[c][i] = 0;
@@ -14346,11 +14357,7 @@ static void gs4i_apply_pressure(int z, void *context)
         GS4I_EACH_FACE(f, c, z, at, i) {
             size_t cell, before;
             if (f->known[c][i] != GS4I_FACE_SOLVED) continue;
-            cell = gs4i_box_index(box, GS4I_AT_CELL, at[0], at[1], at[2]);
-            before = cell
-                     - (c == 0   ? 1
-                        : c == 1 ? (size_t)box->size[0]
-                                 : (size_t)box->size[0] * (size_t)box->size[1]);
+            cell = gs4i_cells_of_face(box, c, at, &before);
             f->taken[c][4 * i + (size_t)pass->what] -= scale
                                                        / f->given[c][4 * i + GS4I_FACE_DENSITY]
                                                        * (f->pressure[cell] - f->pressure[before]);
@@ -14380,7 +14387,9 @@ static int gs4i_setup_pressure(gs4_sim *sim)
                            "was not taken; a smaller dt would do");
 }
 
-static int gs4i_solve_pressure(gs4_sim *sim)
+/* Solve for the right-hand side that is there, and take the gradient over the density from the
+ * number of the faces that `pass` says. */
+static int gs4i_solve_pressure(gs4_sim *sim, gs4i_staggered_pass *pass)
 {
     gs4i_staggered *f = &sim->staggered;
     gs4_solve_stats stats;
@@ -14401,6 +14410,7 @@ static int gs4i_solve_pressure(gs4_sim *sim)
                                f->solver.fault_value,
                                " in the pressure of the step, which is not finite or absurd; the "
                                "step was not taken; a smaller dt would do");
+    gs4i_parallel_for(&sim->tasks, f->box.size[2] + 1, gs4i_apply_pressure, pass);
     return GS4_OK;
 }
 
@@ -14456,12 +14466,9 @@ static int gs4i_project(gs4_sim *sim, int what)
     memset(&pass, 0, sizeof pass);
     pass.sim = sim;
     pass.what = what;
-    pass.scale = 1;
     gs4i_parallel_for(&sim->tasks, f->box.size[2], gs4i_pressure_rhs, &pass);
     if (what == GS4I_FACE_STAGE) GS4I_TRY(gs4i_check_inflow(sim));
-    GS4I_TRY(gs4i_solve_pressure(sim));
-    gs4i_parallel_for(&sim->tasks, f->box.size[2] + 1, gs4i_apply_pressure, &pass);
-    return GS4_OK;
+    return gs4i_solve_pressure(sim, &pass);
 }
 
 /* --- extrapolation ---------------------------------------------------------------------------- */
@@ -14546,7 +14553,7 @@ static void gs4i_extrapolate(gs4_sim *sim, int restart)
  * theta = min(1/2, s U/h). Third, positions are corrected once a step so that material fills its
  * cells: x += dt u_c, div u_c = what is too much there, times a rate. */
 
-/* Largest rates (1/s) of the correction of volume: 20 a stage, or a half a step. */
+/* The correction of volume takes at most this share of what is too much in a step. */
 #define GS4I_MOST_CORRECTION 0.5
 
 /* --- S4, S5 ----------------------------------------------------------------------------------- */
@@ -14554,8 +14561,6 @@ static void gs4i_extrapolate(gs4_sim *sim, int restart)
 /* What a particle takes from the faces around x. */
 typedef struct gs4i_face_sums {
     gs4_real sum[3][4], slope[3][3]; /* of what is taken; dv_c/dx_a of number 0 */
-    gs4_real divergence;
-    int near_liquid;
 } gs4i_face_sums;
 
 GS4I_INLINE void gs4i_take_component(const gs4i_box *box, int c, const gs4_real *field,
@@ -14763,10 +14768,7 @@ static int gs4i_correct_volume(gs4_sim *sim, gs4_real fastest)
     pass.what = GS4I_FACE_CORRECTION;
     pass.scale = gs4i_min(fastest * sim->grid.inv_h, GS4I_C(GS4I_MOST_CORRECTION) / dt);
     gs4i_parallel_for(&sim->tasks, f->box.size[2], gs4i_excess_of_volume, &pass);
-    GS4I_TRY(gs4i_solve_pressure(sim));
-    pass.scale = 1;
-    gs4i_parallel_for(&sim->tasks, f->box.size[2] + 1, gs4i_apply_pressure, &pass);
-    return GS4_OK;
+    return gs4i_solve_pressure(sim, &pass);
 }
 
 /* --- the parts of the step -------------------------------------------------------------------- */
@@ -14782,11 +14784,10 @@ static int gs4i_finish_faces(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     gs4i_staggered *f = &sim->staggered;
     gs4i_staggered_pass pass;
-    int c;
     memset(&pass, 0, sizeof pass);
     pass.sim = sim;
     pass.lightest = nodes->lightest;
-    for (c = 0; c < 3; c++) gs4i_each_mirror(sim, 1 << c, f->given[c], gs4i_fold_given);
+    gs4i_mirror_faces(sim, f->given, gs4i_fold_given);
     gs4i_each_mirror(sim, GS4I_AT_CELL, f->cell, gs4i_fold_given);
     gs4i_parallel_for(&sim->tasks, f->box.size[2] + 1, gs4i_face_velocities, &pass);
     return GS4_OK;
@@ -14815,13 +14816,12 @@ static int gs4i_finish_acceleration(gs4_sim *sim, gs4_real fastest)
 {
     gs4i_staggered *f = &sim->staggered;
     gs4i_staggered_pass pass;
-    int c;
     memset(&pass, 0, sizeof pass);
     pass.sim = sim;
     gs4i_parallel_for(&sim->tasks, f->box.size[2] + 1, gs4i_raw_acceleration, &pass);
     if (!f->compressible && !f->without_split) {
         gs4i_extrapolate(sim, 0);
-        for (c = 0; c < 3; c++) gs4i_each_mirror(sim, 1 << c, f->taken[c], gs4i_fill_taken);
+        gs4i_mirror_faces(sim, f->taken, gs4i_fill_taken);
         GS4I_TRY(gs4i_project(sim, GS4I_FACE_ACCELERATION));
         pass.scale = gs4i_min(GS4I_C(0.5), sim->integrator.s * fastest * sim->grid.inv_h);
     }
@@ -14837,15 +14837,14 @@ static int gs4i_accelerate_by_projection(gs4_sim *sim, gs4i_node_pass *nodes)
     const double start = gs4i_now(sim);
     gs4i_staggered_pass pass;
     gs4_real fastest, most = 0;
-    int c;
     memset(&pass, 0, sizeof pass);
     pass.sim = sim;
     pass.lightest = nodes->lightest;
     gs4i_place_bodies(sim, nodes);
     if (has_stress) {
-        for (c = 0; c < 3; c++) gs4i_each_mirror(sim, 1 << c, f->given[c], gs4i_fill_given);
+        gs4i_mirror_faces(sim, f->given, gs4i_fill_given);
         gs4i_scatter(sim, gs4i_scatter_stress);
-        for (c = 0; c < 3; c++) gs4i_each_mirror(sim, 1 << c, f->force[c], gs4i_fold_number);
+        gs4i_mirror_faces(sim, f->force, gs4i_fold_number);
     }
     gs4i_parallel_for(&sim->tasks, planes + 1, gs4i_predict_faces, &pass);
     gs4i_parallel_for(&sim->tasks, planes, gs4i_classify_cells, &pass);
@@ -14858,7 +14857,7 @@ static int gs4i_accelerate_by_projection(gs4_sim *sim, gs4i_node_pass *nodes)
     if (f->compressible) most = gs4i_find_divergence(sim);
     gs4i_extrapolate(sim, 1);
     gs4i_parallel_for(&sim->tasks, planes + 1, gs4i_finish_taken, &pass);
-    for (c = 0; c < 3; c++) gs4i_each_mirror(sim, 1 << c, f->taken[c], gs4i_fill_taken);
+    gs4i_mirror_faces(sim, f->taken, gs4i_fill_taken);
     f->is_safe = !sim->particles.elastic_reals && !sim->particles.deformation_reals
                  && fastest * sim->integrator.dt < sim->grid.h
                  && most * sim->integrator.dt < GS4I_C(GS4I_SAFE_STRAIN);
@@ -17322,12 +17321,12 @@ static int gs4i_find_affine(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     const gs4_real ahead = sim->integrator.prediction.ahead;
     gs4i_staggered *f = &sim->staggered;
-    int pass, c, result = GS4_OK;
+    int pass, result = GS4_OK;
     sim->integrator.prediction.ahead = 0;
     for (pass = 0; pass < 16 && result == GS4_OK; pass++) {
         result = gs4i_scatter_momenta(sim, nodes);
         if (result != GS4_OK) break;
-        for (c = 0; c < 3; c++) gs4i_each_mirror(sim, 1 << c, f->given[c], gs4i_fill_given);
+        gs4i_mirror_faces(sim, f->given, gs4i_fill_given);
         gs4i_gather(sim, gs4i_find_affine_task);
     }
     sim->integrator.prediction.ahead = ahead;

@@ -27,6 +27,20 @@ static int partitioned_steps(gs4_sim *sim, double time, int steps)
     return result;
 }
 
+/* Angular momentum about the axis `a` through the centre of mass. */
+static double partitioned_spin(const gs4_sim *sim, const gs4_stats *s, int a)
+{
+    const gs4_view x = gs4_particles(sim, GS4_FIELD_POSITION);
+    const int b = (a + 1) % 3, c = (a + 2) % 3;
+    double at_b = 0, at_c = 0;
+    int i;
+    for (i = 0; i < x.count; i++) {
+        at_b += (double)x.data[i * x.stride + b] / x.count;
+        at_c += (double)x.data[i * x.stride + c] / x.count;
+    }
+    return s->angular_momentum[a] - (at_b * s->momentum[c] - at_c * s->momentum[b]);
+}
+
 /* A spinning drop falls freely: its momentum exactly, its angular momentum within 1 %. */
 static void test_partitioned_flight(void)
 {
@@ -35,7 +49,8 @@ static void test_partitioned_flight(void)
         gs4_sim_desc d = partitioned_cube(16);
         const gs4_material m = partitioned_liquid(0);
         gs4_fill f = scene_fill(at(0.3, 0.9, -0.2));
-        gs4_stats before, after;
+        double spin[3];
+        gs4_stats after;
         gs4_sim *sim;
         int c;
         for (c = 0; c < 6; c++) d.walls[c] = GS4_WALL_OPEN;
@@ -45,7 +60,8 @@ static void test_partitioned_flight(void)
         CHECK_RESULT(NULL, gs4_create(&d, &sim), GS4_OK);
         f.material = gs4_add_material(sim, &m);
         gs4_add_particles(sim, gs4_sphere(at(0.5, 0.5, 0.5), (gs4_real)0.22), &f);
-        before = gs4_get_stats(sim);
+        after = gs4_get_stats(sim);
+        for (c = 0; c < 3; c++) spin[c] = partitioned_spin(sim, &after, c);
         partitioned_steps(sim, 0.2, 12);
         after = gs4_get_stats(sim);
         for (c = 0; c < 3; c++) {
@@ -57,8 +73,7 @@ static void test_partitioned_flight(void)
                                       : -0.2;
             CHECK_CLOSE(after.momentum[c] / after.mass, u + g * 0.2, 2e-4);
         }
-        CHECK_BETWEEN(after.kinetic_energy, 0, HUGE_VAL);
-        (void)before;
+        for (c = 0; c < 3; c++) CHECK_CLOSE(partitioned_spin(sim, &after, c) / spin[c], 1, 0.01);
         gs4_destroy(sim);
     }
 }

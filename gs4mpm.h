@@ -1091,6 +1091,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *solver); /* NULL is fine */
 typedef struct gs4i_memory {
     gs4_allocator hook;
     uint64_t bytes;
+    int in_hook; /* a hook is running */
 } gs4i_memory;
 
 static void *gs4i_default_alloc(size_t bytes, size_t alignment, void *user)
@@ -1126,7 +1127,9 @@ static void *gs4i_alloc(gs4i_memory *m, size_t count, size_t size)
     void *p;
     if (count == 0) count = 1;
     if (size && count > (SIZE_MAX / 2) / size) return NULL;
+    m->in_hook = 1;
     p = m->hook.alloc_fn(count * size, 64, m->hook.user);
+    m->in_hook = 0;
     if (!p) return NULL;
     if (m->hook.alloc_fn != gs4i_default_alloc) memset(p, 0, count * size);
     m->bytes += (uint64_t)count * size;
@@ -1138,7 +1141,9 @@ static void gs4i_free(gs4i_memory *m, void *p, size_t count, size_t size)
     if (!p) return;
     if (count == 0) count = 1;
     m->bytes -= (uint64_t)count * size;
+    m->in_hook = 1;
     m->hook.free_fn(p, count * size, m->hook.user);
+    m->in_hook = 0;
 }
 
 /* At least `bytes` of scratch; what was in the first `keep` bytes stays. NULL when memory is
@@ -1271,7 +1276,18 @@ typedef struct gs4i_error {
     char text[480];
     gs4_log_fn log;
     void *log_user;
+    int quiet, in_log; /* errors are not for `log`; it is running */
 } gs4i_error;
+
+/* Tell `log`. Whatever it calls back is refused, and leaves no sentence. */
+static void gs4i_log(gs4i_error *e, int level, const char *line)
+{
+    const gs4i_error before = *e;
+    if (!e->log || e->in_log) return;
+    e->in_log = 1;
+    e->log(level, line == e->text ? before.text : line, e->log_user);
+    *e = before;
+}
 
 /* A sentence begins, is put together, and ends with its code. */
 static gs4i_text gs4i_begin_error(gs4i_error *e) { return gs4i_text_into(e->text, sizeof e->text); }
@@ -1279,7 +1295,7 @@ static gs4i_text gs4i_begin_error(gs4i_error *e) { return gs4i_text_into(e->text
 static int gs4i_end_error(gs4i_error *e, int code)
 {
     e->code = code;
-    if (e->log) e->log(2, e->text, e->log_user);
+    if (!e->quiet) gs4i_log(e, 2, e->text);
     return code;
 }
 
@@ -10819,9 +10835,15 @@ struct gs4_sim {
     gs4i_error error; /* the last one */
 };
 
-static double gs4i_now(const gs4_sim *sim)
+static double gs4i_now(gs4_sim *sim)
 {
-    return sim->desc.now ? sim->desc.now(sim->desc.now_user) : 0;
+    const int busy = sim->busy;
+    double now;
+    if (!sim->desc.now) return 0;
+    sim->busy = 1;
+    now = sim->desc.now(sim->desc.now_user);
+    sim->busy = busy;
+    return now;
 }
 
 /* What is likely not meant, though it is allowed: said once a simulation, at level 1. */
@@ -10856,14 +10878,14 @@ static void gs4i_warn_value(gs4_sim *sim, gs4i_warning which, const char *before
     gs4i_put(&t, before);
     gs4i_put_real(&t, value);
     gs4i_put(&t, after);
-    sim->desc.log(1, line, sim->desc.log_user);
+    gs4i_log(&sim->error, 1, line);
 }
 
 static void gs4i_warn(gs4_sim *sim, gs4i_warning which, const char *line)
 {
     if (!gs4i_will_warn(sim, which)) return;
     sim->warned |= (unsigned)which;
-    sim->desc.log(1, line, sim->desc.log_user);
+    gs4i_log(&sim->error, 1, line);
 }
 
 /* The law of a particle in its phase. */
@@ -19243,11 +19265,18 @@ GS4_API GS4I_COLD int gs4_create(const gs4_sim_desc *desc, gs4_sim **out)
     return gs4i_tell(&e, gs4i_create(&e, desc, out));
 }
 
+/* Does a callback run, which must not change the simulation? */
+static int gs4i_is_busy(const gs4_sim *sim)
+{
+    return sim->busy || sim->error.in_log || sim->memory.in_hook;
+}
+
 GS4_API void gs4_destroy(gs4_sim *sim)
 {
     gs4i_memory memory;
     int i;
-    if (!sim || sim->busy) return; /* a callback of its own would go on in what is freed */
+    if (!sim || gs4i_is_busy(sim)) return; /* a callback of its own would go on in what is freed */
+    sim->busy = 1;
 #ifdef GS4_PTHREADS
     gs4i_pool_destroy(&sim->memory, sim->tasks.pool, sim->desc.threads - 1);
 #endif
@@ -19350,9 +19379,9 @@ GS4_API gs4_shape gs4_mesh(const gs4_real *vertices_xyz, int vertex_count, const
 static int gs4i_check_idle(gs4_sim *sim)
 {
     if (!sim) return GS4_ERROR_ARGUMENT;
-    return gs4i_require(&sim->error, !sim->busy,
+    return gs4i_require(&sim->error, !gs4i_is_busy(sim),
                         "a callback must not change the simulation that called it: do that before "
-                        "or after the step");
+                        "or after the call");
 }
 
 GS4_API GS4I_COLD int gs4_add_material(gs4_sim *sim, const gs4_material *material)
@@ -19477,6 +19506,7 @@ GS4_API int gs4_add_points(gs4_sim *sim, const gs4_real *xyz, int count, gs4_rea
     gs4i_error *e;
     gs4_fill f;
     gs4_vec3 mean;
+    int result;
     GS4I_TRY(gs4i_check_idle(sim));
     e = &sim->error;
     GS4I_TRY(gs4i_require(e, fill && (xyz || count <= 0), "xyz or fill is NULL"));
@@ -19489,9 +19519,12 @@ GS4_API int gs4_add_points(gs4_sim *sim, const gs4_real *xyz, int count, gs4_rea
                                 "volume_each is ", (double)volume_each,
                                 "; above eight cells there would be holes in the material"));
     GS4I_TRY(gs4i_check_points(sim, xyz, count, &mean));
+    sim->busy = 1;
     gs4i_warn_of_bodies(sim, xyz, 3, count);
-    return gs4i_add_points(sim, xyz, count, sim->constants[f.material].density * volume_each, mean,
-                           &f);
+    result = gs4i_add_points(sim, xyz, count, sim->constants[f.material].density * volume_each,
+                             mean, &f);
+    sim->busy = 0;
+    return result;
 }
 
 GS4_API GS4I_COLD int gs4_add_collider(gs4_sim *sim, const gs4_collider *collider)
@@ -19502,8 +19535,10 @@ GS4_API GS4I_COLD int gs4_add_collider(gs4_sim *sim, const gs4_collider *collide
     GS4I_TRY(gs4i_require(&sim->error, collider != NULL, "collider is NULL"));
     c = *collider;
     GS4I_TRY(gs4i_check_collider(sim, &c));
+    sim->busy = 1;
     result = gs4i_add_collider(sim, &c, 0.5 * (double)sim->grid.h);
     if (result >= 0) gs4i_warn_of_bodies(sim, sim->particles.position, 4, sim->particles.count);
+    sim->busy = 0;
     return result;
 }
 
@@ -19548,11 +19583,15 @@ GS4_API int gs4_move_collider(gs4_sim *sim, int collider, gs4_vec3 velocity,
 GS4_API GS4I_COLD int gs4_add_emitter(gs4_sim *sim, const gs4_emitter *emitter)
 {
     gs4_emitter e;
+    int result;
     GS4I_TRY(gs4i_check_idle(sim));
     GS4I_TRY(gs4i_require(&sim->error, emitter != NULL, "emitter is NULL"));
     e = *emitter;
     GS4I_TRY(gs4i_check_emitter(sim, &e));
-    return gs4i_add_emitter(sim, &e);
+    sim->busy = 1;
+    result = gs4i_add_emitter(sim, &e);
+    sim->busy = 0;
+    return result;
 }
 
 GS4_API int gs4_move_emitter(gs4_sim *sim, int emitter, gs4_vec3 travel)
@@ -19765,11 +19804,10 @@ static double gs4i_less(const gs4_sim *sim)
 /* A step that may be refused and tried again: that is no error, so `log` does not hear of it. */
 static int gs4i_try_quietly(gs4_sim *sim, gs4_real dt)
 {
-    const gs4_log_fn log = sim->error.log;
     int result;
-    sim->error.log = NULL;
+    sim->error.quiet = 1;
     result = gs4i_try_step(sim, dt);
-    sim->error.log = log;
+    sim->error.quiet = 0;
     return result;
 }
 
@@ -20088,8 +20126,12 @@ GS4_API int gs4_save(gs4_sim *sim, const char *path)
 
 GS4_API int gs4_load(gs4_sim *sim, const char *path)
 {
+    int result;
     GS4I_TRY(gs4i_check_idle(sim));
-    return gs4i_load(sim, path);
+    sim->busy = 1; /* memory of the state that it reads has no mark of its own */
+    result = gs4i_load(sim, path);
+    sim->busy = 0;
+    return result;
 }
 
 /* --- one material point ----------------------------------------------------------------------- */
@@ -20327,6 +20369,7 @@ struct gs4_poisson {
     gs4_poisson_desc desc;
     gs4i_solver solver;
     double setup_seconds;
+    int busy; /* a callback may be running */
 };
 
 static double gs4i_poisson_now(const gs4_poisson *p)
@@ -20415,11 +20458,14 @@ static int gs4i_poisson_solve(gs4i_error *e, gs4_poisson *p, const gs4_real *rhs
     int r;
     memset(stats, 0, sizeof *stats);
     GS4I_TRY(gs4i_require(e, p && rhs && x, "gs4_poisson_solve needs a solver, rhs and x"));
+    GS4I_TRY(gs4i_require(e, !p->busy, "a callback must not call the solver that called it"));
+    p->busy = 1;
     start = gs4i_poisson_now(p);
     r = gs4i_solver_solve(&p->solver, rhs, x, (double)p->desc.tolerance, p->desc.max_iterations,
                           stats);
     stats->setup_seconds = p->setup_seconds;
     stats->solve_seconds = gs4i_poisson_now(p) - start;
+    p->busy = 0;
     stats->memory_bytes = p->memory.bytes;
     if (r == GS4_OK) return GS4_OK;
     return gs4i_fail_value(e, r, p->solver.fault,
@@ -20439,7 +20485,8 @@ GS4_API int gs4_poisson_solve(gs4_poisson *p, const gs4_real *rhs, gs4_real *x,
 GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 {
     gs4i_memory memory;
-    if (!p) return;
+    if (!p || p->busy) return; /* as gs4_destroy */
+    p->busy = 1;
     gs4i_solver_free(&p->solver);
 #ifdef GS4_PTHREADS
     gs4i_pool_destroy(&p->memory, p->tasks.pool, p->desc.threads - 1);

@@ -2140,13 +2140,10 @@ typedef struct err_calls_back {
     int calls, refused;
 } err_calls_back;
 
-static gs4_real err_calling_viscosity(gs4_real temperature, gs4_real rate, void *user)
+static void err_call_back(err_calls_back *c)
 {
-    err_calls_back *c = (err_calls_back *)user;
     const gs4_material m = err_material();
-    (void)temperature;
-    (void)rate;
-    if (!c->sim || c->calls++) return (gs4_real)0.1;
+    if (!c->sim || c->calls++) return;
     c->refused += gs4_step(c->sim, (gs4_real)1e-4) == GS4_ERROR_ARGUMENT;
     c->refused += strstr(gs4_last_error(c->sim), "callback") != NULL;
     c->refused += gs4_advance(c->sim, (gs4_real)1e-4) == GS4_ERROR_ARGUMENT;
@@ -2154,6 +2151,13 @@ static gs4_real err_calling_viscosity(gs4_real temperature, gs4_real rate, void 
     c->refused += gs4_load(c->sim, "x") == GS4_ERROR_ARGUMENT;
     c->refused += gs4_edit_particles(c->sim, GS4_FIELD_VELOCITY).data == NULL;
     gs4_destroy(c->sim);
+}
+
+static gs4_real err_calling_viscosity(gs4_real temperature, gs4_real rate, void *user)
+{
+    (void)temperature;
+    (void)rate;
+    err_call_back((err_calls_back *)user);
     return (gs4_real)0.1;
 }
 
@@ -2161,7 +2165,7 @@ static int err_calling_go_on(void *user)
 {
     err_calls_back *c = (err_calls_back *)user;
     c->calls = c->refused = 0;
-    err_calling_viscosity(0, 0, user);
+    err_call_back(c);
     return 1;
 }
 
@@ -2189,6 +2193,140 @@ static void test_errors_callback_calls(void)
     c.sim = NULL;
     CHECK_RESULT(sim, gs4_step(sim, (gs4_real)1e-4), 0);
     gs4_destroy(sim);
+}
+
+static void err_calling_log(int level, const char *message, void *user)
+{
+    (void)level;
+    (void)message;
+    err_call_back((err_calls_back *)user);
+}
+
+static double err_calling_now(void *user)
+{
+    err_call_back((err_calls_back *)user);
+    return 0;
+}
+
+static void *err_calling_alloc(size_t bytes, size_t alignment, void *user)
+{
+    char *block = (char *)calloc(bytes + 2 * alignment, 1), *at = block + alignment;
+    err_call_back((err_calls_back *)user);
+    at += alignment - (size_t)at % alignment;
+    memcpy(at - sizeof block, &block, sizeof block);
+    return at;
+}
+
+static void err_calling_free(void *memory, size_t bytes, void *user)
+{
+    char *block;
+    (void)bytes;
+    err_call_back((err_calls_back *)user);
+    memcpy(&block, (char *)memory - sizeof block, sizeof block);
+    free(block);
+}
+
+static gs4_real err_calling_distance(gs4_vec3 x, void *user)
+{
+    err_call_back((err_calls_back *)user);
+    return x.y;
+}
+
+/* All of the six calls were refused, from the first callback of those that there were. */
+static void err_check_calls(err_calls_back *c, gs4_sim *sim, const char *sentence)
+{
+    CHECK(c->calls > 0);
+    CHECK(c->refused == 6);
+    if (sentence) CHECK(strstr(gs4_last_error(sim), sentence) != NULL);
+    c->calls = c->refused = 0;
+}
+
+/* The same outside of steps: who hears of an error or a warning, a clock, an allocator, a distance.
+ * The sentence of the call that failed is there afterwards. */
+static void test_errors_callback_calls_outside(void)
+{
+    gs4_sim_desc d = err_desc();
+    const gs4_material m = err_material();
+    const gs4_vec3 low = { (gs4_real)0.2, 0, (gs4_real)0.2 },
+                   high = { (gs4_real)0.8, (gs4_real)0.5, (gs4_real)0.8 };
+    gs4_collider body;
+    gs4_emitter emitter;
+    err_calls_back log = { NULL, 0, 0 }, now = log, memory = log, shape = log;
+    gs4_sim *sim = NULL;
+    int id;
+    memset(&body, 0, sizeof body);
+    memset(&emitter, 0, sizeof emitter);
+    d.log = err_calling_log;
+    d.log_user = &log;
+    d.now = err_calling_now;
+    d.now_user = &now;
+    d.allocator.alloc_fn = err_calling_alloc;
+    d.allocator.free_fn = err_calling_free;
+    d.allocator.user = &memory;
+    CHECK(gs4_create(&d, &sim) == GS4_OK);
+    memory.sim = sim;
+    CHECK(gs4_add_material(sim, &m) == 0);
+    err_check_calls(&memory, sim, NULL);
+    CHECK(err_add_block(sim) == 64);
+    err_check_calls(&memory, sim, NULL);
+    log.sim = sim;
+    CHECK(gs4_add_material(sim, NULL) == GS4_ERROR_ARGUMENT);
+    err_check_calls(&log, sim, "material is NULL");
+    CHECK(gs4_load(sim, "/nowhere/at/all") == GS4_ERROR_IO);
+    err_check_calls(&log, sim, "could not be opened");
+    CHECK(gs4_step(sim, 1000) == GS4_ERROR_UNSTABLE);
+    err_check_calls(&log, sim, "largest stable step");
+    now.sim = sim;
+    CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)1e-4), 0);
+    err_check_calls(&now, sim, NULL);
+    now.sim = NULL;
+    /* that there is material inside is a warning */
+    shape.sim = sim;
+    body.shape = gs4_sdf(err_calling_distance, &shape, low, high);
+    id = gs4_add_collider(sim, &body);
+    CHECK(id == 0);
+    err_check_calls(&shape, sim, NULL);
+    emitter.shape = body.shape;
+    emitter.fill.velocity.y = 1;
+    gs4_add_emitter(sim, &emitter);
+    err_check_calls(&shape, sim, NULL);
+    memory.calls = memory.refused = 0;
+    shape.sim = log.sim = NULL;
+    gs4_destroy(sim);
+    err_check_calls(&memory, NULL, NULL);
+}
+
+static double err_calling_poisson_now(void *user)
+{
+    gs4_poisson **p = (gs4_poisson **)user;
+    gs4_real x = 0;
+    if (!*p) return 0;
+    CHECK(gs4_poisson_solve(*p, &x, &x, NULL) == GS4_ERROR_ARGUMENT);
+    CHECK(strstr(gs4_last_error(NULL), "callback") != NULL);
+    gs4_poisson_destroy(*p);
+    return 0;
+}
+
+/* The clock of a solver calls it. */
+static void test_errors_poisson_callback_calls(void)
+{
+    const uint8_t kind[2] = { GS4_CELL_LIQUID, GS4_CELL_AIR };
+    const gs4_real rhs[2] = { 1, 0 };
+    gs4_real x[2] = { 0, 0 };
+    gs4_poisson_desc d;
+    gs4_poisson *p = NULL, *called = NULL;
+    memset(&d, 0, sizeof d);
+    d.cells[0] = 2;
+    d.cells[1] = d.cells[2] = 1;
+    d.cell_size = 1;
+    d.kind = kind;
+    d.now = err_calling_poisson_now;
+    d.now_user = &called;
+    CHECK(gs4_poisson_create(&d, &p) == GS4_OK);
+    called = p;
+    CHECK(gs4_poisson_solve(p, rhs, x, NULL) == GS4_OK);
+    CHECK_CLOSE(x[0], 1, 1e-6);
+    gs4_poisson_destroy(p);
 }
 
 /* An emitter that is refused has raised no default speed of sound, which its travel would. */
@@ -2343,6 +2481,8 @@ static void run_errors(void)
     RUN(test_errors_too_much);
     RUN_ONCE(test_errors_half_way);
     RUN_ONCE(test_errors_callback_calls);
+    RUN_ONCE(test_errors_callback_calls_outside);
+    RUN_ONCE(test_errors_poisson_callback_calls);
     RUN_ONCE(test_errors_refused_emitter);
     RUN(test_errors_traps);
     RUN(test_errors_limits);

@@ -9,61 +9,30 @@
 
 enum {
     LETTERS = 6,
-    MOST_POINTS = 16
+    MOST_POINTS = 12
 };
 
-/* A letter as the path of a pen, x and y in heights of the letter; a negative x lifts the pen. */
-typedef struct letter {
-    double path[MOST_POINTS][2];
+/* The path of a pen: x and y of its corners in heights of the letter, one after the other. */
+typedef struct pen {
     int points;
+    double path[2 * MOST_POINTS];
+} pen;
+
+typedef struct letter {
+    const pen *drawn;
     double middle[3], size, tilt, thick;
 } letter;
 
-static const struct {
-    double path[MOST_POINTS][2];
-    int points;
-} pens[4] = {
-    /* G */
-    { { { 0.62, 0.84 },
-        { 0.50, 0.97 },
-        { 0.22, 0.97 },
-        { 0.06, 0.80 },
-        { 0.06, 0.20 },
-        { 0.22, 0.03 },
-        { 0.50, 0.03 },
-        { 0.64, 0.18 },
-        { 0.64, 0.46 },
-        { 0.40, 0.46 } },
-      10 },
-    { { { 0.62, 0.84 },
-        { 0.50, 0.97 },
-        { 0.20, 0.97 },
-        { 0.06, 0.84 },
-        { 0.06, 0.66 },
-        { 0.20, 0.53 },
-        { 0.50, 0.47 },
-        { 0.64, 0.34 },
-        { 0.64, 0.16 },
-        { 0.50, 0.03 },
-        { 0.20, 0.03 },
-        { 0.06, 0.16 } },
-      12 },
-    /* 4 */
-    { { { 0.50, 0.03 }, { 0.50, 0.97 }, { 0.04, 0.34 }, { 0.68, 0.34 } }, 4 },
-    /* M */
-    { { { 0.06, 0.03 }, { 0.06, 0.97 }, { 0.40, 0.45 }, { 0.74, 0.97 }, { 0.74, 0.03 } }, 5 }
+/* G, S, 4, M, P */
+static const pen pens[5] = {
+    { 10, { 0.62, 0.84, 0.50, 0.97, 0.22, 0.97, 0.06, 0.80, 0.06, 0.20,
+            0.22, 0.03, 0.50, 0.03, 0.64, 0.18, 0.64, 0.46, 0.40, 0.46 } },
+    { 12, { 0.62, 0.84, 0.50, 0.97, 0.20, 0.97, 0.06, 0.84, 0.06, 0.66, 0.20, 0.53,
+            0.50, 0.47, 0.64, 0.34, 0.64, 0.16, 0.50, 0.03, 0.20, 0.03, 0.06, 0.16 } },
+    { 4, { 0.50, 0.03, 0.50, 0.97, 0.04, 0.34, 0.68, 0.34 } },
+    { 5, { 0.06, 0.03, 0.06, 0.97, 0.40, 0.45, 0.74, 0.97, 0.74, 0.03 } },
+    { 7, { 0.06, 0.03, 0.06, 0.97, 0.46, 0.97, 0.62, 0.84, 0.62, 0.62, 0.46, 0.48, 0.06, 0.48 } }
 };
-static const struct {
-    double path[MOST_POINTS][2];
-    int points;
-} pen_p = { { { 0.06, 0.03 },
-              { 0.06, 0.97 },
-              { 0.46, 0.97 },
-              { 0.62, 0.84 },
-              { 0.62, 0.62 },
-              { 0.46, 0.48 },
-              { 0.06, 0.48 } },
-            7 };
 
 /* Distance to the round bar that the pen drew, with flat front and back. */
 static gs4_real letter_distance(gs4_vec3 at, void *user)
@@ -75,8 +44,8 @@ static gs4_real letter_distance(gs4_vec3 at, void *user)
                  y = -sin(l->tilt) * X + cos(l->tilt) * Y + 0.5;
     const double side = fabs((double)at.z - l->middle[2]) / l->size - 1.3 * l->thick;
     double best = 1e9;
-    for (int i = 0; i + 1 < l->points; ++i) {
-        const double *a = l->path[i], *b = l->path[i + 1], dx = b[0] - a[0], dy = b[1] - a[1];
+    for (int i = 0; i + 1 < l->drawn->points; ++i) {
+        const double *a = l->drawn->path + 2 * i, *b = a + 2, dx = b[0] - a[0], dy = b[1] - a[1];
         const double t =
             fmin(1, fmax(0, ((x - a[0]) * dx + (y - a[1]) * dy) / (dx * dx + dy * dy)));
         best = fmin(best, hypot(x - a[0] - t * dx, y - a[1] - t * dy));
@@ -86,7 +55,7 @@ static gs4_real letter_distance(gs4_vec3 at, void *user)
 
 int main(int argc, char **argv)
 {
-    /* G S 4 above M P M; 4 is the P */
+    /* G S 4 above M P M */
     static const int which[LETTERS] = { 0, 1, 2, 3, 4, 3 };
     /* shear moduli, Pa */
     static const double stiff[LETTERS] = { 150e3, 40e3, 50e3, 60e3, 20e3, 30e3 };
@@ -123,8 +92,7 @@ int main(int argc, char **argv)
     for (int i = 0; i < LETTERS; ++i) {
         letter *l = &letters[i];
         const double r = 0.11;
-        memcpy(l->path, which[i] == 4 ? pen_p.path : pens[which[i]].path, sizeof l->path);
-        l->points = which[i] == 4 ? pen_p.points : pens[which[i]].points;
+        l->drawn = &pens[which[i]];
         l->size = 0.13;
         l->thick = 0.085;
         l->tilt = place[i][2];

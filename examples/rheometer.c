@@ -1,6 +1,5 @@
-/* rheometer.c - flow curves of three liquids from one material point each, as CSV and as a
- * chart.
- *     cc -O3 -march=native examples/rheometer.c -I. -lm -o rheometer
+/* rheometer.c - flow curves of three liquids from one material point each, as CSV and chart.
+ *     cc -O3 -march=native examples/rheometer.c -Iexamples -I. -lm -o rheometer
  *     ./rheometer                         rheometer.csv and rheometer.svg in out/ (--out DIR)
  *
  * Shows gs4_point_step and gs4_point_stress: the code that particles run, without a simulation
@@ -11,31 +10,24 @@
  * lambda). Pom-Pom: thins, overshoots, and hardens in stretching before it thins. */
 #define GS4MPM_IMPLEMENTATION
 #include "gs4mpm.h"
-#include <errno.h>
+#include "chart.h"
 #include <sys/stat.h>
 
 enum {
     MATERIALS = 3,
     PANELS = 5,
-    RATES = 33,
-    POINTS = 64
+    RATES = 33
 };
 static const char *const names[MATERIALS] = { "Newtonian", "Oldroyd-B", "Pom-Pom" };
-static const char *const titles[PANELS] = { "viscosity in shear, Pa s", "N1 in shear, Pa",
-                                            "-N2 in shear, Pa", "viscosity in stretching, Pa s",
-                                            "viscosity when shear of 10 /s starts, Pa s" };
 static const char *const keys[PANELS] = { "shear_viscosity", "N1", "minus_N2", "stretch_viscosity",
                                           "startup_viscosity" };
-typedef struct curve {
-    double x[POINTS], y[POINTS];
-    int count;
-} curve;
-
-static void add(curve *c, double x, double y)
-{
-    c->x[c->count] = x;
-    c->y[c->count++] = y;
-}
+static const chart_plane planes[PANELS] = {
+    { "viscosity in shear, Pa s", "rate, 1/s", 60, 45, 280, 225, -2, 2, -1, 2 },
+    { "N1 in shear, Pa", "rate, 1/s", 415, 45, 280, 225, -2, 2, -2, 5 },
+    { "-N2 in shear, Pa", "rate, 1/s", 770, 45, 280, 225, -2, 2, -4, 2 },
+    { "viscosity in stretching, Pa s", "rate, 1/s", 60, 355, 280, 225, -2, 2, 0, 3 },
+    { "viscosity when shear of 10 /s starts, Pa s", "s", 415, 355, 280, 225, -2, 2, -1, 2 }
+};
 
 static void need(int result)
 {
@@ -53,7 +45,7 @@ static void flow(const gs4_material *m, gs4_point *p, const gs4_real L[9], doubl
 }
 
 /* Steady flow at each rate, in shear or in stretching, into the panels' curves. */
-static void sweep(const gs4_material *m, curve curves[PANELS])
+static void sweep(const gs4_material *m, chart_curve curves[PANELS])
 {
     for (int i = 0; i < RATES; ++i) {
         const double rate = pow(10, -2 + 4.0 * i / (RATES - 1)),
@@ -65,18 +57,18 @@ static void sweep(const gs4_material *m, curve curves[PANELS])
         gs4_point p = { { 0 }, { 0 }, { 0 }, 0 }, q = p;
         gs4_real s[6];
         flow(m, &p, shear, time, steps, s);
-        add(&curves[0], rate, (double)s[3] / rate);
-        if (lambda > 0) add(&curves[1], rate, (double)(s[0] - s[1]));
-        if (m->anisotropy > 0) add(&curves[2], rate, (double)(s[2] - s[1]));
+        chart_add(&curves[0], rate, (double)s[3] / rate);
+        if (lambda > 0) chart_add(&curves[1], rate, (double)(s[0] - s[1]));
+        if (m->anisotropy > 0) chart_add(&curves[2], rate, (double)(s[2] - s[1]));
         /* it would stretch for ever */
         if (m->liquid == GS4_OLDROYD_B && 2 * lambda * rate > 0.98) continue;
         flow(m, &q, stretch, time * (m->liquid == GS4_OLDROYD_B ? 1 / (1 - 2 * lambda * rate) : 1),
              steps, s);
-        add(&curves[3], rate, (double)(s[0] - s[1]) / rate);
+        chart_add(&curves[3], rate, (double)(s[0] - s[1]) / rate);
     }
 }
 
-static void start_up(const gs4_material *m, curve *c)
+static void start_up(const gs4_material *m, chart_curve *c)
 {
     const gs4_real L[9] = { 0, 10, 0, 0, 0, 0, 0, 0, 0 };
     gs4_point p = { { 0 }, { 0 }, { 0 }, 0 };
@@ -84,60 +76,26 @@ static void start_up(const gs4_material *m, curve *c)
     for (double t = 0, next = 0.01; c->count < 41; next *= pow(10, 0.075)) {
         flow(m, &p, L, next - t, 40, s);
         t = next;
-        add(c, t, (double)s[3] / 10);
+        chart_add(c, t, (double)s[3] / 10);
     }
 }
 
-/* Five charts of two decades each way and more: rates (or seconds) to the right, both axes
- * logarithmic. */
-static void draw(FILE *f, curve curves[MATERIALS][PANELS])
+/* Five charts, of the material's curves against rates or seconds. */
+static void draw(FILE *f, chart_curve curves[MATERIALS][PANELS])
 {
-    static const int low[PANELS] = { -1, -2, -4, 0, -1 }, high[PANELS] = { 2, 5, 2, 3, 2 };
     static const char *const colours[MATERIALS] = { "#bbb", "#06c", "#c40" };
-    fputs("<svg xmlns='http://www.w3.org/2000/svg' width='1080' height='640' "
-          "font-family='sans-serif' font-size='12'>\n<rect width='1080' height='640' "
-          "fill='white'/>\n",
-          f);
+    chart_begin(f, 1080, 640);
     for (int k = 0; k < PANELS; ++k) {
-        const double left = 60 + k % 3 * 355, top = 45 + k / 3 * 310, w = 280, h = 225,
-                     dy = h / (high[k] - low[k]);
-        fprintf(f, "<text x='%g' y='%g' font-size='14'>%s</text>\n", left, top - 12, titles[k]);
-        for (int d = -2; d <= 2; ++d)
-            fprintf(f,
-                    "<path d='M%g %gv%g' stroke='#ddd'/><text x='%g' y='%g' "
-                    "text-anchor='middle'>%g</text>\n",
-                    left + (d + 2) * w / 4, top, h, left + (d + 2) * w / 4, top + h + 16,
-                    pow(10, d));
-        for (int d = low[k]; d <= high[k]; ++d)
-            fprintf(f,
-                    "<path d='M%g %gh%g' stroke='#ddd'/><text x='%g' y='%g' "
-                    "text-anchor='end'>%g</text>\n",
-                    left, top + (high[k] - d) * dy, w, left - 6, top + (high[k] - d) * dy + 4,
-                    pow(10, d));
-        fprintf(f, "<text x='%g' y='%g' text-anchor='middle'>%s</text>\n", left + w / 2,
-                top + h + 34, k == 4 ? "s" : "rate, 1/s");
-        for (int m = 0; m < MATERIALS; ++m) {
-            const curve *c = &curves[m][k];
-            fprintf(f, "<path fill='none' stroke='%s' stroke-width='%g' d='", colours[m],
-                    m ? 2.5 : 6.0);
-            /* what lies outside of the chart is left out */
-            for (int i = 0, n = 0; i < c->count; ++i) {
-                const double x = left + (log10(c->x[i]) + 2) * w / 4,
-                             y = c->y[i] > 0 ? top + (high[k] - log10(c->y[i])) * dy : -1;
-                if (y >= top && y <= top + h && x <= left + w)
-                    fprintf(f, "%s%.1f %.1f ", n++ ? "L" : "M", x, y);
-                else
-                    n = 0;
-            }
-            fputs("'/>\n", f);
-        }
+        chart_axes(f, &planes[k]);
+        for (int m = 0; m < MATERIALS; ++m)
+            chart_draw(f, &planes[k], &curves[m][k], colours[m], m ? 2.5 : 6.0);
     }
     for (int m = 0; m < MATERIALS; ++m)
         fprintf(f,
                 "<path d='M800 %dh40' stroke='%s' stroke-width='2.5'/><text x='850' y='%d' "
                 "font-size='14'>%s</text>\n",
                 420 + 30 * m, colours[m], 425 + 30 * m, names[m]);
-    fputs("</svg>\n", f);
+    chart_end(f);
 }
 
 static FILE *open_in(const char *directory, const char *name)
@@ -146,16 +104,14 @@ static FILE *open_in(const char *directory, const char *name)
     FILE *f;
     sprintf(path, "%.900s/%s", directory, name);
     f = fopen(path, "w");
-    if (!f) {
-        fprintf(stderr, "rheometer: %s cannot be written: %s\n", path, strerror(errno));
-        exit(1);
-    }
-    return f;
+    if (f) return f;
+    perror(path);
+    exit(1);
 }
 
 int main(int argc, char **argv)
 {
-    static curve curves[MATERIALS][PANELS];
+    static chart_curve curves[MATERIALS][PANELS];
     const char *out = argc == 3 && !strcmp(argv[1], "--out") ? argv[2] : "out";
     gs4_material m = { 0 };
     FILE *f;

@@ -347,7 +347,7 @@ static void check_views(void)
     const gs4_sim_desc *d = &r.desc;
     const gs4_real low[3] = { d->origin.x, d->origin.y, d->origin.z };
     int f, i, c;
-    for (f = 0; f <= GS4_FIELD_MASS + 1; f++) {
+    for (f = 0; f <= GS4_FIELD_PRESSURE + 1; f++) {
         const gs4_view v = gs4_particles(r.s.sim, (gs4_field)f);
         for (i = 0; i < v.count; i++)
             for (c = 0; c < v.components; c++) {

@@ -269,10 +269,10 @@ static void symmetry_edit(symmetry_world *w, symmetry_velocity_fn velocity,
 
 /* --- comparing -------------------------------------------------------------------------------- */
 
-/* All numbers of all particles in the coordinates of the scene, 28 a particle. */
+/* All numbers of all particles in the coordinates of the scene, 29 a particle. */
 enum {
-    SYMMETRY_FIELDS = GS4_FIELD_MASS + 1,
-    SYMMETRY_NUMBERS = 28
+    SYMMETRY_FIELDS = GS4_FIELD_PRESSURE + 1,
+    SYMMETRY_NUMBERS = 29
 };
 typedef struct symmetry_state {
     int count, ids;
@@ -486,9 +486,8 @@ static int symmetry_image(int i, int n, int has_mesh)
 static void symmetry_print(const char *name, int n, const symmetry_state *s,
                            const double worst[SYMMETRY_FIELDS], double sums)
 {
-    static const char *const fields[SYMMETRY_FIELDS] = {
-        "x", "v", "J", "s", "F", "T", "l", "q", "m"
-    };
+    static const char *const fields[SYMMETRY_FIELDS] = { "x", "v", "J", "s", "F",
+                                                         "T", "l", "q", "m", "p" };
     int f;
     printf("\n  %s %d, %d particles:", name, n, s->count);
     for (f = 0; f < SYMMETRY_FIELDS; f++)

@@ -78,6 +78,33 @@ static void test_partitioned_flight(void)
     }
 }
 
+/* A pool of the depth H, 8 particles a cell, whose floor is the low or the high side of axis a. */
+static gs4_sim *partitioned_pool(gs4_sim_desc d, const gs4_material *m, int a, int down, double H)
+{
+    const int cells = d.cells[0], rows = (int)floor(2 * cells * H + 0.5),
+              count = 4 * cells * cells * rows;
+    gs4_real *points = (gs4_real *)malloc(3 * (size_t)count * sizeof *points);
+    const gs4_real g = (gs4_real)(down ? -1 : 1);
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    gs4_sim *sim;
+    int i;
+    d.gravity.x = a == 0 ? g : 0;
+    d.gravity.y = a == 1 ? g : 0;
+    d.gravity.z = a == 2 ? g : 0;
+    for (i = 0; i < count; i++) {
+        const double height = (i / (4 * cells * cells) + 0.5) * H / rows;
+        points[3 * i + a] = (gs4_real)(down ? height : 1 - height);
+        points[3 * i + (a + 1) % 3] = (gs4_real)((i % (2 * cells) + 0.5) / (2 * cells));
+        points[3 * i + (a + 2) % 3] =
+            (gs4_real)((i / (2 * cells) % (2 * cells) + 0.5) / (2 * cells));
+    }
+    CHECK_RESULT(NULL, gs4_create(&d, &sim), GS4_OK);
+    f.material = gs4_add_material(sim, m);
+    CHECK_RESULT(sim, gs4_add_points(sim, points, count, (gs4_real)(H / count), &f), GS4_OK);
+    free(points);
+    return sim;
+}
+
 /* A pool whose surface lies anywhere in a cell, under gravity along each axis, is at rest. */
 static void test_partitioned_rest(void)
 {
@@ -86,35 +113,76 @@ static void test_partitioned_rest(void)
     int n;
     for (n = 0; n < 24; n += test_slow ? 1 : 5) {
         const int a = n / 8, down = n & 1, which = n / 2 % 4, cells = 8;
-        const double depth = (5 + rest[which]) / cells, H = depth;
-        const int rows = (int)floor(2 * cells * H + 0.5), count = 4 * cells * cells * rows;
-        gs4_real *points = (gs4_real *)malloc(3 * (size_t)count * sizeof *points);
+        const double H = (5 + rest[which]) / cells;
         gs4_sim_desc d = partitioned_cube(cells);
         const gs4_material m = partitioned_liquid(n % 3 ? 0 : 1);
-        gs4_fill f = scene_fill(at(0, 0, 0));
         gs4_sim *sim;
         gs4_stats s;
-        int i, w;
+        int w;
         for (w = 0; w < 6; w++) d.walls[w] = (w + n) % 2 ? GS4_WALL_STICK : GS4_WALL_SLIP;
-        d.gravity = at(a == 0 ? (down ? -1 : 1) : 0, a == 1 ? (down ? -1 : 1) : 0,
-                       a == 2 ? (down ? -1 : 1) : 0);
-        for (i = 0; i < count; i++) {
-            const double height = (i / (4 * cells * cells) + 0.5) * H / rows;
-            points[3 * i + a] = (gs4_real)(down ? height : 1 - height);
-            points[3 * i + (a + 1) % 3] = (gs4_real)((i % (2 * cells) + 0.5) / (2 * cells));
-            points[3 * i + (a + 2) % 3] =
-                (gs4_real)((i / (2 * cells) % (2 * cells) + 0.5) / (2 * cells));
-        }
-        CHECK_RESULT(NULL, gs4_create(&d, &sim), GS4_OK);
-        f.material = gs4_add_material(sim, &m);
-        CHECK_RESULT(sim, gs4_add_points(sim, points, count, (gs4_real)(H / count), &f), GS4_OK);
+        sim = partitioned_pool(d, &m, a, down, H);
         partitioned_steps(sim, test_slow ? 2 : 0.2, test_slow ? 500 : 50);
         s = gs4_get_stats(sim);
         CHECK_BETWEEN(s.max_speed / sqrt(H), 0, limit);
         CHECK_BETWEEN(s.pressure_iterations, 1, 60);
         gs4_destroy(sim);
-        free(points);
     }
+}
+
+/* Its pressure is that of its depth, with a ball and a box in it, whatever walls and bodies are. */
+static void test_partitioned_pressure(void)
+{
+    static const double rest[4] = { 0, 0.25, 0.5, 0.8 };
+    double worst = 0;
+    int n, i;
+    for (n = 0; n < 24; n += test_full ? 1 : 7) {
+        const int a = n / 8, down = n & 1, cells = 12;
+        const double H = (9 + rest[n / 2 % 4]) / cells, side = down ? 1 : -1;
+        gs4_sim_desc d = partitioned_cube(cells);
+        gs4_material m = partitioned_liquid(n % 3 ? 0 : 1);
+        gs4_shape body[2];
+        gs4_real c[3][3];
+        gs4_sim *sim;
+        gs4_view x, p;
+        for (i = 0; i < 6; i++) d.walls[i] = (i + n) % 2 ? GS4_WALL_STICK : GS4_WALL_SLIP;
+        d.walls[2 * a + down] = GS4_WALL_OPEN;
+        if (n % 5 == 4) {
+            m.incompressible = 0;
+            m.bulk_modulus = (gs4_real)1e8;
+        }
+        for (i = 0; i < 3; i++) {
+            static const double centre[3] = { 0.3, 0.37, 0.41 }, low[3] = { 0.16, 0.55, 0.6 },
+                                high[3] = { 0.44, 0.87, 0.83 };
+            const int b = (a + i) % 3;
+            const int turned = i == 0 && !down;
+            c[0][b] = (gs4_real)(turned ? 1 - centre[i] : centre[i]);
+            c[1][b] = (gs4_real)(turned ? 1 - high[i] : low[i]);
+            c[2][b] = (gs4_real)(turned ? 1 - low[i] : high[i]);
+        }
+        body[0] = gs4_sphere(at(c[0][0], c[0][1], c[0][2]), (gs4_real)0.17);
+        body[1] = gs4_box(at(c[1][0], c[1][1], c[1][2]), at(c[2][0], c[2][1], c[2][2]));
+        sim = partitioned_pool(d, &m, a, down, H);
+        CHECK(gs4_particles(sim, GS4_FIELD_PRESSURE).data[0] == 0);
+        for (i = 0; i < 2; i++) {
+            gs4_collider b;
+            memset(&b, 0, sizeof b);
+            b.shape = body[i];
+            b.contact = (i + n / 2) % 2 ? GS4_WALL_STICK : GS4_WALL_SLIP;
+            CHECK(gs4_remove_particles(sim, body[i]) > 100);
+            CHECK_RESULT(sim, gs4_add_collider(sim, &b), GS4_OK);
+        }
+        partitioned_steps(sim, 0.2, m.incompressible ? 2 : 20);
+        x = gs4_particles(sim, GS4_FIELD_POSITION);
+        p = gs4_particles(sim, GS4_FIELD_PRESSURE);
+        CHECK(p.count == x.count && p.components == 1);
+        for (i = 0; i < p.count; i++) {
+            const double height = 0.5 + side * ((double)x.data[i * x.stride + a] - 0.5),
+                         off = (double)p.data[i * p.stride] / (1000 * H) - (1 - height / H);
+            if (fabs(off) > fabs(worst)) worst = off;
+        }
+        gs4_destroy(sim);
+    }
+    CHECK_BETWEEN(worst, -0.0005, 0.0005);
 }
 
 /* So is one with a ball and a box in it, which hold it or let it slide. */
@@ -498,7 +566,7 @@ static gs4_sim *partitioned_splash(int threads)
     return sim;
 }
 
-/* The same bits for any number of threads, and from a checkpoint. */
+/* The same bits for any number of threads, and from a checkpoint; frames have its pressure. */
 static void test_partitioned_bits(void)
 {
     gs4_sim *a = partitioned_splash(1), *b = partitioned_splash(1);
@@ -519,6 +587,13 @@ static void test_partitioned_bits(void)
     CHECK_RESULT(a, gs4_advance(a, (gs4_real)0.05), GS4_OK);
     CHECK_RESULT(b, gs4_advance(b, (gs4_real)0.05), GS4_OK);
     CHECK(gs4_state_hash(a) == gs4_state_hash(b));
+    files_warm = 0;
+    CHECK_RESULT(a, gs4_write_ply(a, files_path("a.ply")), GS4_OK);
+    CHECK_RESULT(a, gs4_write_raw(a, files_path("a.npy")), GS4_OK);
+    files_check_ply(a, files_path("a.ply"));
+    files_check_npy(a, files_path("a.npy"));
+    remove(files_path("a.ply"));
+    remove(files_path("a.npy"));
     gs4_destroy(a);
     gs4_destroy(b);
 }
@@ -638,6 +713,7 @@ static void run_partitioned(void)
 {
     RUN(test_partitioned_flight);
     RUN(test_partitioned_rest);
+    RUN(test_partitioned_pressure);
     RUN_ONCE(test_partitioned_bodies_at_rest);
     RUN_ONCE(test_partitioned_slope);
     RUN_ONCE(test_partitioned_vortex);

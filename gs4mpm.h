@@ -5848,9 +5848,11 @@ typedef struct gs4i_elliptic {
     /* d; c of the faces across each axis; b; the unknown, 0 at the start */
     gs4_real *diagonal, *face[3], *rhs, *x;
     /* scratch: residual of the sweeps; diagonal, then right-hand side of the preconditioner;
-     * with a periodic axis what that gives, and the vectors of [[krylov]] */
+     * with a periodic axis what that gives, the vectors of [[krylov]] and two numbers of parts; the
+     * part that a cell belongs to, by its first cell */
     gs4_real *scratch, *correction;
-    double *vectors;
+    double *vectors, *part_capacity, *part_mean;
+    size_t *part;
     gs4i_solver solver;
     double tolerance;   /* relative residual */
     int max_iterations; /* of the multigrid, and of what is around it */
@@ -5867,7 +5869,8 @@ static int gs4i_box_is_periodic(const gs4i_box *box)
 static size_t gs4i_elliptic_bytes(const gs4i_box *box)
 {
     const size_t reals = gs4i_box_is_periodic(box) ? 8 : 7;
-    return reals * sizeof(gs4_real) + 1 + (gs4i_box_is_periodic(box) ? 4 * sizeof(double) : 0);
+    return reals * sizeof(gs4_real) + 1
+           + (gs4i_box_is_periodic(box) ? 6 * sizeof(double) + sizeof(size_t) : 0);
 }
 static void gs4i_elliptic_take(gs4i_elliptic *e, gs4i_box *box)
 {
@@ -5877,6 +5880,9 @@ static void gs4i_elliptic_take(gs4i_elliptic *e, gs4i_box *box)
     e->correction = NULL;
     if (gs4i_box_is_periodic(box)) {
         e->vectors = (double *)gs4i_box_take(box, 4 * sizeof(double));
+        e->part_capacity = (double *)gs4i_box_take(box, sizeof(double));
+        e->part_mean = (double *)gs4i_box_take(box, sizeof(double));
+        e->part = (size_t *)gs4i_box_take(box, sizeof(size_t));
         e->correction = (gs4_real *)gs4i_box_take(box, sizeof(gs4_real));
     }
     e->diagonal = (gs4_real *)gs4i_box_take(box, sizeof(gs4_real));
@@ -6027,6 +6033,61 @@ static void gs4i_unwrapped_diagonal(const gs4i_elliptic *e, gs4_real *diagonal)
         }
 }
 
+/* A part is what faces join. Where d is small against c/h^2 its mean hides in a residual: A times
+ * a constant is d, and the heat of the part is sum d x. So means are solved for beside the rest
+ * (deflation: Nicolaides 1987). With W the indicators of parts W^T A W is diagonal, sums of d:
+ *     x = W m + y,   m = sum b / sum d,   W^T A y = sum d y = 0 in each part. */
+static size_t gs4i_first_of_part(size_t *part, size_t i)
+{
+    while (part[i] != i) i = part[i] = part[part[i]];
+    return i;
+}
+
+static void gs4i_find_parts(gs4i_elliptic *e)
+{
+    const gs4i_box *box = e->box;
+    const size_t n = gs4i_box_count(box, GS4I_AT_CELL);
+    size_t k;
+    size_t face[6], i;
+    int at[3], a, z;
+    for (k = 0; k < n; k++) e->part[k] = k;
+    for (z = 0; z < box->size[2]; z++)
+        GS4I_BOX_PLANE(box, GS4I_AT_CELL, z, at, i) {
+            gs4i_box_faces_of(box, at, face);
+            for (a = 0; a < 3; a++) {
+                int before[3];
+                size_t one, other;
+                if (!(e->face[a][face[2 * a]] > 0)) continue;
+                memcpy(before, at, sizeof before);
+                before[a] = (at[a] ? at[a] : box->size[a]) - 1;
+                one = gs4i_first_of_part(e->part, i);
+                other = gs4i_first_of_part(
+                    e->part, gs4i_box_index(box, GS4I_AT_CELL, before[0], before[1], before[2]));
+                e->part[one < other ? other : one] = one < other ? one : other;
+            }
+        }
+    memset(e->part_capacity, 0, n * sizeof *e->part_capacity);
+    for (k = 0; k < n; k++) {
+        e->part[k] = gs4i_first_of_part(e->part, k);
+        if (e->kind[k] == GS4_CELL_LIQUID) e->part_capacity[e->part[k]] += (double)e->diagonal[k];
+    }
+}
+
+/* Takes the mean by d off v in each part. */
+static void gs4i_take_off_means(const gs4i_elliptic *e, double *v)
+{
+    const size_t n = gs4i_box_count(e->box, GS4I_AT_CELL);
+    double *mean = e->part_mean;
+    size_t i;
+    memset(mean, 0, n * sizeof *mean);
+    for (i = 0; i < n; i++)
+        if (e->kind[i] == GS4_CELL_LIQUID) mean[e->part[i]] += (double)e->diagonal[i] * v[i];
+    for (i = 0; i < n; i++)
+        if (e->part_capacity[i] > 0) mean[i] /= e->part_capacity[i];
+    for (i = 0; i < n; i++)
+        if (e->kind[i] == GS4_CELL_LIQUID) v[i] -= mean[e->part[i]];
+}
+
 /* One multigrid solve without the faces around: few eigenvalues of what is left differ from 1. It
  * goes to the rounding of its float cycles, so that the preconditioner is linear; 1e-6 will do. */
 static int gs4i_elliptic_precondition(void *context, const double *r, double *out)
@@ -6047,6 +6108,7 @@ static int gs4i_elliptic_precondition(void *context, const double *r, double *ou
     if (result != GS4_OK && (result != GS4_ERROR_NOT_CONVERGED || !(stats.residual < 1e-6)))
         return result;
     for (i = 0; i < n; i++) out[i] = e->kind[i] == GS4_CELL_LIQUID ? (double)e->correction[i] : 0;
+    gs4i_take_off_means(e, out);
     return GS4_OK;
 }
 
@@ -6054,6 +6116,7 @@ static int gs4i_solve_periodic(gs4i_elliptic *e)
 {
     const size_t n = gs4i_box_count(e->box, GS4I_AT_CELL);
     gs4i_krylov k;
+    double size, rest;
     size_t i;
     int result;
     k.n = n;
@@ -6065,9 +6128,20 @@ static int gs4i_solve_periodic(gs4i_elliptic *e)
     k.precondition = gs4i_elliptic_precondition;
     k.context = e;
     for (i = 0; i < n; i++) k.r[i] = (double)e->rhs[i];
-    result = gs4i_conjugate_gradients(&k, e->tolerance, e->max_iterations);
-    for (i = 0; i < n; i++) e->x[i] = GS4I_C(k.x[i]);
-    e->residual = k.residual;
+    size = sqrt(gs4i_krylov_dot(k.r, k.r, n));
+    gs4i_find_parts(e);
+    for (i = 0; i < n; i++)
+        if (e->kind[i] == GS4_CELL_LIQUID) k.r[i] /= (double)e->diagonal[i];
+    gs4i_take_off_means(e, k.r);
+    for (i = 0; i < n; i++) {
+        k.r[i] *= (double)e->diagonal[i];
+        e->x[i] = GS4I_C(e->part_mean[e->part[i]]);
+    }
+    rest = sqrt(gs4i_krylov_dot(k.r, k.r, n));
+    result =
+        gs4i_conjugate_gradients(&k, rest > 0 ? e->tolerance * size / rest : 1, e->max_iterations);
+    for (i = 0; i < n; i++) e->x[i] += GS4I_C(k.x[i]);
+    e->residual = size > 0 ? k.residual * rest / size : 0;
     return result;
 }
 
@@ -20726,7 +20800,8 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  * where they were large. Parts that overlap are a union, before the overlap was empty. Parts inside
  * out, and bodies thinner than 0.3 cells on average, are refused.
  * Heat: temperatures that the grid does not see fade as fast as heat is conducted, before no faster
- * than flip_decay_time; beside isothermal walls faster yet.
+ * than flip_decay_time; beside isothermal walls faster yet. Periodic boxes keep their heat, which
+ * drifted by some % a step where s k/(rho c h^2) was 1e5.
  * Refused now: numbers too small for a reciprocal, callbacks that give no number, shapes too far
  * out for gs4_real, changes of a simulation by its own callbacks, checkpoints with numbers that no
  * simulation has or with other pivots, starts or stops. `log` says at level 1, once each, what is

@@ -4191,8 +4191,8 @@ static int gs4i_conjugate_gradients(gs4i_krylov *k, double tolerance, int max_it
 
 /* ==== [[kernel]] quadratic B-splines on 27 nodes =============================================== *
  *
- * Nodes are cell centres. A particle in cell c sees nodes c-1, c, c+1 along each axis; with its
- * offset xi in [-1/2, 1/2) from the centre of c, in cells:
+ * Nodes are cell centres. A particle in cell c sees nodes c-1, c, c+1 along each axis. Its offset
+ * from the centre of c is xi, in cells, -1/2 <= xi < 1/2:
  *
  *        node c-1         node c        node c+1
  *     ------o-------|-------o---x---|-------o------
@@ -4202,10 +4202,10 @@ static int gs4i_conjugate_gradients(gs4i_krylov *k, double tolerance, int max_it
  *     w' = -(1/2 - xi),       -2 xi,        1/2 + xi
  *     sum w = 1,   sum w (x_i - x) = 0,   sum w (x_i - x)^2 = h^2/4
  *
- * A block is 4 x 4 x 4 nodes, its particles are neighbours in memory. Transfers work on a tile
- * of 8 x 8 x 8 nodes, which is a block with two nodes around it, so that a particle may stray
- * one cell from its block before it must be sorted anew. A node is four numbers, and three nodes
- * of a row are twelve contiguous ones: the `row` below. */
+ * Products of three are the weights, w_i = w_x w_y w_z. A block is 4^3 nodes, its particles are
+ * neighbours in memory. Transfers work on a tile of 8^3 nodes, a block with two nodes around it.
+ * So a particle may stray one cell from its block before it must be sorted anew. A node is four
+ * numbers. Three nodes along x are twelve contiguous ones: the `row` below. */
 
 #define GS4I_BLOCK_SIDE 4
 #define GS4I_BLOCK_NODES 64
@@ -4213,10 +4213,9 @@ static int gs4i_conjugate_gradients(gs4i_krylov *k, double tolerance, int max_it
 /* a row read may run 4 numbers over the end */
 #define GS4I_TILE_REALS (4 * GS4I_TILE * GS4I_TILE * GS4I_TILE + 16)
 
-/* Four and sixteen numbers at a time: compiler vectors where there are any, arrays elsewhere;
- * the same arithmetic in the same order, so the same bits. Lane 3 of a quad is often without
- * meaning. */
-/* gcc breaks up long vectors badly */
+/* Four and sixteen numbers at a time, by compiler vectors where there are any, else by arrays. The
+ * arithmetic and its order are the same, so the bits are. Lane 3 of a quad often means nothing.
+ * gcc without AVX breaks four doubles up badly: arrays there. */
 #if defined(__has_builtin) && !defined(GS4_NO_VECTORS) \
     && (!defined(GS4_DOUBLE) || defined(__AVX__) || defined(__clang__))
 #if __has_builtin(__builtin_shufflevector) && __has_builtin(__builtin_convertvector)
@@ -4274,9 +4273,9 @@ typedef struct gs4i_quad {
 #define GS4I_LOAD(v, p) memcpy(&(v), (p), sizeof(v))
 #define GS4I_STORE(p, v) memcpy((p), &(v), sizeof(v))
 
-/* A row is one vector of sixteen where the machine has such, two of eight where it has those,
- * three quads elsewhere: it is not left to the compiler to break up long vectors, which costs
- * gcc a factor of four. */
+/* A row is one vector of sixteen where the machine has such, two of eight where it has those, else
+ * three quads. Longer vectors than the machine has are not left to the compiler: gcc was four times
+ * slower with them. */
 #if defined(GS4I_VECTORS) && defined(__AVX__) && !defined(GS4_DOUBLE)
 typedef gs4_real gs4i_pair __attribute__((vector_size(8 * sizeof(gs4_real))));
 #define GS4I_PAIRS 1
@@ -4296,7 +4295,7 @@ typedef gs4_real gs4i_row __attribute__((vector_size(16 * sizeof(gs4_real))));
 typedef struct gs4i_row {
     gs4i_pair ab, cd;
 } gs4i_row;
-/* once for both */
+/* s in eight lanes, made once for both halves */
 #define GS4I_SPREAD(s)           \
     const gs4_real gs4i_n = (s); \
     const gs4i_pair gs4i_s = { gs4i_n, gs4i_n, gs4i_n, gs4i_n, gs4i_n, gs4i_n, gs4i_n, gs4i_n }
@@ -4469,9 +4468,9 @@ GS4I_INLINE void gs4i_row_dot(gs4i_quad *q, const gs4i_row *x, const gs4i_row *y
 }
 
 /* Sixteen particles of a block go together, a batch. What each does by itself is done for
- * GS4I_WIDTH of them at a time: one number of each side by side in a `wide`, the widest vector
- * of the machine, or a plain number where there are none. The formulas are written once for all
- * of these, in loops over the wides of a batch. */
+ * GS4I_WIDTH of them at a time, one number of each side by side in a `wide`. That is the widest
+ * vector of the machine, or a plain number where there are none. Formulas are written once, in
+ * loops over the wides of a batch. */
 enum {
     GS4I_BATCH = 16
 };
@@ -4619,7 +4618,8 @@ GS4I_INLINE void gs4i_sixteen_to_lanes(const gs4_real *from, int apart, gs4i_lan
 #endif
 }
 
-/* The same of n particles; the first one's again where there are fewer */
+/* The same of n particles. Lanes beyond hold the first particle again, so that no arithmetic
+ * there overflows. */
 GS4I_INLINE void gs4i_to_lanes(const gs4_real *from, int n, gs4i_lanes to[4])
 {
     gs4_real filled[4 * GS4I_BATCH];
@@ -4632,7 +4632,7 @@ GS4I_INLINE void gs4i_to_lanes(const gs4_real *from, int n, gs4i_lanes to[4])
     gs4i_sixteen_to_lanes(from, 4, to);
 }
 
-/* And back: (x y z w) of each particle. */
+/* From four lanes to (x y z w) of each particle. */
 GS4I_INLINE void gs4i_from_lanes(const gs4i_wide *x, const gs4i_wide *y, const gs4i_wide *z,
                                  const gs4i_wide *w, gs4_real to[4 * GS4I_BATCH])
 {
@@ -4713,7 +4713,7 @@ GS4I_INLINE void gs4i_from_lanes(const gs4i_wide *x, const gs4i_wide *y, const g
 }
 
 /* `reals` numbers of each of n particles, side by side in memory, into as many lanes. Not one
- * number more is read: those behind may belong to another block, which is in work. */
+ * number more is read: another task may be writing those behind, of another block. */
 GS4I_INLINE void gs4i_numbers_to_lanes(const gs4_real *from, int reals, int n, gs4i_lanes *l)
 {
     gs4_real four[4 * GS4I_BATCH];
@@ -4736,7 +4736,7 @@ GS4I_INLINE void gs4i_numbers_to_lanes(const gs4_real *from, int reals, int n, g
     memcpy(l + 4 * part, last, (size_t)(reals - 4 * part) * sizeof *last);
 }
 
-/* And back. */
+/* From lanes to memory. */
 GS4I_INLINE void gs4i_lanes_to_numbers(gs4i_lanes *l, int reals, int n, gs4_real *to)
 {
     gs4_real four[4 * GS4I_BATCH];
@@ -4764,7 +4764,7 @@ typedef struct gs4i_frame {
     gs4_real origin[3], first[3], inv_h;
 } gs4i_frame;
 
-/* Coordinates outside of 1 <= x < 7 cells, and NaN, give base -1. */
+/* Tile coordinates outside of 1 <= x < 7, and NaN, give base -1: their nodes are not all there. */
 GS4I_INLINE void gs4i_stencils_at(gs4i_stencils *s, const gs4i_frame *f, gs4i_lanes x[3])
 {
     gs4i_wide_int base;
@@ -4836,8 +4836,8 @@ GS4I_INLINE void gs4i_gather_plane(const gs4_real *at, const gs4i_stencils *s, i
     GS4I_ROW_SPLAT_MAD(*slope, GS4I_NTH_CONST(s->d[1][2], n), r);
 }
 
-/* What nodes give to a batch: value (with the fourth number of the nodes) and the columns of its
- * gradient, four numbers a particle; then the same in lanes. */
+/* What nodes give to a batch, four numbers a particle: value = sum w_i f_i of the four numbers f_i
+ * of nodes. Columns of its gradient: dx = sum dw_i/dx f_i and so on. */
 typedef struct gs4i_gathered {
     gs4_real value[4 * GS4I_BATCH], dx[4 * GS4I_BATCH], dy[4 * GS4I_BATCH], dz[4 * GS4I_BATCH];
 } gs4i_gathered;
@@ -4848,8 +4848,7 @@ typedef struct gs4i_forces {
     gs4_real x[4 * GS4I_BATCH], y[4 * GS4I_BATCH], z[4 * GS4I_BATCH], weight[4 * GS4I_BATCH];
 } gs4i_forces;
 
-/* Particle n: value = sum_i w_i f_i, dx = sum_i dw_i/dx f_i, ...; wx and dx the spread weights
- * and derivatives along x */
+/* For particle n; wx and dx: weights and derivatives along x, from gs4i_x_weights. */
 GS4I_INLINE void gs4i_gather_local(const gs4_real *at, const gs4i_stencils *s, int n,
                                    const gs4i_row *wx, const gs4i_row *dx, gs4i_gathered *g)
 {
@@ -4878,7 +4877,7 @@ GS4I_INLINE void gs4i_gather_local(const gs4_real *at, const gs4i_stencils *s, i
     GS4I_STORE(g->dz + 4 * n, q);
 }
 
-/* The value alone. */
+/* sum w_i f_i without the gradient. */
 GS4I_INLINE void gs4i_gather_value(const gs4_real *at, const gs4i_stencils *s, int n,
                                    const gs4i_row *wx, gs4_real value[4 * GS4I_BATCH])
 {
@@ -6183,19 +6182,17 @@ static int gs4i_elliptic_solve(gs4i_elliptic *e, const gs4_sim_desc *desc)
 
 /* ==== [[particles]] the store, and how it is sorted by block =================================== *
  *
- * Arrays of small vectors, each 16 bytes in float where it can be: (x y z mass), (vx vy vz J)
- * and their rates (ax ay az dJ/dt), the velocity gradient, and how much v differs from the
- * grid's velocity there. Sorting permutes in place along the cycles of the permutation: no
- * second copy of anything. */
+ * Arrays of small vectors, each 16 bytes in float where it can be. Sorting permutes in place along
+ * the cycles of the permutation, so nothing is stored twice. */
 
-/* Where the step just before left the rates: a rate of this rule belongs to the time (gamma -
- * 1/2) dt before that of its quantity, so that in free flight dx/dt = v - shift a exactly, and
- * the small rest fits a half. */
+/* When the rates are: by (4) a rate belongs to (gamma - 1/2) dt before the time of its quantity. So
+ * in free flight dx/dt = v - shift a exactly. What dx/dt differs from that, the position residual,
+ * is small enough for a half. */
 typedef struct gs4i_prediction {
     gs4_real ahead /* alpha_f dt */, shift /* (gamma - 1/2) dt of the last step */;
 } gs4i_prediction;
 
-/* Rule (4) of the manual for one step of size dt, and what goes with the step. */
+/* Rule (4) for one step of size dt, and what goes with the step. */
 typedef struct gs4i_integrator {
     gs4_real dt, alpha_m, alpha_f, gamma, inv_alpha_m;
     gs4i_prediction prediction;
@@ -6206,22 +6203,21 @@ typedef struct gs4i_integrator {
     /* Decay of what the grid does not see, at the rate k = 1/flip_decay_time and as noise crosses
      * cells: see gs4i_set_decay. */
     gs4_real decay;           /* k, 1/s */
-    gs4_real stable_decay;    /* k as far as (4) is stable with it, 1/s */
-    gs4_real inv_stable;      /* 1 / the fastest rate that is taken, s */
+    gs4_real stable_decay;    /* the rate that is taken for k, 1/s */
+    gs4_real inv_stable;      /* 1 / the fastest rate that is taken, 0.8 k_max, s */
     gs4_real decayed_at_once; /* share that goes in the step itself, where k dt > 1; else 0 */
-    gs4_real crossing;        /* rate by the speed of noise, 1/m; 0: none */
-    gs4_real volume_crossing; /* the same by the noise of J, 1/s; 0: that does not decay */
-    gs4_real weight_crossing; /* of that rate what weight alone gives J, 1/s */
+    gs4_real crossing;        /* k_n = crossing |v~ - V|: 1/h, or 0 */
+    gs4_real volume_crossing; /* k_J has volume_crossing |Jbar - J~|: c0/h, or 0 */
+    gs4_real weight_crossing; /* less this, |g|/c0, 1/s: what weight alone makes of it */
     gs4_real fast_decay;      /* c0 / h, 1/s: added to k where the grid sees little */
-    gs4_real affine_ratio;    /* of the change of C in the last step that is seen at the stage */
-    gs4_real stopping;        /* 1/s: how fast friction stops a node; half of what (4) bears */
+    gs4_real affine_ratio; /* C of the stage goes on from its last change by this: dt/dt before */
+    gs4_real stopping;     /* how fast friction stops a node: k_max/2, 1/s */
     /* 1/h^2; 1 / mass of a node in the midst of the lightest material, and of the densest */
     gs4_real inv_area, inv_node_mass, inv_densest_node_mass;
 } gs4i_integrator;
 
-/* How much faster something decays at the rate `decay` + `noise` than at `decay`, as far as the
- * explicit (4) is stable with it: a rate k is taken as k (1 + x)/(1 + x + x^2), x = k over the
- * fastest one; k for small x, that for large. */
+/* `noise`: in, the rate of decay as noise; out, what that adds to `stable_decay`, 1/s. As in
+ * gs4i_set_decay a rate k is taken as k (1 + x)/(1 + x + x^2), x = k/(0.8 k_max). */
 GS4I_INLINE void gs4i_faster(const gs4i_integrator *r, gs4_real decay, gs4_real stable_decay,
                              gs4i_wide *noise)
 {
@@ -6230,8 +6226,7 @@ GS4I_INLINE void gs4i_faster(const gs4i_integrator *r, gs4_real decay, gs4_real 
 }
 
 #ifdef GS4_DOUBLE
-/* half of gs4_real's width: enough for a small difference, see S2 in [[transfer]] */
-typedef float gs4i_half;
+typedef float gs4i_half; /* half of gs4_real's width, for the position residual */
 #else
 typedef uint16_t gs4i_half; /* the upper half of a float, rounded */
 #endif
@@ -6286,8 +6281,7 @@ typedef struct gs4i_particles {
     /* 4 each: non-local heat flux (W/m^2), 0, and its rate; 0: the scene has none */
     gs4_real *flux, *flux_rate;
     int with_flux;
-    /* 4: v - shift a - dx/dt, see S2; decay of J in the last step, 1/s; NULL for symplectic
-     * Euler */
+    /* 4: v - shift a - dx/dt; decay of J in the last step, 1/s; NULL for symplectic Euler */
     gs4i_half *position_residual;
     /* 4: V - v~ and how fast it decays as noise, from S4 to S7 of a step; NULL
      * where it does not */
@@ -6298,7 +6292,7 @@ typedef struct gs4i_particles {
     uint32_t *order; /* scratch: block, then destination of each particle */
 } gs4i_particles;
 
-/* those of the state come first, then scratch */
+/* Those of the state come first, then scratch. */
 enum {
     GS4I_ARRAYS = 20,
     GS4I_STATE_ARRAYS = 18
@@ -6434,8 +6428,8 @@ GS4I_INLINE void gs4i_permute_sized(char *data, size_t size, const uint32_t *ord
     }
 }
 
-/* Move every element to its destination; the sizes are spelled out so that copies are plain
- * moves. */
+/* Moves every element of array `index` to its destination. Sizes are constants where they can be,
+ * so that the compiler copies without a call. */
 static void gs4i_permute_task(int index, void *context)
 {
     gs4i_particles *p = (gs4i_particles *)context;
@@ -6458,8 +6452,8 @@ static void gs4i_permute_task(int index, void *context)
     }
 }
 
-/* Counting sort by block, stable, in a number of chunks that depends on the number of particles
- * alone. */
+/* Counting sort by block, stable. The number of chunks depends on the number of particles alone,
+ * so that the order does not depend on threads. */
 typedef struct gs4i_sorting {
     gs4i_particles *p;
     gs4i_grid *g;
@@ -6474,17 +6468,17 @@ GS4I_INLINE void gs4i_chunk(const gs4i_sorting *s, int index, int *begin, int *e
     *end = (int)((int64_t)s->p->count * (index + 1) / s->chunks);
 }
 
-/* What a batch of particles is; with Euler's tier rates and lag are zero. */
+/* What a batch of particles is. With symplectic Euler rates and position residuals are zero. */
 typedef struct gs4i_batch {
     gs4i_lanes x[4];    /* and mass */
     gs4i_lanes v[4];    /* and J */
     gs4i_lanes a[4];    /* dv/dt and dJ/dt */
     gs4i_lanes move[3]; /* dx/dt */
-    gs4i_lanes fades;   /* of dJ/dt the decay, see gs4i_volume_decay */
+    gs4i_lanes fades;   /* what decay of noise gave dJ/dt, see gs4i_volume_decay */
 } gs4i_batch;
 
-/* Ask for a batch some batches ahead: prefetchers of processors end at each page, which is all
- * too soon. */
+/* Asks for a batch before it is needed: processors by themselves fetch ahead to the end of a page
+ * of memory only. */
 GS4I_INLINE void gs4i_prefetch_particles(const gs4i_particles *p, size_t i)
 {
     int b;
@@ -6510,7 +6504,7 @@ GS4I_INLINE void gs4i_prefetch_particles(const gs4i_particles *p, size_t i)
     for (b = 0; b < 4 * GS4I_BATCH && p->heat; b += 16) GS4I_PREFETCH(p->heat + 4 * i + b);
 }
 
-/* Particles i to i + n. */
+/* Particles i to i + n; four batches ahead, chosen, are asked for. */
 GS4I_INLINE void gs4i_load_batch(const gs4i_particles *p, size_t i, int n,
                                  gs4i_prediction prediction, gs4i_batch *q)
 {
@@ -6591,8 +6585,8 @@ static void gs4i_sort_place_task(int index, void *context)
     for (; i < end; i++) s->p->order[i] = h[s->g->occupant[s->g->table[s->p->order[i]] - 1]]++;
 }
 
-/* List of the blocks that particles are in, ascending, from the keys in `order`, in lists[0].
- * Returns how many, or an error. */
+/* Lists the blocks that particles are in, ascending, from the keys in `order`, in lists[0]. Returns
+ * how many, or an error. */
 static int gs4i_list_occupied(gs4i_memory *m, gs4i_sorting *s)
 {
     uint32_t last = UINT32_MAX, *list = (uint32_t *)s->g->lists[0].data;
@@ -6616,8 +6610,9 @@ static int gs4i_list_occupied(gs4i_memory *m, gs4i_sorting *s)
     return n;
 }
 
-/* S1. Sort the particles by the block of their predicted position and give nodes to all blocks
- * in reach. Nothing has changed when memory is refused. */
+/* S1. Sorts the particles by the block of their predicted position and gives nodes to all blocks in
+ * reach. Nothing has changed when memory is refused. A chunk has 4096 particles, chosen, or there
+ * are 64 chunks. */
 static int gs4i_particles_sort(gs4i_memory *m, const gs4i_tasks *tasks, gs4i_particles *p,
                                gs4i_grid *g, gs4i_prediction prediction)
 {
@@ -7104,22 +7099,24 @@ static int gs4i_preset(const char *name, gs4_material *m)
 
 /* ==== [[viscoelastic]] the non-local stress: UCM, Oldroyd-B, extended Pom-Pom ================== *
  *
- * With G0 = (1 - F_v) mu / lambda_b, S = s/G0, r = lambda_b/lambda_0s, nu = 2/Q (Verbeeten,
- * Peters & Baaijens 2001):
+ * Equation (5) of the manual for the Cauchy stress s, Pa (Verbeeten, Peters & Baaijens 2001). Below
+ * S = s/G0, r = lambda_b/lambda_0s, nu = 2/Q.
  *
  *     ds/dt = L s + s L^T + 2 G0 D - [f s + G0 (f - 1) I + (alpha/G0) s.s] / lambda_b
  *     f = 2 r exp(nu (Lam - 1)) (1 - 1/Lam) + (1 - alpha tr(S.S)/3) / Lam^2,
  *     Lam = sqrt(1 + tr S/3);   Oldroyd-B: f = 1, alpha = 0
  *
- * The conformation c = S + I is positive definite: its eigenvalues are squares of stretches. Two
- * integrators of second order: rule 1 of the manual, in lanes, with the relaxation f s implicit,
- * where the step resolves the material; and, particle by particle where it does not, one that
- * keeps c positive definite by construction: UCM and Oldroyd-B exactly; a pom-pom by the split c
- * <- E c E^T, E = exp(L h), between two half relaxations dc/dt = -[f c - I + alpha (c - I)^2] /
- * lambda_b, in substeps h chosen by comparing one with two halves. For alpha > 1 an eigenvalue
- * below 1 - 1/alpha falls without end: the model leaves the cone in finite time. Then, and only
- * then, it relaxes there without the term of alpha, none relaxes to less, none is above 1e6, and
- * how often is counted. */
+ * The conformation c = S + I is positive definite: its eigenvalues are squares of stretches. There
+ * are two integrators, both of second order. Where the step resolves the material, rule (4) in
+ * lanes, with the relaxation f s implicit (gs4i_resolved). Elsewhere the split, particle by
+ * particle, which keeps c positive definite by construction:
+ *     UCM, Oldroyd-B    one linear map, exact for constant L (gs4i_linear_advance)
+ *     pom-pom           c <- E c E^T, E = exp(L h), between two half relaxations
+ *                       dc/dt = -[f c - I + alpha (c - I)^2] / lambda_b, in substeps h
+ * An eigenvalue near 0 relaxes at (1 - alpha)/lambda_b. So for alpha > 1 the model leaves the cone
+ * of positive conformations in finite time. With f = 1 all below 1 - 1/alpha fall. Then, and only
+ * then, eigenvalues there relax without the term of alpha, none relaxes to less, and none is above
+ * 1e6, chosen. How often is counted (tests/test_stress.c: stress_bounded). */
 
 /* What the particles of a batch need of their materials. */
 typedef struct gs4i_elastic_constants {
@@ -7164,8 +7161,9 @@ static void gs4i_load_elastic_constants(const gs4i_batch_constants *constants,
     }
 }
 
-/* f - 1 without cancellation for small S, and how fast f changes with the stretch: r exp(nu (Lam
- * - 1)) (1 + nu) at most. */
+/* f1 = f - 1 without cancellation for small S; trace3 = tr S/3, squares = tr S.S, stretch = 2 r.
+ * How fast Lam^2 relaxes, in 1/lambda_b: stiff = 2 r exp(nu (Lam - 1)) (1 + nu |Lam - 1|).
+ * Exponents are at most 300 and Lam^2 at least 1e-30, so that no number overflows. */
 GS4I_INLINE void gs4i_pom_pom(double stretch, double nu, double alpha, double trace3,
                               double squares, double *f1, double *stiff)
 {
@@ -7176,8 +7174,8 @@ GS4I_INLINE void gs4i_pom_pom(double stretch, double nu, double alpha, double tr
     *stiff = e * (1 + nu * fabs(long_by));
 }
 
-/* The right-hand side R at stress s and gradient L, f / lambda_b, and the rate (1/s) of its
- * fastest part that is not in that. */
+/* The right-hand side R of (5), Pa/s. relax = f / lambda_b is taken implicitly; stiff is how fast
+ * the rest goes at most, by the stretch and by alpha. Both in 1/s. */
 static void gs4i_elastic_rate(const gs4i_elastic_constants *l, gs4i_lanes G, gs4i_symmetric s,
                               gs4i_gradient L, gs4i_symmetric R, gs4i_lanes relax, gs4i_lanes stiff)
 {
@@ -7231,11 +7229,12 @@ static void gs4i_elastic_rate(const gs4i_elastic_constants *l, gs4i_lanes G, gs4
 /* Of one particle, in double. */
 typedef struct gs4i_split {
     double inv_lambda, stretch, nu, alpha, L[3][3],
-        swing /* how far f h / lambda_b moves within a relaxation */;
+        swing /* bound of how far f h / lambda_b moves within a relaxation */;
     int bounded, substeps;
 } gs4i_split;
 
-/* Eigenvalues and eigenvectors (columns of Q) of a symmetric matrix, by Jacobi's rotations. */
+/* Eigenvalues and eigenvectors (columns of Q) of a symmetric matrix, by Jacobi's rotations. They
+ * converge quadratically, in a few of the twenty sweeps. */
 static void gs4i_eigen(const double m[6], double values[3], double Q[3][3])
 {
     double a[3][3];
@@ -7276,7 +7275,7 @@ static void gs4i_eigen(const double m[6], double values[3], double Q[3][3])
     for (i = 0; i < 3; i++) values[i] = a[i][i];
 }
 
-/* f of the conformation m, and how fast it changes with the stretch */
+/* f of the conformation m, and `stiff` of gs4i_pom_pom */
 static double gs4i_relaxation(const gs4i_split *p, const double m[6], double *stiff)
 {
     const double x = m[0] - 1, y = m[1] - 1, z = m[2] - 1;
@@ -7286,8 +7285,8 @@ static double gs4i_relaxation(const gs4i_split *p, const double m[6], double *st
     return f1 + 1;
 }
 
-/* Is the smallest eigenvalue more than what rounding of the largest makes of it? By det / (sum
- * of principal minors), a third of it at least. */
+/* Is the smallest eigenvalue more than what rounding of the largest makes of it? By det / (sum of
+ * principal minors), which is a third of it to all of it. 1e-11, chosen, is 1e5 roundings. */
 static int gs4i_is_round(const double m[6])
 {
     const double minors =
@@ -7297,16 +7296,18 @@ static int gs4i_is_round(const double m[6])
     return minors > 0 && det > 1e-11 * (m[0] + m[1] + m[2]) * minors;
 }
 
-/* With f fixed dc/dt = -[alpha c^2 + (f - 2 alpha) c - (1 - alpha)], t in units of lambda_b, is
- * Riccati's equation: c = u v^-1 of the linear (u, v)' = [[-g, 1 - alpha], [alpha, g]] (u, v), g
- * = f/2 - alpha, whose exponential e has no negative entry for alpha in [0, 1]. Exact, and
- * positive definite as c is: (e00 c + e01)(e10 c + e11)^-1. */
+/* Relaxation with f fixed, t in units of lambda_b, for alpha in [0, 1]:
+ *     dc/dt = -[alpha c^2 + (f - 2 alpha) c - (1 - alpha) I]
+ * That is Riccati's equation. Its solution is c = u v^-1 of the linear
+ *     (u, v)' = [[-g, 1 - alpha], [alpha, g]] (u, v),   g = f/2 - alpha,
+ * whose exponential e has no negative entry. So (e00 c + e01)(e10 c + e11)^-1 is exact, and
+ * positive definite as c is. */
 static void gs4i_relax_fixed(double alpha, double f, double t, const double c[6], double to[6])
 {
     const double g = 0.5 * f - alpha, w = sqrt(g * g + alpha * (1 - alpha));
     double e00 = 1 - g * t, e11 = 1 + g * t, grown = t, d[6], inverse[6], det;
     int i, j, k;
-    if (w * t > 1e-9) { /* all times exp(-w t), which cancels */
+    if (w * t > 1e-9) { /* else its series; e times exp(-w t), which cancels */
         const double q = exp(-2 * w * t), more = 1 + fabs(g) / w,
                      less = alpha * (1 - alpha) / (w * (w + fabs(g)));
         e00 = 0.5 * (g > 0 ? less + q * more : more + q * less);
@@ -7329,8 +7330,9 @@ static void gs4i_relax_fixed(double alpha, double f, double t, const double c[6]
         }
 }
 
-/* The same for alpha > 1, and where rounding could make an eigenvalue negative: each by itself,
- * dc/dt = -(g c - (1 - alpha)), g = f + alpha (c - 2) fixed too, and held inside the bounds. */
+/* The same for alpha > 1, and where rounding could make an eigenvalue negative. Each goes by
+ * itself: dc/dt = -(g c - (1 - alpha)), g = f + alpha (c - 2) at `now`, fixed too. For alpha > 1 it
+ * stays in the bounds, of which the lower is taken at 0.999, chosen. */
 static void gs4i_relax_values(gs4i_split *p, double f, double t, const double now[3],
                               const double c[3], double next[3])
 {
@@ -7361,8 +7363,8 @@ static void gs4i_recompose(double Q[3][3], const double values[3], double m[6])
                                   + Q[i][2] * values[2] * Q[j][2];
 }
 
-/* Relax for the time h: with f fixed, twice, half way ahead, then all the way with f from
- * there. */
+/* Relaxes for the time h by the midpoint rule: with f fixed half the way, then all the way with f
+ * from there. */
 static void gs4i_relax(gs4i_split *p, double m[6], double h)
 {
     const double t = h * p->inv_lambda;
@@ -7396,7 +7398,8 @@ static void gs4i_multiply3(double a[3][3], double b[3][3], double r[3][3])
     memcpy(r, out, sizeof out);
 }
 
-/* exp(L h): Taylor's series of L h / 2^n, squared n times. */
+/* exp(L h): Taylor's series of A = L h / 2^n, entries of at most 1/8, squared n times. Ten terms
+ * leave (3/8)^11/11! = 5e-13 at most. */
 static void gs4i_exponential(double L[3][3], double h, double E[3][3])
 {
     double A[3][3], term[3][3], size = 0;
@@ -7437,9 +7440,9 @@ static void gs4i_convect(double E[3][3], double m[6])
             m[gs4i_place[i][j]] = T[i][0] * E[j][0] + T[i][1] * E[j][1] + T[i][2] * E[j][2];
 }
 
-/* UCM and Oldroyd-B: dS/dt = K S + S K^T + L + L^T, K = L - I/(2 lambda_b), is linear: S <- A S
- * A^T + H, A = exp(K dt), by series over a time so short that they need few terms, then doubled.
- * Exact for constant L. */
+/* UCM and Oldroyd-B are linear: dS/dt = K S + S K^T + L + L^T, K = L - I/(2 lambda_b). So
+ * S <- A S A^T + H, A = exp(K dt), exact for constant L. Both come by series over dt / 2^n, entries
+ * of K dt / 2^n at most 1/64, and are doubled n times. Eight terms leave about 1e-14 of H. */
 static void gs4i_linear_advance(const gs4i_split *p, double c[6], double dt)
 {
     double K[3][3], A[3][3], M[3][3], T[3][3], H[6] = { 0, 0, 0, 0, 0, 0 }, values[3], size = 0,
@@ -7472,7 +7475,7 @@ static void gs4i_linear_advance(const gs4i_split *p, double c[6], double dt)
         for (i = 0; i < 6; i++) H[i] += later[i];
         gs4i_multiply3(A, A, A);
     }
-    /* rounding of a thin ellipsoid: flow would draw it out */
+    /* what rounding made negative of a thin ellipsoid: flow would draw it out */
     if (!gs4i_is_round(c)) {
         gs4i_eigen(c, values, T);
         for (i = 0; i < 3; i++) values[i] = values[i] > 0 ? values[i] : 0;
@@ -7483,14 +7486,18 @@ static void gs4i_linear_advance(const gs4i_split *p, double c[6], double dt)
     for (i = 0; i < 6; i++) c[i] += H[i] + (i < 3);
 }
 
-#define GS4I_SPLIT_TOLERANCE 5e-6 /* of a substep, relative to S */
-#define GS4I_SPLIT_LIMIT 20000    /* substeps; more means that nothing settles */
+/* Error of a substep, relative to S, measured: one call stays within 1e-3 of every row of the
+ * reference (tests/test_stress.c: stress_split). With 1e-5 it missed one row. */
+#define GS4I_SPLIT_TOLERANCE 5e-6
+#define GS4I_SPLIT_LIMIT 20000 /* substeps, chosen; more means that nothing settles */
 
-/* Conformation after the time dt under constant L. 0, or GS4_ERROR_UNSTABLE where it overflows
- * or takes too long. */
+/* Conformation after the time dt under constant L. 0, or GS4_ERROR_UNSTABLE where it overflows or
+ * takes too long. Substeps are of second order, so two halves are off by a third of their
+ * difference from one whole. The next h goes by the cube root; 0.9, and factors from 0.1 to 4, are
+ * chosen. */
 static int gs4i_split_advance(gs4i_split *p, double c[6], double dt)
 {
-    /* over a longer one any two answers agree: all has relaxed */
+    /* longer than lambda_b one and two halves agree whatever they are: all has relaxed */
     double h = fmin(dt, 0.25 / p->inv_lambda), left = dt, E[3][3], half[3][3];
     int n, i;
     if (!(p->stretch > 0)) {
@@ -7525,12 +7532,12 @@ static int gs4i_split_advance(gs4i_split *p, double c[6], double dt)
         change = sqrt(change);
         size = fmax(1e-14, sqrt(fmax(before, after)));
         if (!(error < 1e145)) error = 1e290; /* NaN, too */
-        /* where f swings, one and two halves agree on a wrong answer */
+        /* where f swings, one and two halves may agree on a wrong answer */
         ratio = fmax(error / (GS4I_SPLIT_TOLERANCE * size + 2e-15 * (1 + size)), p->swing);
         if (ratio <= 1) {
             memcpy(c, two, sizeof two);
             left -= h;
-            /* it has settled */
+            /* it has settled: what is left changes less than 1e-6 of S, chosen, or than rounding */
             if (h < left && (change * (left / h) < 1e-6 * size || change < 4e-15 * (1 + size)))
                 return GS4_OK;
         }
@@ -7565,16 +7572,15 @@ static void gs4i_conformation_rate(const gs4i_split *p, const double c[6], doubl
         }
 }
 
-/* How many particles took the split, how many of them had eigenvalues bounded; 1 + the last of
- * the batch that could not be done. */
+/* How many particles took the split, and how many of them had eigenvalues bounded. */
 typedef struct gs4i_elastic_count {
     int split, bounded;
     int substeps;
     int failed, no_modulus; /* number in the batch, from 1, of one whose stress, G0 failed */
 } gs4i_elastic_count;
 
-/* A batch whose particles may need the split: constants, G (Pa), L, stress before; the time and,
- * for the rate, gamma of the rule. */
+/* A batch whose particles may need the split: constants, G0 (Pa), L, stress before, the time, and
+ * gamma of (4) for the rate. */
 typedef struct gs4i_split_batch {
     const gs4i_elastic_constants *constants;
     const gs4i_wide *G;
@@ -7597,8 +7603,9 @@ static gs4i_split_batch gs4i_batch_to_split(const gs4i_elastic_constants *consta
     return batch;
 }
 
-/* Particle n of a batch by the split over dt; `after`: its stress then, and with `rate` the rate
- * that belongs to rule 1. */
+/* Particle n of a batch by the split over dt: its stress then, and with `rate` the rate that (4)
+ * would have left. That belongs to (gamma - 1/2) dt before. The mean slope belongs to dt/2 before.
+ * So 2 gamma - 1 of that and the rest of the slope at the end make it. */
 static void gs4i_split_one(const gs4i_split_batch *batch, int n, gs4i_symmetric after,
                            gs4i_lanes *rate, gs4i_elastic_count *count)
 {
@@ -7627,7 +7634,7 @@ static void gs4i_split_one(const gs4i_split_batch *batch, int n, gs4i_symmetric 
         fast = fmax(fast, fabs(end[i]));
         gap = fmax(gap, fabs((c[i] - before[i]) / dt - end[i]));
     }
-    /* a transient that is over does not belong into the rate */
+    /* a transient that is over is no part of the rate: there the slope at the end alone */
     slope = (2 * batch->gamma - 1) * fmin(1, fast / gap);
     for (i = 0; i < 6; i++)
         GS4I_NTH(rate[i], n) =
@@ -7636,13 +7643,18 @@ static void gs4i_split_one(const gs4i_split_batch *batch, int n, gs4i_symmetric 
 
 /* --- both together ---------------------------------------------------------------------------- */
 
-/* Does rule 1 resolve each particle: |L| dt and what relaxes explicitly small, and c = s/G + I
- * inside the cone, or above 1 - 1/alpha? */
+/* Does rule (4) resolve each particle? Beside the border both integrators are of second order. So
+ * most of it is chosen:
+ *     |L| dt       < 1/4
+ *     stiff dt     < 0.4: (4) is stable up to 0.48 or more, see gs4i_correct_elastic
+ *     f dt/lambda_b    > -0.1, far from the pole at -1; in a first step < 1: there the factor
+ *                  of the midpoint rule, (1 - z/2)/(1 + z/2), is negative from 2 on
+ *     c            or for alpha > 1 c - (1 - 1/alpha) I, positive definite: its first entry above
+ *                  1e-3, minors above 1e-5 of products of the diagonal, which float resolves */
 static int gs4i_resolved(gs4i_lanes G, const gs4i_wide *alpha, gs4i_gradient L, gs4i_symmetric s,
                          gs4i_lanes relax, gs4i_lanes stiff, const gs4i_integrator *integrator,
                          int ok[GS4I_BATCH])
 {
-    /* the midpoint rule of a first step damps nothing */
     const gs4_real dt = integrator->dt, fastest = integrator->restart ? 1 / dt : GS4I_HUGE;
     gs4i_lanes squared, verdict;
     int b, j, all = 1;
@@ -7670,8 +7682,8 @@ static int gs4i_resolved(gs4i_lanes G, const gs4i_wide *alpha, gs4i_gradient L, 
     return all;
 }
 
-/* G0 = (1 - F_v) mu / lambda_b of n particles; where mu depends on the shear rate, of the mu
- * there. Where that is none G0 is 0, which is counted. */
+/* G0 = (1 - F_v) mu / lambda_b of n particles, where mu depends on the shear rate of the mu there.
+ * Where the callback gives no number G0 is 0, and no_modulus says so. */
 static void gs4i_moduli(const gs4i_elastic_constants *l, gs4i_gradient L, int n, gs4i_lanes G,
                         gs4i_elastic_count *count)
 {
@@ -7715,10 +7727,12 @@ static void gs4i_stage_elastic(const gs4i_elastic_constants *l, gs4i_lanes G, co
         if (!ok[b]) gs4i_split_one(&batch, b, s, NULL, count);
 }
 
-/* S7: s by rule 1, (alpha_m + w relax) ds' = R(y) + relax (y - s*) - s' with w = alpha_f gamma
- * dt, for n particles of the batch. y is the predicted stress s*; where there are no rates to
- * predict with, that of the midpoint rule; and it is taken again at s* + w ds' for members with
- * gamma near 1/2, which a prediction alone leaves unstable. */
+/* S7: s by rule (4) with implicit relaxation, for n particles of the batch. With
+ * w = alpha_f gamma dt and s* = s + alpha_f dt s':
+ *     (alpha_m + w relax) ds' = R(y) + relax (y - s*) - s'
+ * y is s*; where there are no rates to predict with, that of the midpoint rule. Such a prediction
+ * is stable up to stiff dt = 4 (1 - r s)/(3 + r + s - r s): at least 0.48 where gamma > 0.66, and 0
+ * at 1/2. Members below 0.66 take y = s* + w ds' again, five times in all, chosen. */
 static void gs4i_correct_elastic(const gs4i_elastic_constants *l, gs4i_elastic *e,
                                  const gs4i_integrator *integrator, gs4i_gradient L, int n,
                                  gs4i_elastic_count *count)
@@ -7760,8 +7774,8 @@ static void gs4i_correct_elastic(const gs4i_elastic_constants *l, gs4i_elastic *
         if (!ok[b]) gs4i_split_one(&batch, b, e->s, e->rate, count);
 }
 
-/* Elastic waves of each particle: density times squared speed at most, 2 G0 c_max, by the
- * largest row sum of c. */
+/* Density times the squared speed of elastic waves of each particle, Pa: 2 G0 c_max at most. The
+ * largest row sum of c bounds its eigenvalues. */
 static void gs4i_see_elastic(gs4i_lanes G, gs4i_symmetric s, gs4i_lanes stiffness)
 {
     int b, i, j;
@@ -7781,8 +7795,7 @@ static void gs4i_see_elastic(gs4i_lanes G, gs4i_symmetric s, gs4i_lanes stiffnes
     }
 }
 
-/* Stress of n particles from memory, six numbers each and six of the rate where there are rates;
- * and back. */
+/* Stress of n particles from memory, six numbers each and six of the rate where that is kept. */
 static void gs4i_load_elastic(const gs4_real *from, int reals, int n, gs4i_elastic *e)
 {
     gs4i_lanes *l = (gs4i_lanes *)(void *)e; /* 12 in the order of its fields */
@@ -7806,34 +7819,35 @@ static void gs4i_store_elastic(gs4_real *to, int reals, int n, gs4i_elastic *e)
 /* ==== [[solid]] elastic and plastic solids: neo-Hookean, fixed-corotated ======================= *
  *
  * F is the elastic part of the deformation gradient, dF/dt = L F while nothing yields; F = V R
- * with a rotation R. Cauchy stress (Pa):
+ * with a rotation R. Its Cauchy stress (Pa), equation (6), beside the pressure:
  *
  *     neo-Hookean      s = (G/J) dev(B),         B = J^(-2/3) F F^T                         (2021)
  *     fixed-corotated  s = (2 G/J) dev(B - V),   V^2 = B: energy G |J^(-1/3) F - R|^2  (2014, 7, 8)
  *
- * beside the pressure of the particle's J, which alone is the volume: F is scaled to det F = J
- * whenever it is written, and its stress is that of the part that keeps volume. Particles of
- * liquids have F = J^(1/3) I.
- *     What is kept with F is not dF/dt but M = (dF/dt) F^-1, by rule 1 for known grad u, and F goes
- *     by the mean of M over the step:
+ * J of the particle alone is the volume: F is scaled to det F = J whenever it is written. Particles
+ * of liquids have F = J^(1/3) I.
+ *     What is kept with F is not dF/dt but M = (dF/dt) F^-1. M goes by (4) for known grad u, and F
+ * by the mean of M over the step:
  *
  *     dM = (grad u - M) / alpha_m,   X = dt (M + gamma dM),   M += dM,
  *     F <- (I - X/2)^-1 (I + X/2) F
  *     stage: Y = alpha_f dt M + s (L~ - M),   F~ = (I - Y/2)^-1 (I + Y/2) F
  *
- * To first order in X that is rule 1 for F itself, implicit in F at the stage. But a rotation
- * stays one, whatever dt; where |X| > 1 exp(X) takes the place of the fraction, so that det F >
- * 0 after any step; and what happens to F from the right - yielding, F <- F P, or forgetting all
- * strain, F <- J^(1/3) I - leaves M as it is, so that nothing needs a restart.
+ * To first order in X that is (4) for F itself, implicit in F at the stage. But a rotation stays
+ * one, whatever dt. Where |X| > 1 exp(X) takes the place of the fraction, so det F > 0 after any
+ * step. Yielding, F <- F P, and forgetting all strain, F <- J^(1/3) I, change F from the right.
+ * They leave M as it is, so nothing needs a restart.
  *     Yield (2014, 5.1), after each step: singular values of F are clamped to
  *     [1 - theta_c, 1 + theta_s], then all scaled to det F = J.
- *     Solids also keep how they turn, w (rad/s), with its rate: S3, gs4i_correct_spin. */
+ *     Solids also keep their spin w (rad/s) with its rate: S3, gs4i_correct_spin. */
 
-/* Density times squared speed of elastic waves, over G times the largest eigenvalue of B: 4/3 by
- * the acoustic tensor, but the grid, which has less of div dev grad than of div grad, sees 0.83
- * of it in the measure of sound (tests/test_solid.c). */
+/* Density times squared speed of elastic waves, over G times the largest eigenvalue of B. A
+ * continuum has 4/3 beside sound, by its acoustic tensor. The grid has less of div dev grad than of
+ * div grad. Balls as in tests/test_solid.c (solid_stability) are stable at 0.95 of the limit with
+ * 0.7 here, not with 0.6: 1 is chosen above that. */
 #define GS4I_SOLID_WAVES GS4I_C(1)
-#define GS4I_MOST_STRAIN GS4I_C(8) /* |X| of one step; more is refused */
+/* |X| of one step, chosen; more is refused. Where |grad u| dt <= 1 it is about 1. */
+#define GS4I_MOST_STRAIN GS4I_C(8)
 
 /* What the particles of a batch need of their materials. */
 typedef struct gs4i_solid_constants {
@@ -7849,13 +7863,13 @@ typedef struct gs4i_deformation {
     gs4i_lanes spin[3], spin_rate[3];
 } gs4i_deformation;
 
-/* How many particles took the exponential, how many had to be bounded; 1 + the last of the batch
- * that could not be done. */
+/* How many particles took the exponential, how many had to be bounded; 1 + the place in the batch
+ * of the last that could not be done. */
 typedef struct gs4i_solid_count {
     int split, bounded, failed;
 } gs4i_solid_count;
 
-/* Is any of the batch solid? */
+/* Returns whether any of the batch is solid. */
 static int gs4i_load_solid_constants(const gs4i_batch_constants *constants, gs4i_solid_constants *l)
 {
     int n;
@@ -7892,9 +7906,10 @@ static void gs4i_turn_columns(double a[3][3], int p, int q, double cosine, doubl
     }
 }
 
-/* F = U diag(s) V^T with rotations U and V, s[0] >= s[1] >= |s[2]|, the sign of det F in s[2];
- * of any finite F, flat ones and zero included. One-sided Jacobi: the columns of F V are made
- * orthogonal, so that small singular values keep their digits. */
+/* F = U diag(s) V^T with rotations U and V, s[0] >= s[1] >= |s[2]|, and the sign of det F in s[2].
+ * F may be any that is finite, flat or zero too. One-sided Jacobi: the columns of F V are made
+ * orthogonal, so that small singular values keep their digits. It converges quadratically, in a few
+ * of the thirty sweeps. */
 static void gs4i_svd(double F[3][3], double U[3][3], double s[3], double V[3][3])
 {
     double A[3][3], size = 0, u[3][3];
@@ -7991,7 +8006,7 @@ static double gs4i_determinant(double F[3][3])
            + F[0][2] * (F[1][0] * F[2][1] - F[1][1] * F[2][0]);
 }
 
-/* F <- exp(X) F. 0 where that is too much for one step. */
+/* F <- exp(X) F. Returns 0, and leaves F, where |X| > GS4I_MOST_STRAIN. */
 static int gs4i_exponential_step(gs4i_matrix X, int n, double F[3][3])
 {
     double x[3][3], E[3][3], squared = 0;
@@ -8034,7 +8049,7 @@ GS4I_INLINE void gs4i_cube_root(const gs4i_wide *x, gs4i_wide *root)
     *root = y;
 }
 
-/* Cofactors: the inverse is their transpose over the determinant. */
+/* Cofactors c of a: its inverse is their transpose over the determinant. */
 GS4I_INLINE void gs4i_cofactors(gs4i_wide a[3][3], gs4i_wide c[3][3], gs4i_wide *determinant)
 {
     int i, j;
@@ -8045,7 +8060,7 @@ GS4I_INLINE void gs4i_cofactors(gs4i_wide a[3][3], gs4i_wide c[3][3], gs4i_wide 
     *determinant = a[0][0] * c[0][0] + a[0][1] * c[0][1] + a[0][2] * c[0][2];
 }
 
-/* |X|^2 up to which the fraction serves; its pole is at 4 */
+/* |X|^2 up to which the fraction serves, chosen: its pole is at 4. */
 #define GS4I_SMALL_STEP GS4I_C(1)
 
 /* Is |X| small for all? */
@@ -8060,7 +8075,7 @@ static int gs4i_is_small_step(gs4i_matrix X, gs4i_lanes squared)
     return small;
 }
 
-/* now = (I - X/2)^-1 (I + X/2) F = F + (I - X/2)^-1 X F; may be F itself */
+/* now = (I - X/2)^-1 (I + X/2) F, as F + (I - X/2)^-1 X F, which rounds less; may be F itself. */
 static void gs4i_deform(gs4i_matrix X, gs4i_matrix F, gs4i_matrix now)
 {
     int b, i, j;
@@ -8138,8 +8153,8 @@ static void gs4i_stage_solid(const gs4i_solid_constants *l, gs4i_deformation *e,
     }
 }
 
-/* F of particle n after a step X from `old`, to the volume ratio J, as plasticity and bounds let
- * it be; `now` is what the fraction made of it. */
+/* F of particle n after the step X, scaled to det F = J, then within its limits. From `old` by
+ * exp(X); where that is NULL, `now` is what the fraction made of it. */
 static void gs4i_correct_one(const gs4i_material_constants *mat, gs4i_matrix X,
                              gs4i_lanes (*old)[3], gs4i_matrix now, double J, int n, gs4i_matrix F,
                              gs4i_solid_count *count)
@@ -8160,9 +8175,9 @@ static void gs4i_correct_one(const gs4i_material_constants *mat, gs4i_matrix X,
     gs4i_set_matrix(F, n, one);
 }
 
-/* F as it is now, but det F = J; F = J^(1/3) I where there is no solid. Is each within its
- * limits, which F F^T - low^2 and high^2 - F F^T tell, and not so stretched that its determinant
- * would need more digits than there are? */
+/* F is `now`, scaled to det F = J; J^(1/3) I where there is no solid. Is each within its limits? It
+ * is where F F^T - low^2 and high^2 - F F^T are positive definite. Beyond a trace of 64, chosen,
+ * the first has too few digits of det F in float, and double is taken. */
 static int gs4i_fit_volume(const gs4i_solid_constants *l, gs4i_matrix now, const gs4i_wide *J,
                            gs4i_matrix F, gs4i_lanes verdict)
 {
@@ -8212,7 +8227,7 @@ static void gs4i_let_flow(gs4i_gradient L, const gs4i_wide *J, gs4i_deformation 
         GS4I_BATCH_LOOP(b) gs4i_cube_root(&J[b], &e->F[i][i][b]);
 }
 
-/* S7: F and M for known grad u = L, to the volume ratio J; n particles of the batch. */
+/* S7: F and M for known grad u = L, det F = J; n particles of the batch. */
 static void gs4i_correct_solid(const gs4i_solid_constants *l, gs4i_deformation *e,
                                const gs4i_integrator *integrator, gs4i_gradient L,
                                const gs4i_wide *J, int n, gs4i_solid_count *count)
@@ -8244,7 +8259,7 @@ static void gs4i_correct_solid(const gs4i_solid_constants *l, gs4i_deformation *
     }
 }
 
-/* Bound of the largest eigenvalue: the largest sum of a row */
+/* Bounds the largest eigenvalue, by the largest sum of sizes in a row. */
 GS4I_INLINE void gs4i_largest_row(const gs4i_wide s[6], gs4i_wide *most)
 {
     gs4i_wide size[6];
@@ -8261,8 +8276,9 @@ GS4I_INLINE void gs4i_largest_row(const gs4i_wide s[6], gs4i_wide *most)
     }
 }
 
-/* B - V of the unimodular F = V R, and the largest row sum of V: R by Newton's rule R <- (R +
- * R^-T)/2. Has it converged for all? */
+/* B - V of F = V R, det F = 1, and the largest row sum of V. R by Newton's rule R <- (R + R^-T)/2
+ * from F. Returns whether that has converged for all; in nine steps stretches from 1/32 to 32 do.
+ * */
 static int gs4i_corotated_strain(gs4i_matrix F, gs4i_symmetric strain, gs4i_lanes most)
 {
     gs4i_matrix R;
@@ -8282,7 +8298,7 @@ static int gs4i_corotated_strain(gs4i_matrix F, gs4i_symmetric strain, gs4i_lane
                     R[i][j][b] += d;
                     moved += d * d;
                 }
-            /* squared; what is left is half of that */
+            /* |dR|^2: the rule converges quadratically, so what is left is half of that */
             near_by = moved < GS4I_C(0.1) * GS4I_EPSILON;
             done &= gs4i_all(&near_by);
         }
@@ -8304,8 +8320,10 @@ static int gs4i_corotated_strain(gs4i_matrix F, gs4i_symmetric strain, gs4i_lane
     return done;
 }
 
-/* Adds the deviatoric stress of F where the volume ratio is J to sigma. `stiffness`: density
- * rho0 times the squared speed of elastic waves, at most; 0 for liquids. */
+/* Adds the deviatoric stress of F at the volume ratio J to sigma. `stiffness`: density rho0 times
+ * the squared speed of elastic waves, at most; 0 for liquids. With b_max of B it is G b_max, or
+ * where fixed-corotated G (2 b_max - sqrt(b_max)). In double beyond J from 1/20 to 20, where the
+ * cube root is not exact, and beyond b_max = 64, chosen as in gs4i_fit_volume. */
 static void gs4i_solid_stress(const gs4i_solid_constants *l, gs4i_matrix F, const gs4i_wide *J,
                               gs4i_symmetric sigma, gs4i_lanes stiffness)
 {
@@ -8348,7 +8366,7 @@ static void gs4i_solid_stress(const gs4i_solid_constants *l, gs4i_matrix F, cons
         GS4I_CHOOSE(verdict[b], usual, one, zero);
         fine &= gs4i_all(&usual);
     }
-    /* crushed, drawn out, or not converged: by singular values */
+    /* in double, by singular values */
     for (i = 0; i < GS4I_BATCH && !fine; i++) {
         double one[3][3], s[6] = { 0, 0, 0, 0, 0, 0 }, stiff;
         if (!(GS4I_NTH_CONST(l->modulus, i) > 0)
@@ -8370,9 +8388,9 @@ typedef struct gs4i_gathered_rates {
     gs4i_lanes decay; /* of the sub-grid velocity, 1/s */
 } gs4i_gathered_rates;
 
-/* S7: w by rule 1. dw/dt is half the curl of acc - L L, which is what the velocity gradient of a
- * particle does; what the grid cannot see of w fades at the rate that of v does, implicit in
- * itself; and contact turns at once. */
+/* S7: w by (4). The velocity gradient of a particle has the rate grad acc - L L, so w has half its
+ * curl. What the grid does not see of w decays at the rate of the sub-grid velocity, implicit in
+ * itself. Contact turns at once. */
 static void gs4i_correct_spin(const gs4i_solid_constants *l, gs4i_deformation *e,
                               const gs4i_integrator *integrator, gs4i_gradient L,
                               gs4i_gathered_rates *rates)
@@ -8407,7 +8425,7 @@ static void gs4i_correct_spin(const gs4i_solid_constants *l, gs4i_deformation *e
     }
 }
 
-/* F, M, w and dw/dt of n particles from memory, F alone where there are no rates; and back. */
+/* F, M, w and dw/dt of n particles from memory, F alone where there are no rates. */
 static void gs4i_load_deformation(const gs4_real *from, int reals, int n, gs4i_deformation *e)
 {
     gs4i_lanes *l = (gs4i_lanes *)(void *)e; /* 24 in the order of its fields */
@@ -8428,7 +8446,7 @@ static void gs4i_store_deformation(gs4_real *to, int reals, int n, gs4i_deformat
         gs4i_lanes_to_numbers(l, 9, n, to);
 }
 
-/* No strain but that of the volume: F = J^(1/3) I; M = 0, and no spin. */
+/* Forgets all strain but that of the volume: F = J^(1/3) I, M = 0, no spin. */
 static void gs4i_undeform(const gs4i_particles *p, size_t i, gs4_real J)
 {
     gs4_real *F = p->deformation + (size_t)p->deformation_reals * i;
@@ -13001,9 +13019,9 @@ GS4I_INLINE void gs4i_volume_decay(const gs4i_integrator *r, const gs4i_correcti
     }
 }
 
-/* S7. Velocity by rule 1, motion that the grid cannot see decays: v~ - V at its rate, see
+/* S7. Velocity by rule (4), motion that the grid cannot see decays: v~ - V at its rate, see
  * gs4i_find_subgrid, in spray and at walls v - U faster, implicit in itself; J by 2021 (57),
- * implicit in J for known div u; position by rule 1 with the grid's velocity U. In: move is
+ * implicit in J for known div u; position by rule (4) with the grid's velocity U. In: move is
  * dx/dt; out: what the new dx/dt lags behind v - shift a. */
 GS4I_INLINE void gs4i_correct_batch(gs4i_integrator r, const gs4i_corrections *k, gs4i_batch *q)
 {

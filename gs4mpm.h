@@ -12812,11 +12812,10 @@ GS4I_INLINE void gs4i_prefetch_subgrid(const gs4i_particles *p, size_t i)
 }
 
 /* V - v~ of n particles, V = sum w v_i; and, where noise decays by itself, how much faster. */
-GS4I_INLINE void gs4i_subgrid_of(const gs4i_integrator *r, const gs4i_batch *q, const gs4_real *V,
-                                 int n, gs4i_lanes subgrid[4])
+GS4I_INLINE void gs4i_subgrid_of(const gs4i_integrator *r, const gs4i_batch *q,
+                                 gs4i_lanes subgrid[4])
 {
     int b, c;
-    gs4i_to_lanes(V, n, subgrid);
     for (c = 0; c < 3; c++)
         GS4I_BATCH_LOOP(b) subgrid[c][b] -= q->v[c][b] + r->prediction.ahead * q->a[c][b];
     memset(subgrid[3], 0, sizeof subgrid[3]);
@@ -12836,7 +12835,8 @@ GS4I_INLINE void gs4i_find_subgrid(const gs4i_particles *p, size_t i, int n,
                                    gs4i_lanes subgrid[4])
 {
     gs4_real out[4 * GS4I_BATCH];
-    gs4i_subgrid_of(r, q, V, n, subgrid);
+    gs4i_to_lanes(V, n, subgrid);
+    gs4i_subgrid_of(r, q, subgrid);
     gs4i_from_lanes(subgrid[0], subgrid[1], subgrid[2], subgrid[3], out);
     gs4i_prefetch_subgrid(p, i + 4 * GS4I_BATCH);
     memcpy(p->subgrid + 4 * i, out, 4 * (size_t)n * sizeof *out);
@@ -13687,53 +13687,86 @@ enum {
  * then divided by it: 1/K (1/Pa), J** - 1 -> pressure (Pa). */
 enum {
     GS4I_CELL_FILL = 0,
+    GS4I_CELL_DIVERGENCE = GS4I_CELL_FILL, /* in tiles, for particles */
     GS4I_CELL_COMPLIANCE,
     GS4I_CELL_DILATION,
     GS4I_CELL_PRESSURE = GS4I_CELL_DILATION,
     GS4I_CELL_SOLID /* share of its kernel that bodies take */
 };
 
-/* Weights of a particle along each axis, for numbers at centres [0] and at faces [1]. */
-typedef struct gs4i_face_weights {
-    int base[2][3];
-    gs4_real w[2][3][3], d[2][3][3]; /* d: 1/m */
-    gs4_real offset[2][3];           /* m, of the first place from the particle */
-} gs4i_face_weights;
+/* Transfers go by tiles as those of nodes do: 8^3 cells around a block, and as many faces of each
+ * axis, tile [place of a face's axis + 1]; cells are tile [0]. Weights of faces are those of nodes
+ * in a tile that lies half a cell lower along their axis. */
+typedef gs4_real gs4i_face_tile[GS4I_TILE_REALS];
 
-/* For a particle at x (m). 0 if it reaches beyond the box. */
-static int gs4i_face_weights_at(const gs4i_grid *g, const gs4i_box *box, const gs4_real x[3],
-                                gs4i_face_weights *s)
+static void gs4i_face_stencils_at(gs4i_stencils s[4], const gs4i_frame *cells, gs4i_lanes x[3])
 {
-    const gs4_real origin[3] = { g->origin.x, g->origin.y, g->origin.z };
-    int a, t;
-    for (a = 0; a < 3; a++) {
-        const gs4_real at = (x[a] - origin[a]) * g->inv_h - GS4I_C(box->low[a]);
-        if (!(at >= 2 && at < GS4I_C(box->size[a] - 2))) return 0;
-        for (t = 0; t < 2; t++) {
-            const gs4_real here = t ? at : at - GS4I_C(0.5); /* places are at 0, 1, 2 ... */
-            const int base = (int)(here + GS4I_C(0.5)) - 1;
-            const gs4_real e = here - GS4I_C(base + 1); /* -1/2 to 1/2 */
-            s->base[t][a] = base;
-            s->offset[t][a] = (GS4I_C(base) - here) * g->h;
-            s->w[t][a][0] = GS4I_C(0.5) * (GS4I_C(0.5) - e) * (GS4I_C(0.5) - e);
-            s->w[t][a][1] = GS4I_C(0.75) - e * e;
-            s->w[t][a][2] = GS4I_C(0.5) * (GS4I_C(0.5) + e) * (GS4I_C(0.5) + e);
-            s->d[t][a][0] = (e - GS4I_C(0.5)) * g->inv_h;
-            s->d[t][a][1] = -2 * e * g->inv_h;
-            s->d[t][a][2] = (e + GS4I_C(0.5)) * g->inv_h;
-        }
+    int place;
+    for (place = 0; place < 4; place++) {
+        gs4i_frame frame = *cells;
+        if (place) frame.first[place - 1] -= GS4I_C(0.5);
+        gs4i_stencils_at(&s[place], &frame, x);
     }
-    return 1;
 }
 
-/* Loop over the 27 entries `at` of a place around a particle: w_x, w_y, w_z are weights[..][i]. */
-#define GS4I_FACES_AROUND(box, place, s, i, j, k, at)                            \
-    for (k = 0; k < 3; k++)                                                      \
-        for (j = 0; j < 3; j++)                                                  \
-            for (i = 0, at = gs4i_box_index(box, place, (s)->base[(place)&1][0], \
-                                            (s)->base[(place) >> 1 & 1][1] + j,  \
-                                            (s)->base[(place) >> 2 & 1][2] + k); \
-                 i < 3; i++, at++)
+/* Is particle b where the tiles have faces? They go half a cell further up than nodes. */
+GS4I_INLINE int gs4i_is_in_tiles(const gs4i_stencils s[4], int b)
+{
+    return (s[0].base[b] | s[1].base[b] | s[2].base[b] | s[3].base[b]) >= 0;
+}
+
+/* S2: a batch and its weights at the predicted positions. */
+GS4I_INLINE void gs4i_stage_faces(const gs4_sim *sim, const gs4i_frame *cells, size_t i, int n,
+                                  gs4i_batch *q, gs4i_stencils s[4])
+{
+    gs4i_lanes x[3];
+    gs4i_load_batch(&sim->particles, i, n, sim->integrator.prediction, q);
+    gs4i_predict_positions(q, sim->integrator.prediction, x);
+    gs4i_face_stencils_at(s, cells, x);
+}
+
+/* Where row (y, z) of the tile of occupied block o begins in a field of the box. */
+GS4I_INLINE size_t gs4i_face_row(const gs4i_staggered *f, const int first[3], int place, int row)
+{
+    return gs4i_box_index(&f->box, place, first[0] - f->box.low[0] - 2,
+                          first[1] - f->box.low[1] - 2 + (row & 7),
+                          first[2] - f->box.low[2] - 2 + (row >> 3));
+}
+
+/* Touched rows of quads into a tile, and the row behind each. */
+static void gs4i_load_face_tile(const gs4_sim *sim, int o, int place,
+                                const gs4_real *GS4I_RESTRICT field, gs4_real *GS4I_RESTRICT tile)
+{
+    const uint64_t rows = sim->reports[o].rows | sim->reports[o].rows << 1;
+    int first[3], row;
+    gs4i_block_origin(&sim->grid, sim->grid.occupied_block[o], first);
+    for (row = 0; row < 64; row++, tile += 4 * GS4I_TILE)
+        if (rows >> row & 1)
+            memcpy(tile, field + 4 * gs4i_face_row(&sim->staggered, first, place, row),
+                   4 * GS4I_TILE * sizeof *tile);
+    memset(tile, 0, 16 * sizeof *tile);
+}
+
+/* A tile of quads, or of single numbers, to where its touched rows are in the box. */
+static void gs4i_add_face_tile(const gs4_sim *sim, int o, int place, int reals,
+                               const gs4_real *GS4I_RESTRICT tile, gs4_real *GS4I_RESTRICT field)
+{
+    const uint64_t rows = sim->reports[o].rows;
+    int first[3], row, i;
+    gs4i_block_origin(&sim->grid, sim->grid.occupied_block[o], first);
+    for (row = 0; row < 64; row++, tile += reals * GS4I_TILE) {
+        gs4_real *to;
+        if (!(rows >> row & 1)) continue;
+        to = field + (size_t)reals * gs4i_face_row(&sim->staggered, first, place, row);
+        for (i = 0; i < reals * GS4I_TILE; i += 4) {
+            gs4i_quad sum, q;
+            GS4I_LOAD(sum, to + i);
+            GS4I_LOAD(q, tile + i);
+            GS4I_SUM(sum, sum, q);
+            GS4I_STORE(to + i, sum);
+        }
+    }
+}
 
 /* Has any material stress beside the pressure? */
 static int gs4i_has_stress(const gs4_sim *sim)
@@ -13945,112 +13978,111 @@ static void gs4i_mirror_faces(const gs4_sim *sim, gs4_real *const field[3], gs4i
 
 /* C at the stage, from those of the last two: C + (C - before) times the ratio of steps; |C| dt at
  * most 1/4, or a splash without viscosity blows up. */
-static void gs4i_stage_affine(const gs4_sim *sim, size_t i, gs4_real C[3][3])
+static void gs4i_stage_affine(const gs4_sim *sim, size_t i, int n, gs4i_gradient C)
 {
     const gs4i_particles *p = &sim->particles;
-    const gs4_real dt = sim->integrator.dt, ratio = sim->integrator.affine_ratio;
-    gs4_real squared = 0, most = GS4I_C(0.0625) / (dt * dt);
-    int c, a;
-    for (a = 0; a < 3; a++)
-        for (c = 0; c < 3; c++) {
-            const gs4_real now = p->affine[a][4 * i + (size_t)c],
-                           before = p->affine_before[a][4 * i + (size_t)c];
-            C[c][a] = now + ratio * (now - before);
-            squared += C[c][a] * C[c][a];
+    const gs4_real ratio = sim->integrator.affine_ratio;
+    gs4i_gradient before;
+    gs4i_lanes bound;
+    int k, b;
+    gs4i_gradient_lanes(p->affine[0] + 4 * i, p->affine[1] + 4 * i, p->affine[2] + 4 * i, n, C);
+    gs4i_gradient_lanes(p->affine_before[0] + 4 * i, p->affine_before[1] + 4 * i,
+                        p->affine_before[2] + 4 * i, n, before);
+    for (k = 0; k < 9; k++)
+        GS4I_BATCH_LOOP(b) {
+            const gs4i_wide change = C[k / 3][k % 3][b] - before[k / 3][k % 3][b];
+            C[k / 3][k % 3][b] += ratio * change;
         }
-    if (squared <= most) return;
-    for (a = 0; a < 9; a++) C[a / 3][a % 3] *= GS4I_SQRT(most / squared);
+    gs4i_affine_bound(C, sim->integrator.dt, bound);
+    for (k = 0; k < 9; k++)
+        GS4I_BATCH_LOOP(b) C[k / 3][k % 3][b] *= bound[b];
 }
 
-/* Momentum m (v~ + C (x_f - x~)), m a, volume and mass of particles to faces; volume, and what
- * compresses it, to cells. */
-static void gs4i_give_to_faces(gs4_sim *sim, size_t i, const gs4_real x[3], const gs4_real v[3])
+/* What a batch gives: momentum m (v~ + C (x_f - x~)), m a, volume and mass to faces; volume, and
+ * what compresses it, to cells. */
+typedef struct gs4i_face_gifts {
+    gs4i_affine_forces faces[3];
+    gs4_real cells[4 * GS4I_BATCH];
+} gs4i_face_gifts;
+
+static void gs4i_give_to_faces(const gs4_sim *sim, size_t i, int n, const gs4i_batch *q,
+                               const gs4i_stencils s[4], gs4i_face_gifts *gifts)
 {
-    gs4i_staggered *f = &sim->staggered;
-    const gs4i_particles *p = &sim->particles;
-    const gs4i_material_constants *mat = gs4i_constants_of(sim, i);
-    const gs4_real m = p->position[4 * i + 3],
-                   J = p->velocity[4 * i + 3] + sim->integrator.before * p->rate[4 * i + 3],
-                   volume = m * mat->inv_density * J;
-    gs4i_face_weights s;
-    gs4_real C[3][3];
-    size_t at;
-    int c, j, k, n;
-    gs4i_stage_affine(sim, i, C);
-    memset(&s, 0, sizeof s);
-    if (!gs4i_face_weights_at(&sim->grid, &f->box, x, &s)) return;
+    const gs4i_integrator *r = &sim->integrator;
+    const gs4_real h = sim->grid.h;
+    gs4i_gradient C;
+    gs4i_lanes J, volume, compliance, squeeze, zero, momentum, rate, slope[3];
+    int b, c, a;
+    gs4i_stage_affine(sim, i, n, C);
+    memset(zero, 0, sizeof zero);
+    for (b = 0; b < GS4I_BATCH; b++) {
+        const gs4i_material_constants *m = gs4i_constants_of(sim, i + (size_t)(b < n ? b : 0));
+        GS4I_NTH(volume, b) = m->inv_density;
+        GS4I_NTH(compliance, b) = m->compliance;
+        GS4I_NTH(squeeze, b) = m->compliance > 0 ? GS4I_C(1) : GS4I_C(0);
+    }
+    GS4I_BATCH_LOOP(b) {
+        J[b] = q->v[3][b] + r->before * q->a[3][b];
+        volume[b] = q->x[3][b] * volume[b] * J[b];
+        compliance[b] *= volume[b];
+        squeeze[b] *= volume[b] * (J[b] - 1);
+    }
+    gs4i_from_lanes(volume, compliance, squeeze, zero, gifts->cells);
     for (c = 0; c < 3; c++) {
-        const int place = 1 << c, tx = c == 0, ty = c == 1, tz = c == 2;
-        const gs4_real base = v[c] + C[c][0] * s.offset[tx][0] + C[c][1] * s.offset[ty][1]
-                              + C[c][2] * s.offset[tz][2],
-                       h = sim->grid.h, a = p->rate[4 * i + (size_t)c];
-        GS4I_FACES_AROUND(&f->box, place, &s, n, j, k, at) {
-            const gs4_real w = s.w[tx][0][n] * s.w[ty][1][j] * s.w[tz][2][k];
-            gs4_real *to = f->given[c] + 4 * at;
-            to[GS4I_FACE_VELOCITY] +=
-                w * m
-                * (base + h * (C[c][0] * GS4I_C(n) + C[c][1] * GS4I_C(j) + C[c][2] * GS4I_C(k)));
-            to[GS4I_FACE_RATE] += w * m * a;
-            to[GS4I_FACE_DENSITY] += w * volume;
-            to[GS4I_FACE_MASS] += w * m;
+        const gs4i_stencils *at = &s[1 + c];
+        gs4i_affine_forces *to = &gifts->faces[c];
+        GS4I_BATCH_LOOP(b) {
+            const gs4i_wide m = q->x[3][b];
+            for (a = 0; a < 3; a++) slope[a][b] = m * (h * C[c][a][b]);
+            momentum[b] = m * (q->v[c][b] + r->prediction.ahead * q->a[c][b])
+                          - ((slope[0][b] * at->xi[0][b] + slope[1][b] * at->xi[1][b])
+                             + slope[2][b] * at->xi[2][b]);
+            rate[b] = m * q->a[c][b];
         }
+        gs4i_from_lanes(momentum, rate, volume, q->x[3], to->middle);
+        gs4i_from_lanes(slope[0], zero, zero, zero, to->x);
+        gs4i_from_lanes(slope[1], zero, zero, zero, to->y);
+        gs4i_from_lanes(slope[2], zero, zero, zero, to->z);
     }
-    GS4I_FACES_AROUND(&f->box, GS4I_AT_CELL, &s, n, j, k, at) {
-        const gs4_real w = s.w[0][0][n] * s.w[0][1][j] * s.w[0][2][k] * volume;
-        f->cell[4 * at + GS4I_CELL_FILL] += w;
-        f->cell[4 * at + GS4I_CELL_COMPLIANCE] += w * mat->compliance;
-        if (mat->compliance > 0) f->cell[4 * at + GS4I_CELL_DILATION] += w * (J - 1);
-    }
-}
-
-/* Positions and velocities of a batch at the stage, four numbers a particle. */
-static void gs4i_stage_of(const gs4i_particles *p, size_t i, int n, gs4i_prediction prediction,
-                          gs4i_batch *q, gs4_real x[4 * GS4I_BATCH], gs4_real v[4 * GS4I_BATCH])
-{
-    gs4i_lanes at[3], speed[3];
-    int b, c;
-    gs4i_load_batch(p, i, n, prediction, q);
-    gs4i_predict_positions(q, prediction, at);
-    for (c = 0; c < 3; c++)
-        GS4I_BATCH_LOOP(b) speed[c][b] = q->v[c][b] + prediction.ahead * q->a[c][b];
-    gs4i_from_lanes(at[0], at[1], at[2], q->x[3], x);
-    gs4i_from_lanes(speed[0], speed[1], speed[2], q->x[3], v);
-}
-
-/* Is x where the tile of its block has faces? They go half a cell further up than nodes. */
-static int gs4i_is_in_tile(const gs4i_grid *g, const int first[3], const gs4_real x[3])
-{
-    const gs4_real origin[3] = { g->origin.x, g->origin.y, g->origin.z };
-    int a;
-    for (a = 0; a < 3; a++) {
-        const gs4_real at = (x[a] - origin[a]) * g->inv_h - GS4I_C(first[a]);
-        if (!(at >= -1 && at < GS4I_C(GS4I_BLOCK_SIDE + 0.5))) return 0;
-    }
-    return 1;
 }
 
 static void gs4i_scatter_to_faces(int index, void *context)
 {
     const gs4i_pass *pass = (const gs4i_pass *)context;
     gs4_sim *sim = pass->sim;
-    const gs4i_particles p = sim->particles;
+    gs4i_staggered *f = &sim->staggered;
     const int o = pass->blocks[index];
+    const gs4i_frame frame = gs4i_tile_frame(&sim->grid, sim->grid.occupied_block[o]);
+    gs4i_report *report = &sim->reports[o];
+    gs4i_face_tile tile[4];
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
-    int first[3];
-    gs4i_block_origin(&sim->grid, sim->grid.occupied_block[o], first);
-    gs4i_report_clear(&sim->reports[o]);
+    int c;
+    gs4i_report_clear(report);
+    report->rows = 0;
+    memset(tile, 0, sizeof tile);
     for (; i < end; i += GS4I_BATCH) {
         const int n = gs4i_batch_size(i, end);
         gs4i_batch q;
-        gs4_real x[4 * GS4I_BATCH], v[4 * GS4I_BATCH];
+        gs4i_stencils s[4];
+        gs4i_face_gifts gifts;
         int b;
-        gs4i_stage_of(&p, i, n, sim->integrator.prediction, &q, x, v);
-        for (b = 0; b < n; b++)
-            if (gs4i_is_in_tile(&sim->grid, first, x + 4 * b))
-                gs4i_give_to_faces(sim, i + (size_t)b, x + 4 * b, v + 4 * b);
-            else
-                sim->reports[o].left_tile++;
+        gs4i_stage_faces(sim, &frame, i, n, &q, s);
+        gs4i_give_to_faces(sim, i, n, &q, s, &gifts);
+        for (b = 0; b < n; b++) {
+            if (!gs4i_is_in_tiles(s, b)) {
+                report->left_tile++;
+                continue;
+            }
+            gs4i_scatter_quad(tile[0], &s[0], b, gifts.cells + 4 * b);
+            report->rows |= gs4i_touched_rows(s[0].base[b]);
+            for (c = 0; c < 3; c++) {
+                gs4i_scatter_affine(tile[1 + c], &s[1 + c], b, &gifts.faces[c]);
+                report->rows |= gs4i_touched_rows(s[1 + c].base[b]);
+            }
+        }
     }
+    gs4i_add_face_tile(sim, o, GS4I_AT_CELL, 4, tile[0], f->cell);
+    for (c = 0; c < 3; c++) gs4i_add_face_tile(sim, o, 1 << c, 4, tile[1 + c], f->given[c]);
 }
 
 /* --- faces ------------------------------------------------------------------------------------ */
@@ -14744,47 +14776,68 @@ static void gs4i_take_pressure(gs4_sim *sim)
 
 /* --- S4, S5 ----------------------------------------------------------------------------------- */
 
-/* What a particle takes from the faces around x. */
-typedef struct gs4i_face_sums {
-    gs4_real sum[3][4], slope[3][3]; /* of what is taken; dv_c/dx_a of number 0 */
-} gs4i_face_sums;
-
-GS4I_INLINE void gs4i_take_component(const gs4i_box *box, int c, const gs4_real *field,
-                                     const gs4i_face_weights *s, gs4i_face_sums *out)
+/* Slopes of the first number of the faces of each axis, four numbers a particle: its gradient L. */
+GS4I_INLINE void gs4i_gather_slopes(gs4i_face_tile tile[3], const gs4i_stencils s[4], int n,
+                                    gs4i_gathered *slope)
 {
-    const int place = 1 << c, tx = c == 0, ty = c == 1, tz = c == 2;
-    size_t at;
-    int i, j, k, n;
-    for (n = 0; n < 4; n++) out->sum[c][n] = 0;
-    for (n = 0; n < 3; n++) out->slope[c][n] = 0;
-    GS4I_FACES_AROUND(box, place, s, i, j, k, at) {
-        const gs4_real x = s->w[tx][0][i], y = s->w[ty][1][j], z = s->w[tz][2][k];
-        const gs4_real *q = field + 4 * at;
-        for (n = 0; n < 4; n++) out->sum[c][n] += x * y * z * q[n];
-        out->slope[c][0] += s->d[tx][0][i] * y * z * q[0];
-        out->slope[c][1] += x * s->d[ty][1][j] * z * q[0];
-        out->slope[c][2] += x * y * s->d[tz][2][k] * q[0];
+    gs4i_gathered g;
+    int b, c;
+    memset(slope, 0, sizeof *slope);
+    for (b = 0; b < n; b++)
+        for (c = 0; c < 3; c++) {
+            gs4i_row x, d;
+            gs4i_x_weights(&s[1 + c], b, &x, &d);
+            gs4i_gather_local(tile[c] + 4 * s[1 + c].base[b], &s[1 + c], b, &x, &d, &g);
+            slope->dx[4 * b + c] = g.dx[4 * b];
+            slope->dy[4 * b + c] = g.dy[4 * b];
+            slope->dz[4 * b + c] = g.dz[4 * b];
+        }
+}
+
+/* These for the next step, and the last ones beside them: the same, where there is none. */
+static void gs4i_store_affine(const gs4i_particles *p, size_t i, int n, const gs4i_gathered *slope,
+                              int is_first)
+{
+    int a;
+    for (a = 0; a < 3; a++) {
+        const gs4_real *now = a == 0 ? slope->dx : a == 1 ? slope->dy : slope->dz;
+        memcpy(p->affine_before[a] + 4 * i, is_first ? now : p->affine[a] + 4 * i,
+               4 * (size_t)n * sizeof *now);
+        memcpy(p->affine[a] + 4 * i, now, 4 * (size_t)n * sizeof *now);
     }
 }
 
-/* f_c = - sum over particles of V sigma_ca dw/dx_a. */
-static void gs4i_give_force(gs4_sim *sim, const gs4i_face_weights *s, const gs4_real *sigma)
+/* Single numbers: tile += gx dw/dx + gy dw/dy + gz dw/dz, for particle n of a batch. */
+GS4I_INLINE void gs4i_scatter_slope(gs4_real *tile, const gs4i_stencils *s, int n, gs4i_lanes g[3])
 {
-    gs4i_staggered *f = &sim->staggered;
-    size_t at;
-    int c, i, j, k;
-    for (c = 0; c < 3; c++) {
-        const int place = 1 << c, tx = c == 0, ty = c == 1, tz = c == 2;
-        GS4I_FACES_AROUND(&f->box, place, s, i, j, k, at) {
-            const gs4_real x = s->w[tx][0][i], y = s->w[ty][1][j], z = s->w[tz][2][k];
-            f->force[c][at] += sigma[gs4i_place[c][0]] * s->d[tx][0][i] * y * z
-                               + sigma[gs4i_place[c][1]] * x * s->d[ty][1][j] * z
-                               + sigma[gs4i_place[c][2]] * x * y * s->d[tz][2][k];
+    const gs4_real x[4] = { GS4I_NTH_CONST(s->w[0][0], n), GS4I_NTH_CONST(s->w[0][1], n),
+                            GS4I_NTH_CONST(s->w[0][2], n), 0 },
+                   d[4] = { GS4I_NTH_CONST(s->d[0][0], n), GS4I_NTH_CONST(s->d[0][1], n),
+                            GS4I_NTH_CONST(s->d[0][2], n), 0 };
+    gs4i_quad p0, p1, p2, a, b, r, t;
+    int j, k;
+    GS4I_LOAD(t, x);
+    GS4I_LOAD(p0, d);
+    GS4I_SPLAT_MUL(p0, GS4I_NTH_CONST(g[0], n), p0);
+    GS4I_SPLAT_MUL(p1, GS4I_NTH_CONST(g[1], n), t);
+    GS4I_SPLAT_MUL(p2, GS4I_NTH_CONST(g[2], n), t);
+    tile += s->base[n];
+    for (j = 0; j < 3; j++) {
+        GS4I_SPLAT_MUL(a, GS4I_NTH_CONST(s->w[1][j], n), p0);
+        GS4I_SPLAT_MAD(a, GS4I_NTH_CONST(s->d[1][j], n), p1);
+        GS4I_SPLAT_MUL(b, GS4I_NTH_CONST(s->w[1][j], n), p2);
+        for (k = 0; k < 3; k++) {
+            gs4_real *row = tile + GS4I_TILE * (GS4I_TILE * k + j);
+            GS4I_LOAD(r, row);
+            GS4I_SPLAT_MUL(t, GS4I_NTH_CONST(s->w[2][k], n), a);
+            GS4I_SPLAT_MAD(t, GS4I_NTH_CONST(s->d[2][k], n), b);
+            GS4I_SUM(r, r, t);
+            GS4I_STORE(row, r);
         }
     }
 }
 
-/* Stress of the stage, in grad v_i, to faces. */
+/* Stress of the stage, in grad v_i, to faces: f_c = - sum over particles of V sigma_ca dw/dx_a. */
 static void gs4i_scatter_stress(int index, void *context)
 {
     const gs4i_pass *pass = (const gs4i_pass *)context;
@@ -14792,45 +14845,40 @@ static void gs4i_scatter_stress(int index, void *context)
     gs4i_staggered *f = &sim->staggered;
     const gs4i_particles p = sim->particles;
     const int o = pass->blocks[index];
+    const gs4i_frame frame = gs4i_tile_frame(&sim->grid, sim->grid.occupied_block[o]);
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
+    gs4i_face_tile given[3];
+    gs4_real force[3][GS4I_TILE * GS4I_TILE * GS4I_TILE + 4];
     gs4i_response r;
+    int c, a;
     gs4i_begin_response(&r, sim, &p, &sim->integrator, &sim->reports[o], NULL);
+    for (c = 0; c < 3; c++) gs4i_load_face_tile(sim, o, 1 << c, f->given[c], given[c]);
+    memset(force, 0, sizeof force);
     for (; i < end; i += GS4I_BATCH) {
         const int n = gs4i_batch_size(i, end);
         gs4i_batch q;
-        gs4_real x[4 * GS4I_BATCH], v[4 * GS4I_BATCH];
-        gs4i_face_weights s[GS4I_BATCH];
+        gs4i_stencils s[4];
         gs4i_gathered slope;
-        gs4i_gradient L;
+        gs4i_gradient L, push;
         gs4i_symmetric sigma;
         gs4i_lanes J, mu;
-        int b, c, a;
-        gs4i_stage_of(&p, i, n, sim->integrator.prediction, &q, x, v);
-        memset(&slope, 0, sizeof slope);
-        for (b = 0; b < n; b++) {
-            gs4i_face_sums sums;
-            if (!gs4i_face_weights_at(&sim->grid, &f->box, x + 4 * b, &s[b]))
-                memset(&s[b], 0, sizeof s[b]);
-            for (c = 0; c < 3; c++) {
-                gs4i_take_component(&f->box, c, f->given[c], &s[b], &sums);
-                slope.dx[4 * b + c] = sums.slope[c][0];
-                slope.dy[4 * b + c] = sums.slope[c][1];
-                slope.dz[4 * b + c] = sums.slope[c][2];
-            }
-        }
+        int b;
+        gs4i_stage_faces(sim, &frame, i, n, &q, s);
+        gs4i_gather_slopes(given, s, n, &slope);
         gs4i_gradient_lanes(slope.dx, slope.dy, slope.dz, n, L);
         GS4I_BATCH_LOOP(b) J[b] = q.v[3][b] + sim->integrator.before * q.a[3][b];
         gs4i_turn_to_batch(&r, i, n);
         gs4i_stress(&r, L, J, sigma, mu);
         gs4i_check_liquids(r.report, J, mu, p.id + i, n);
-        for (b = 0; b < n; b++) {
-            gs4_real one[6];
-            for (a = 0; a < 6; a++)
-                one[a] = -GS4I_NTH(q.x[3], b) * GS4I_NTH(r.constants.inv_density, b)
-                         * GS4I_NTH(J, b) * GS4I_NTH(sigma[a], b);
-            gs4i_give_force(sim, &s[b], one);
-        }
+        for (c = 0; c < 3; c++)
+            for (a = 0; a < 3; a++)
+                GS4I_BATCH_LOOP(b)
+                    push[c][a][b] =
+                        -q.x[3][b] * r.constants.inv_density[b] * J[b] * sigma[gs4i_place[c][a]][b];
+        for (b = 0; b < n; b++)
+            for (c = 0; c < 3; c++) gs4i_scatter_slope(force[c], &s[1 + c], b, push[c]);
     }
+    for (c = 0; c < 3; c++) gs4i_add_face_tile(sim, o, 1 << c, 1, force[c], f->force[c]);
     gs4i_report_liquids(r.report, &r.seen);
 }
 
@@ -14842,24 +14890,20 @@ static void gs4i_find_affine_task(int index, void *context)
     const gs4i_staggered *f = &sim->staggered;
     const gs4i_particles p = sim->particles;
     const int o = pass->blocks[index];
+    const gs4i_frame frame = gs4i_tile_frame(&sim->grid, sim->grid.occupied_block[o]);
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
+    gs4i_face_tile given[3];
+    int b, c;
+    for (c = 0; c < 3; c++) gs4i_load_face_tile(sim, o, 1 << c, f->given[c], given[c]);
     for (; i < end; i += GS4I_BATCH) {
         const int n = gs4i_batch_size(i, end);
         gs4i_batch q;
-        gs4_real x[4 * GS4I_BATCH], v[4 * GS4I_BATCH];
-        int b, c, a;
-        gs4i_stage_of(&p, i, n, sim->integrator.prediction, &q, x, v);
-        for (b = 0; b < n; b++) {
-            gs4i_face_weights s;
-            gs4i_face_sums sums;
-            if (!gs4i_face_weights_at(&sim->grid, &f->box, x + 4 * b, &s)) continue;
-            for (c = 0; c < 3; c++) {
-                gs4i_take_component(&f->box, c, f->given[c], &s, &sums);
-                for (a = 0; a < 3; a++)
-                    p.affine[a][4 * (i + (size_t)b) + (size_t)c] =
-                        p.affine_before[a][4 * (i + (size_t)b) + (size_t)c] = sums.slope[c][a];
-            }
-        }
+        gs4i_stencils s[4];
+        gs4i_gathered slope;
+        gs4i_stage_faces(sim, &frame, i, n, &q, s);
+        gs4i_gather_slopes(given, s, n, &slope);
+        for (b = 0; b < n; b++) slope.dx[4 * b + 3] = p.affine[0][4 * (i + (size_t)b) + 3];
+        gs4i_store_affine(&p, i, n, &slope, 1);
     }
 }
 
@@ -15056,64 +15100,119 @@ static int gs4i_accelerate_by_projection(gs4_sim *sim, gs4i_node_pass *nodes)
 
 /* What faces say to a batch. Particles without liquid around fly by themselves. */
 typedef struct gs4i_face_corrections {
-    gs4i_lanes U[4], A[4], shift[4]; /* sum w u~; sum w (acc + feedback); u_c */
+    gs4i_lanes U[3], A[3], shift[3]; /* sum w u~; sum w (acc + feedback); u_c */
     gs4i_lanes subgrid[4];           /* V - v~; how much faster it decays as noise */
     gs4i_gradient L;                 /* of u~ */
     gs4i_lanes div;
 } gs4i_face_corrections;
 
-static void gs4i_gather_from_faces(const gs4_sim *sim, const gs4i_batch *q, int n,
-                                   const gs4_real *x, const gs4_real *v, gs4i_gathered *slope,
-                                   gs4i_face_corrections *k)
+/* What a block takes: quads of the faces, and of cells; and a bit for each cell of the tile that
+ * has liquid around, 8 of a row a byte. */
+typedef struct gs4i_taken_tiles {
+    gs4i_face_tile face[3], cells;
+    uint8_t near_liquid[GS4I_TILE * GS4I_TILE];
+} gs4i_taken_tiles;
+
+static void gs4i_load_taken(const gs4_sim *sim, int o, gs4i_taken_tiles *t)
 {
     const gs4i_staggered *f = &sim->staggered;
+    uint8_t liquid[GS4I_TILE * GS4I_TILE] = { 0 };
+    int first[3], row, i;
+    gs4i_block_origin(&sim->grid, sim->grid.occupied_block[o], first);
+    gs4i_load_face_tile(sim, o, GS4I_AT_CELL, f->cell, t->cells);
+    for (row = 0; row < 64; row++) {
+        const size_t at = gs4i_face_row(f, first, GS4I_AT_CELL, row);
+        for (i = 0; i < GS4I_TILE; i++)
+            liquid[row] |= (uint8_t)((f->kind[at + (size_t)i] == GS4_CELL_LIQUID) << i);
+        for (i = 0; i < GS4I_TILE && f->compressible; i++)
+            t->cells[4 * (GS4I_TILE * row + i) + GS4I_CELL_DIVERGENCE] = f->rhs[at + (size_t)i];
+    }
+    memset(t->near_liquid, 0, sizeof t->near_liquid);
+    for (row = 9; row < 55; row++) {
+        unsigned any = 0;
+        for (i = 0; i < 9; i++) any |= liquid[row + GS4I_TILE * (i / 3 - 1) + i % 3 - 1];
+        t->near_liquid[row] = (uint8_t)(any | any << 1 | any >> 1);
+    }
+    for (i = 0; i < 3; i++) gs4i_load_face_tile(sim, o, 1 << i, f->taken[i], t->face[i]);
+}
+
+/* Is there liquid among the 27 cells that particle b sees? */
+GS4I_INLINE int gs4i_is_near_liquid(const gs4i_taken_tiles *t, const gs4i_stencils *cells, int b)
+{
+    const int middle = cells->base[b] + GS4I_TILE * (GS4I_TILE + 1) + 1;
+    return t->near_liquid[middle / GS4I_TILE] >> middle % GS4I_TILE & 1;
+}
+
+/* Component c for all: u~, acc and feedback, v_i, u_c, and the slopes of u~. */
+static void gs4i_gather_component(const gs4_sim *sim, int c, const gs4i_taken_tiles *t,
+                                  const gs4i_batch *q, int n, const gs4i_stencils s[4],
+                                  gs4i_gathered *g)
+{
     const gs4i_integrator *r = &sim->integrator;
-    const gs4_real gravity[3] = { sim->desc.gravity.x, sim->desc.gravity.y, sim->desc.gravity.z };
-    gs4_real U[4 * GS4I_BATCH], A[4 * GS4I_BATCH], shift[4 * GS4I_BATCH], seen[4 * GS4I_BATCH];
-    int b, c;
-    memset(U, 0, sizeof U);
-    memset(A, 0, sizeof A);
-    memset(shift, 0, sizeof shift);
-    memcpy(seen, v, 4 * (size_t)n * sizeof *v);
-    memset(slope, 0, sizeof *slope);
-    memset(k->div, 0, sizeof k->div);
+    const gs4_real gravity = gs4i_axis_of(sim->desc.gravity, c);
+    int b;
     for (b = 0; b < n; b++) {
-        const gs4_real most = GS4I_C(0.1) * sim->grid.h / r->dt;
-        gs4i_face_weights s;
-        gs4i_face_sums sums;
-        size_t at;
-        int i, j, l, near_liquid = 0;
-        if (!gs4i_face_weights_at(&sim->grid, &f->box, x + 4 * b, &s)) continue;
-        GS4I_FACES_AROUND(&f->box, GS4I_AT_CELL, &s, i, j, l, at) {
-            near_liquid |= f->kind[at] == GS4_CELL_LIQUID;
-            if (f->compressible)
-                GS4I_NTH(k->div, b) += s.w[0][0][i] * s.w[0][1][j] * s.w[0][2][l] * f->rhs[at];
-            slope->dx[4 * b + 3] +=
-                s.w[0][0][i] * s.w[0][1][j] * s.w[0][2][l] * f->cell[4 * at + GS4I_CELL_PRESSURE];
-        }
-        if (!near_liquid) slope->dx[4 * b + 3] = 0;
-        for (c = 0; c < 3; c++) {
-            const int e = 4 * b + c;
-            if (!near_liquid) {
-                U[e] = GS4I_NTH_CONST(q->v[c], b) + r->before * GS4I_NTH_CONST(q->a[c], b)
-                       + r->s * gravity[c];
-                A[e] = gravity[c];
-                continue;
-            }
-            gs4i_take_component(&f->box, c, f->taken[c], &s, &sums);
-            U[e] = sums.sum[c][GS4I_FACE_STAGE];
-            A[e] = sums.sum[c][GS4I_FACE_ACCELERATION];
-            seen[e] = sums.sum[c][GS4I_FACE_SEEN];
-            shift[e] = gs4i_max(-most, gs4i_min(sums.sum[c][GS4I_FACE_CORRECTION], most));
-            slope->dx[e] = sums.slope[c][0];
-            slope->dy[e] = sums.slope[c][1];
-            slope->dz[e] = sums.slope[c][2];
+        gs4i_row x, d;
+        const gs4_real v = GS4I_NTH_CONST(q->v[c], b), a = GS4I_NTH_CONST(q->a[c], b);
+        const gs4_real alone[4] = { v + r->before * a + r->s * gravity, gravity,
+                                    v + r->prediction.ahead * a, 0 };
+        if (gs4i_is_near_liquid(t, &s[0], b)) {
+            gs4i_x_weights(&s[1 + c], b, &x, &d);
+            gs4i_gather_local(t->face[c] + 4 * s[1 + c].base[b], &s[1 + c], b, &x, &d, g);
+        } else {
+            memcpy(g->value + 4 * b, alone, sizeof alone);
+            g->dx[4 * b] = g->dy[4 * b] = g->dz[4 * b] = 0;
         }
     }
-    gs4i_to_lanes(U, n, k->U);
-    gs4i_to_lanes(A, n, k->A);
-    gs4i_to_lanes(shift, n, k->shift);
-    gs4i_subgrid_of(r, q, seen, n, k->subgrid);
+}
+
+/* What particles take of cells: div u~ where liquids are compressed, and pressure, in number 3 of
+ * dx. */
+static void gs4i_gather_from_cells(const gs4_sim *sim, const gs4i_taken_tiles *t, int n,
+                                   const gs4i_stencils *cells, gs4i_gathered *slope, gs4i_lanes div)
+{
+    gs4_real value[4 * GS4I_BATCH];
+    int b;
+    memset(div, 0, sizeof(gs4i_lanes));
+    for (b = 0; b < n; b++) {
+        gs4i_row x, d;
+        if (!gs4i_is_near_liquid(t, cells, b)) continue;
+        gs4i_x_weights(cells, b, &x, &d);
+        gs4i_gather_value(t->cells + 4 * cells->base[b], cells, b, &x, value);
+        slope->dx[4 * b + 3] = value[4 * b + GS4I_CELL_PRESSURE];
+        if (sim->staggered.compressible) GS4I_NTH(div, b) = value[4 * b + GS4I_CELL_DIVERGENCE];
+    }
+}
+
+static void gs4i_gather_from_faces(const gs4_sim *sim, const gs4i_taken_tiles *t,
+                                   const gs4i_batch *q, int n, const gs4i_stencils s[4],
+                                   gs4i_gathered *slope, gs4i_face_corrections *k)
+{
+    const gs4_real most = GS4I_C(0.1) * sim->grid.h / sim->integrator.dt;
+    int b, c;
+    memset(slope, 0, sizeof *slope);
+    gs4i_gather_from_cells(sim, t, n, &s[0], slope, k->div);
+    for (c = 0; c < 3; c++) {
+        gs4i_gathered g;
+        gs4i_lanes sum[4];
+        gs4i_gather_component(sim, c, t, q, n, s, &g);
+        gs4i_to_lanes(g.value, n, sum);
+        GS4I_BATCH_LOOP(b) {
+            const gs4i_wide high = 0 * q->x[3][b] + most; /* at most h/10 */
+            gs4i_wide shift;
+            k->U[c][b] = sum[GS4I_FACE_STAGE][b];
+            k->A[c][b] = sum[GS4I_FACE_ACCELERATION][b];
+            k->subgrid[c][b] = sum[GS4I_FACE_SEEN][b];
+            GS4I_WIDE_MIN(shift, sum[GS4I_FACE_CORRECTION][b], high);
+            GS4I_WIDE_MAX(k->shift[c][b], shift, -high);
+        }
+        for (b = 0; b < n; b++) {
+            slope->dx[4 * b + c] = g.dx[4 * b];
+            slope->dy[4 * b + c] = g.dy[4 * b];
+            slope->dz[4 * b + c] = g.dz[4 * b];
+        }
+    }
+    gs4i_subgrid_of(&sim->integrator, q, k->subgrid);
     gs4i_gradient_lanes(slope->dx, slope->dy, slope->dz, n, k->L);
 }
 
@@ -15153,20 +15252,22 @@ static void gs4i_correct_from_faces(const gs4i_pass *pass, int index, int commit
     const gs4i_integrator integrator = sim->integrator;
     const int o = pass->blocks[index];
     gs4i_report *report = &sim->reports[o];
+    const gs4i_frame frame = gs4i_tile_frame(g, g->occupied_block[o]);
+    gs4i_taken_tiles tiles;
     gs4i_response r;
     size_t i = (size_t)g->first[o], end = (size_t)g->first[o + 1];
     if (!commit && sim->staggered.is_safe) return;
+    gs4i_load_taken(sim, o, &tiles);
     gs4i_begin_response(&r, sim, &p, &integrator, report, NULL);
     for (; i < end; i += GS4I_BATCH) {
         const int n = gs4i_batch_size(i, end);
         gs4i_batch q;
-        gs4_real x[4 * GS4I_BATCH], v[4 * GS4I_BATCH];
+        gs4i_stencils s[4];
         gs4i_gathered slope;
         gs4i_face_corrections k;
         gs4i_stored out;
-        int a;
-        gs4i_stage_of(&p, i, n, integrator.prediction, &q, x, v);
-        gs4i_gather_from_faces(sim, &q, n, x, v, &slope, &k);
+        gs4i_stage_faces(sim, &frame, i, n, &q, s);
+        gs4i_gather_from_faces(sim, &tiles, &q, n, s, &slope, &k);
         gs4i_correct_by_faces(integrator, &k, &q);
         gs4i_advance_response(&r, i, n, k.L, NULL, q.v[3], commit);
         if (!commit) {
@@ -15177,12 +15278,7 @@ static void gs4i_correct_from_faces(const gs4i_pass *pass, int index, int commit
         gs4i_correct_contact(sim, i, n, NULL, &out, &slope, report);
         gs4i_see_motion(&r.seen, q.v, k.L);
         gs4i_store_batch(&p, i, n, &out);
-        for (a = 0; a < 3; a++) {
-            const gs4_real *now = a == 0 ? slope.dx : a == 1 ? slope.dy : slope.dz;
-            memcpy(p.affine_before[a] + 4 * i, integrator.restart ? now : p.affine[a] + 4 * i,
-                   4 * (size_t)n * sizeof *now);
-            memcpy(p.affine[a] + 4 * i, now, 4 * (size_t)n * sizeof *now);
-        }
+        gs4i_store_affine(&p, i, n, &slope, integrator.restart);
     }
     if (commit) gs4i_report_motion(report, &r.seen);
 }
@@ -20691,7 +20787,6 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_EULER_SOUND_EIGENVALUE
 #undef GS4I_EULER_VISCOUS_EIGENVALUE
 #undef GS4I_EXPONENT_BITS
-#undef GS4I_FACES_AROUND
 #undef GS4I_FACE_LAYERS
 #undef GS4I_FIELD_AHEAD
 #undef GS4I_FIELD_BLOCK

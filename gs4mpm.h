@@ -13801,8 +13801,8 @@ static void gs4i_fit_staggered(gs4i_staggered *f, const gs4i_grid *g)
     }
 }
 
-/* Its fields, the largest first; those of bodies only where there are some. */
-static void gs4i_take_staggered(gs4i_staggered *f, int bodies)
+/* Its fields, the largest first; those of bodies and of stress only where there is some. */
+static void gs4i_take_staggered(gs4i_staggered *f, int bodies, int stress)
 {
     gs4i_box *box = &f->box;
     const size_t real = sizeof(gs4_real);
@@ -13815,7 +13815,7 @@ static void gs4i_take_staggered(gs4i_staggered *f, int bodies)
     for (a = 0; a < 3; a++) f->body[a] = bodies ? (gs4_real *)gs4i_box_take(box, 2 * real) : NULL;
     for (a = 0; a < 3; a++) {
         f->open[a] = bodies ? (gs4_real *)gs4i_box_take(box, real) : NULL;
-        f->force[a] = (gs4_real *)gs4i_box_take(box, real);
+        f->force[a] = stress ? (gs4_real *)gs4i_box_take(box, real) : NULL;
         f->seen[a] = (gs4_real *)gs4i_box_take(box, real);
         f->reach[a] = (gs4_real *)gs4i_box_take(box, real);
     }
@@ -13829,31 +13829,42 @@ static void gs4i_take_staggered(gs4i_staggered *f, int bodies)
     f->kind = (uint8_t *)gs4i_box_take(box, 1);
 }
 
+/* What is scattered to, of a plane. */
+static void gs4i_clear_staggered(int z, void *context)
+{
+    gs4i_staggered *f = (gs4i_staggered *)context;
+    int c;
+    for (c = 0; c < 4; c++) {
+        const int place = c < 3 ? 1 << c : GS4I_AT_CELL;
+        const size_t from = gs4i_box_index(&f->box, place, 0, 0, z),
+                     n = gs4i_box_index(&f->box, place, 0, 0, z + 1) - from;
+        gs4_real *field = c < 3 ? f->given[c] : f->cell;
+        if (z >= gs4i_box_length(&f->box, place, 2)) continue;
+        memset(field + 4 * from, 0, 4 * n * sizeof *field);
+        if (c < 3 && f->force[c]) memset(f->force[c] + from, 0, n * sizeof *field);
+    }
+}
+
 /* Room for a step, with nothing on the faces. */
 static int gs4i_begin_staggered(gs4_sim *sim)
 {
     gs4i_staggered *f = &sim->staggered;
-    const int bodies = sim->boundary.collider_count > 0;
-    /* per face of each axis: given, taken, force, seen, reach; per cell: 4 and 3 */
+    const int bodies = sim->boundary.collider_count > 0, stress = gs4i_has_stress(sim);
+    /* per face of each axis: given, taken, seen, reach and force; per cell: 4 and 3 */
     const size_t bytes =
-        (size_t)(3 * (4 + 4 + 3) + 4 + 3 + (bodies ? 9 : 0)) * sizeof(gs4_real) + (bodies ? 7 : 4);
+        (size_t)(3 * (4 + 4 + 2 + stress) + 4 + 3 + (bodies ? 9 : 0)) * sizeof(gs4_real)
+        + (bodies ? 7 : 4);
     int a;
     gs4i_fit_staggered(f, &sim->grid);
     if (gs4i_box_reserve(&sim->memory, &f->box, bytes) != GS4_OK)
         return gs4i_fail_memory(&sim->error);
-    gs4i_take_staggered(f, bodies);
-    for (a = 0; a < 3; a++) {
-        const size_t n = gs4i_box_count(&f->box, 1 << a);
-        memset(f->given[a], 0, 4 * n * sizeof(gs4_real));
-        memset(f->taken[a], 0, 4 * n * sizeof(gs4_real));
-        memset(f->force[a], 0, n * sizeof(gs4_real));
-    }
-    memset(f->cell, 0, 4 * gs4i_box_count(&f->box, GS4I_AT_CELL) * sizeof(gs4_real));
+    gs4i_take_staggered(f, bodies, stress);
+    gs4i_parallel_for(&sim->tasks, f->box.size[2] + 1, gs4i_clear_staggered, f);
     f->solver.memory = &sim->memory;
     f->solver.tasks = &sim->tasks;
     f->iterations = 0;
     f->residual = 0;
-    f->is_viscous = gs4i_has_stress(sim);
+    f->is_viscous = stress;
     f->compressible = 0;
     for (a = 0; a < sim->material_count; a++) f->compressible |= sim->constants[a].compliance > 0;
     return GS4_OK;
@@ -13910,30 +13921,51 @@ typedef struct gs4i_face_mirror {
 } gs4i_face_mirror;
 typedef void (*gs4i_mirror_fn)(gs4_real *field, const gs4i_face_mirror *m);
 
-/* Apply `fn` to each entry behind the walls. Axis after axis: corners too. */
-static void gs4i_each_mirror(const gs4_sim *sim, int place, gs4_real *field, gs4i_mirror_fn fn)
+/* One side for gs4i_parallel_for: a task for each plane, or row, across the wall. */
+typedef struct gs4i_mirror_pass {
+    const gs4_sim *sim;
+    gs4_real *field;
+    gs4i_mirror_fn fn;
+    int place, side;
+} gs4i_mirror_pass;
+
+static void gs4i_mirror_plane(int index, void *context)
 {
-    const gs4i_staggered *f = &sim->staggered;
+    const gs4i_mirror_pass *pass = (const gs4i_mirror_pass *)context;
+    const gs4i_staggered *f = &pass->sim->staggered;
     const gs4i_box *box = &f->box;
-    int side, m, behind, image, at[3];
-    for (side = 0; side < 6; side++) {
-        const int a = side / 2, b = (a + 1) % 3, c = (a + 2) % 3;
-        gs4i_face_mirror one;
-        one.is_normal = place == 1 << a;
-        one.parity = place ? gs4i_wall_parity(sim, place >> 1, side) : GS4I_C(1);
-        if (!gs4i_has_wall(sim, side)) continue;
-        for (m = 1; m <= 4 && gs4i_mirror_planes(f, place, side, m, &behind, &image); m++)
-            for (at[c] = 0; at[c] < gs4i_box_length(box, place, c); at[c]++)
-                for (at[b] = 0; at[b] < gs4i_box_length(box, place, b); at[b]++) {
-                    at[a] = behind;
-                    one.behind = gs4i_box_index(box, place, at[0], at[1], at[2]);
-                    at[a] = image;
-                    one.image = gs4i_box_index(box, place, at[0], at[1], at[2]);
-                    at[a] = side & 1 ? f->to[a] : f->from[a];
-                    one.wall = one.is_normal ? gs4i_box_index(box, place, at[0], at[1], at[2]) : 0;
-                    fn(field, &one);
-                }
-    }
+    const int place = pass->place, side = pass->side;
+    const int a = side / 2, b = a == 0 ? 1 : 0, c = 3 - a - b;
+    int m, behind, image, at[3];
+    gs4i_face_mirror one;
+    one.is_normal = place == 1 << a;
+    one.parity = place ? gs4i_wall_parity(pass->sim, place >> 1, side) : GS4I_C(1);
+    at[c] = index;
+    for (m = 1; m <= 4 && gs4i_mirror_planes(f, place, side, m, &behind, &image); m++)
+        for (at[b] = 0; at[b] < gs4i_box_length(box, place, b); at[b]++) {
+            at[a] = behind;
+            one.behind = gs4i_box_index(box, place, at[0], at[1], at[2]);
+            at[a] = image;
+            one.image = gs4i_box_index(box, place, at[0], at[1], at[2]);
+            at[a] = side & 1 ? f->to[a] : f->from[a];
+            one.wall = one.is_normal ? gs4i_box_index(box, place, at[0], at[1], at[2]) : 0;
+            pass->fn(pass->field, &one);
+        }
+}
+
+/* Apply `fn` to each entry behind the walls. Axis after axis: corners too. */
+static void gs4i_each_mirror(gs4_sim *sim, int place, gs4_real *field, gs4i_mirror_fn fn)
+{
+    gs4i_mirror_pass pass;
+    pass.sim = sim;
+    pass.field = field;
+    pass.fn = fn;
+    pass.place = place;
+    for (pass.side = 0; pass.side < 6; pass.side++)
+        if (gs4i_has_wall(sim, pass.side))
+            gs4i_parallel_for(&sim->tasks,
+                              gs4i_box_length(&sim->staggered.box, place, pass.side < 4 ? 2 : 1),
+                              gs4i_mirror_plane, &pass);
 }
 
 static void gs4i_fold_number(gs4_real *field, const gs4i_face_mirror *m)
@@ -13953,7 +13985,7 @@ static void gs4i_fill_number(gs4_real *field, const gs4i_face_mirror *m)
 {
     field[m->behind] = m->parity * field[m->image];
 }
-static void gs4i_fill_given(gs4_real *field, const gs4i_face_mirror *m)
+static void gs4i_fill_first(gs4_real *field, const gs4i_face_mirror *m)
 {
     field[4 * m->behind] = m->parity * field[4 * m->image];
 }
@@ -13968,7 +14000,7 @@ static void gs4i_fill_taken(gs4_real *field, const gs4i_face_mirror *m)
 }
 
 /* The same for the faces of all axes. */
-static void gs4i_mirror_faces(const gs4_sim *sim, gs4_real *const field[3], gs4i_mirror_fn fn)
+static void gs4i_mirror_faces(gs4_sim *sim, gs4_real *const field[3], gs4i_mirror_fn fn)
 {
     int c;
     for (c = 0; c < 3; c++) gs4i_each_mirror(sim, 1 << c, field[c], fn);
@@ -14092,6 +14124,7 @@ typedef struct gs4i_staggered_pass {
     gs4_sim *sim;
     gs4_real lightest; /* kg: faces with less are empty */
     int layer, what;   /* of extrapolation; which of the numbers taken */
+    int numbers;       /* of those taken, how many are extrapolated */
     gs4_real scale;
 } gs4i_staggered_pass;
 
@@ -14157,7 +14190,8 @@ static void gs4i_predict_faces(int z, void *context)
         GS4I_EACH_FACE(f, c, z, at, i) {
             gs4_real *q = f->given[c] + 4 * i, *t = f->taken[c] + 4 * i;
             const gs4_real m = q[GS4I_FACE_MASS], *ag = gs4i_remembered_of_face(sim, at, c);
-            const gs4_real acc = (m > pass->lightest ? f->force[c][i] / m : GS4I_C(0)) + gravity[c];
+            gs4_real acc = gravity[c];
+            if (f->force[c] && m > pass->lightest) acc = f->force[c][i] / m + acc;
             if (ag && !f->compressible) q[GS4I_FACE_RATE] = *ag;
             if (r->restart) q[GS4I_FACE_RATE] = 0;
             f->seen[c][i] = q[GS4I_FACE_VELOCITY];
@@ -14630,68 +14664,59 @@ static int gs4i_project(gs4_sim *sim, int what)
 
 /* --- extrapolation ---------------------------------------------------------------------------- */
 
-/* Faces beside known ones, of one layer: 2 u1 - u2 along the directions with two, else the mean of
- * those with one. */
+/* An unknown face of axis c beside known ones: 2 u1 - u2 along the directions with two, else the
+ * mean of those with one. */
+GS4I_INLINE void gs4i_extrapolate_face(const gs4i_staggered_pass *pass, int c, const int at[3],
+                                       const ptrdiff_t step[3], size_t i)
+{
+    gs4i_staggered *f = &pass->sim->staggered;
+    const uint8_t *known = f->known[c];
+    gs4_real *u = f->taken[c];
+    gs4_real two[4] = { 0, 0, 0, 0 }, one[4] = { 0, 0, 0, 0 };
+    int twos = 0, ones = 0, side, k;
+    for (side = 0; side < 6; side++) {
+        const int a = side / 2, last = f->to[a] - (a != c);
+        const int room = side & 1 ? last - at[a] : at[a] - f->from[a];
+        const ptrdiff_t d = side & 1 ? step[a] : -step[a], n1 = (ptrdiff_t)i + d, n2 = n1 + d;
+        if (room < 1 || !known[n1] || known[n1] >= pass->layer) continue;
+        for (k = 0; k < pass->numbers; k++) one[k] += u[4 * n1 + k];
+        ones++;
+        if (room < 2 || !known[n2] || known[n2] >= pass->layer) continue;
+        for (k = 0; k < pass->numbers; k++) two[k] += 2 * u[4 * n1 + k] - u[4 * n2 + k];
+        twos++;
+    }
+    if (!ones) return;
+    for (k = 0; k < pass->numbers; k++)
+        u[4 * i + (size_t)k] = twos ? two[k] / GS4I_C(twos) : one[k] / GS4I_C(ones);
+    f->known[c][i] = (uint8_t)pass->layer;
+}
+
 static void gs4i_extrapolate_layer(int z, void *context)
 {
     const gs4i_staggered_pass *pass = (const gs4i_staggered_pass *)context;
-    gs4i_staggered *f = &pass->sim->staggered;
-    int c, at[3], a, side, k;
+    const gs4i_staggered *f = &pass->sim->staggered;
+    int c, at[3];
     size_t i;
     for (c = 0; c < 3; c++) {
-        const int place = 1 << c;
-        const size_t nx = (size_t)gs4i_box_length(&f->box, place, 0),
-                     step[3] = { 1, nx, nx * (size_t)gs4i_box_length(&f->box, place, 1) };
-        GS4I_EACH_FACE(f, c, z, at, i) {
-            gs4_real two[4] = { 0, 0, 0, 0 }, one[4] = { 0, 0, 0, 0 };
-            int twos = 0, ones = 0;
-            if (f->known[c][i] || !gs4i_face_place(f, c, at)) continue;
-            for (side = 0; side < 6; side++) {
-                const ptrdiff_t d =
-                    side & 1 ? (ptrdiff_t)step[side / 2] : -(ptrdiff_t)step[side / 2];
-                int near[3], far[3], n1, n2;
-                const gs4_real *u1, *u2;
-                for (a = 0; a < 3; a++) near[a] = far[a] = at[a];
-                near[side / 2] += side & 1 ? 1 : -1;
-                far[side / 2] += side & 1 ? 2 : -2;
-                if (!gs4i_face_place(f, c, near)) continue;
-                n1 = f->known[c][(ptrdiff_t)i + d];
-                if (!n1 || n1 >= pass->layer) continue;
-                u1 = f->taken[c] + 4 * ((ptrdiff_t)i + d);
-                for (k = 0; k < 4; k++) one[k] += u1[k];
-                ones++;
-                if (!gs4i_face_place(f, c, far)) continue;
-                n2 = f->known[c][(ptrdiff_t)i + 2 * d];
-                if (!n2 || n2 >= pass->layer) continue;
-                u2 = f->taken[c] + 4 * ((ptrdiff_t)i + 2 * d);
-                for (k = 0; k < 4; k++) two[k] += 2 * u1[k] - u2[k];
-                twos++;
-            }
-            if (!ones) continue;
-            for (k = 0; k < 4; k++)
-                f->taken[c][4 * i + (size_t)k] =
-                    twos ? two[k] / GS4I_C(twos) : one[k] / GS4I_C(ones);
-            f->known[c][i] = (uint8_t)pass->layer;
-        }
+        const ptrdiff_t nx = gs4i_box_length(&f->box, 1 << c, 0),
+                        step[3] = { 1, nx, nx * gs4i_box_length(&f->box, 1 << c, 1) };
+        GS4I_EACH_FACE(f, c, z, at, i)
+            if (!f->known[c][i] && gs4i_face_place(f, c, at))
+                gs4i_extrapolate_face(pass, c, at, step, i);
     }
 }
 
-/* Number `what` from the known faces to those around and behind the walls. */
-static void gs4i_extrapolate(gs4_sim *sim, int restart)
+/* The first `numbers` from the known faces to those around and behind the walls. */
+static void gs4i_extrapolate(gs4_sim *sim, int numbers)
 {
-    gs4i_staggered *f = &sim->staggered;
     gs4i_staggered_pass pass;
-    int c;
-    size_t i;
     memset(&pass, 0, sizeof pass);
     pass.sim = sim;
-    if (restart)
-        for (c = 0; c < 3; c++)
-            for (i = 0; i < gs4i_box_count(&f->box, 1 << c); i++)
-                if (f->known[c][i] >= GS4I_FACE_LAYER) f->known[c][i] = GS4I_FACE_UNKNOWN;
+    pass.numbers = numbers;
     for (pass.layer = GS4I_FACE_LAYER; pass.layer < GS4I_FACE_LAYER + GS4I_FACE_LAYERS;
          pass.layer++)
-        gs4i_parallel_for(&sim->tasks, f->box.size[2] + 1, gs4i_extrapolate_layer, &pass);
+        gs4i_parallel_for(&sim->tasks, sim->staggered.box.size[2] + 1, gs4i_extrapolate_layer,
+                          &pass);
 }
 
 /* The pressure that the solve found, for particles to take; not that of cells whose centres are in
@@ -14928,7 +14953,8 @@ static void gs4i_raw_acceleration(int z, void *context)
         }
 }
 
-/* The feedback theta (acc_raw - acc) in place of acc_raw. */
+/* The feedback theta (acc_raw - acc) in place of acc_raw. What was extrapolated for the split is
+ * forgotten. */
 static void gs4i_split_acceleration(int z, void *context)
 {
     const gs4i_staggered_pass *pass = (const gs4i_staggered_pass *)context;
@@ -14942,6 +14968,7 @@ static void gs4i_split_acceleration(int z, void *context)
                 f->known[c][i] == GS4I_FACE_SOLVED || f->known[c][i] == GS4I_FACE_AT_WALL
                     ? pass->scale * (t[GS4I_FACE_FEEDBACK] - t[GS4I_FACE_ACCELERATION])
                     : GS4I_C(0);
+            if (f->known[c][i] >= GS4I_FACE_LAYER) f->known[c][i] = GS4I_FACE_UNKNOWN;
         }
 }
 
@@ -15050,8 +15077,8 @@ static int gs4i_finish_acceleration(gs4_sim *sim, gs4_real fastest)
     pass.sim = sim;
     gs4i_parallel_for(&sim->tasks, f->box.size[2] + 1, gs4i_raw_acceleration, &pass);
     if (!f->compressible && !f->without_split) {
-        gs4i_extrapolate(sim, 0);
-        gs4i_mirror_faces(sim, f->taken, gs4i_fill_taken);
+        gs4i_extrapolate(sim, GS4I_FACE_STAGE + 1);
+        gs4i_mirror_faces(sim, f->taken, gs4i_fill_first);
         GS4I_TRY(gs4i_project(sim, GS4I_FACE_ACCELERATION));
         pass.scale = gs4i_min(GS4I_C(0.5), sim->integrator.s * fastest * sim->grid.inv_h);
     }
@@ -15072,7 +15099,7 @@ static int gs4i_accelerate_by_projection(gs4_sim *sim, gs4i_node_pass *nodes)
     pass.lightest = nodes->lightest;
     gs4i_place_bodies(sim, nodes);
     if (has_stress) {
-        gs4i_mirror_faces(sim, f->given, gs4i_fill_given);
+        gs4i_mirror_faces(sim, f->given, gs4i_fill_first);
         gs4i_scatter(sim, gs4i_scatter_stress);
         gs4i_mirror_faces(sim, f->force, gs4i_fold_number);
     }
@@ -15086,7 +15113,7 @@ static int gs4i_accelerate_by_projection(gs4_sim *sim, gs4i_node_pass *nodes)
     GS4I_TRY(gs4i_finish_acceleration(sim, fastest));
     if (!f->without_correction) GS4I_TRY(gs4i_correct_volume(sim, fastest));
     if (f->compressible) most = gs4i_find_divergence(sim);
-    gs4i_extrapolate(sim, 1);
+    gs4i_extrapolate(sim, 4);
     gs4i_parallel_for(&sim->tasks, planes + 1, gs4i_finish_taken, &pass);
     gs4i_mirror_faces(sim, f->taken, gs4i_fill_taken);
     f->is_safe = !sim->particles.elastic_reals && !sim->particles.deformation_reals
@@ -17612,7 +17639,7 @@ static int gs4i_find_affine(gs4_sim *sim, gs4i_node_pass *nodes)
     for (pass = 0; pass < 16 && result == GS4_OK; pass++) {
         result = gs4i_scatter_momenta(sim, nodes);
         if (result != GS4_OK) break;
-        gs4i_mirror_faces(sim, f->given, gs4i_fill_given);
+        gs4i_mirror_faces(sim, f->given, gs4i_fill_first);
         gs4i_gather(sim, gs4i_find_affine_task);
     }
     sim->integrator.prediction.ahead = ahead;

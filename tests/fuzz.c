@@ -483,34 +483,12 @@ static const field of_emitter[] = { REAL(gs4_emitter, travel, 1, -1, 0, 3),
 static const field of_pose[] = { REAL(gs4_pose, position, 1, 0, 0, 3),
                                  REAL(gs4_pose, quaternion, 0, 0, 0, 4) };
 
-/* Without what that scheme refuses. */
-static void make_partitioned(gs4_sim_desc *d)
-{
-    int a;
-    d->scheme = GS4_PARTITIONED;
-    d->integrator = one_in(3) ? GS4_INTEGRATOR_BACKWARD_EULER : GS4_INTEGRATOR_GS4;
-    if (d->integrator != GS4_INTEGRATOR_GS4) d->rho_inf = d->rho_inf_spurious = 0;
-    d->sharp_gradients = 0;
-    for (a = 0; a < 6; a++)
-        if (d->walls[a] == GS4_WALL_SEPARATE || d->walls[a] == GS4_WALL_PERIODIC)
-            d->walls[a] = one_in(2) ? GS4_WALL_SLIP : GS4_WALL_STICK;
-}
-
-static void make_cold(gs4_material *m)
-{
-    m->conductivity = m->flux_relaxation_time = m->fourier_fraction = m->melting_temperature =
-        m->latent_heat = 0;
-    m->can_melt = m->viscous_heating = 0;
-    m->incompressible = one_in(2);
-    if (m->incompressible) m->bulk_modulus = m->sound_speed = 0;
-}
-
 static void any_desc(gs4_sim_desc *d)
 {
     const int threads = r.how == TWO_THREADS ? 2 : r.how == THREE_THREADS ? 3 : 1;
     int a;
     make_desc(&r.s, d, threads);
-    if (one_in(4)) make_partitioned(d);
+    if (one_in(4)) make_partitioned(&r.s, d);
     for (a = 0; a < 3; a++)
         if (!one_in(3)) d->cells[a] = r.s.cells[a] = one_in(8) ? pick(15, 24) : pick(4, 10);
     if (one_in(4)) d->max_particles = pick(1, MOST_PARTICLES);

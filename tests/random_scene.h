@@ -306,4 +306,29 @@ static void make_emitter(scene *s, gs4_emitter *e)
     if (one_in(3)) e->start = number(1, 5, 1000);
     if (one_in(2)) e->stop = number(6, 20, 1000);
 }
+
+/* Scenes of the partitioned scheme, without what that refuses. */
+static void make_partitioned(scene *s, gs4_sim_desc *d)
+{
+    int a;
+    s->with_heat = 0;
+    d->scheme = GS4_PARTITIONED;
+    d->integrator = one_in(3) ? GS4_INTEGRATOR_BACKWARD_EULER : GS4_INTEGRATOR_GS4;
+    if (d->integrator != GS4_INTEGRATOR_GS4) d->rho_inf = d->rho_inf_spurious = 0;
+    d->sharp_gradients = 0;
+    for (a = 0; a < 6; a++)
+        if (d->walls[a] == GS4_WALL_SEPARATE || d->walls[a] == GS4_WALL_PERIODIC)
+            d->walls[a] = one_in(2) ? GS4_WALL_SLIP : GS4_WALL_STICK;
+}
+
+static void make_cold(gs4_material *m)
+{
+    m->conductivity = m->flux_relaxation_time = m->fourier_fraction = m->melting_temperature =
+        m->latent_heat = 0;
+    m->can_melt = m->viscous_heating = 0;
+    if (m->solid) m->liquid = GS4_NEWTONIAN;
+    m->incompressible = !m->solid && one_in(2);
+    if (m->incompressible) m->bulk_modulus = m->sound_speed = 0;
+}
+
 #endif

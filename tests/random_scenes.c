@@ -17,10 +17,11 @@ static int result_of(scene *s, int result)
     return result;
 }
 
-static void add_material(scene *s, int sharp)
+static void add_material(scene *s, const gs4_sim_desc *d)
 {
     gs4_material m;
-    make_material(s, sharp, &m);
+    make_material(s, d->sharp_gradients, &m);
+    if (d->scheme == GS4_PARTITIONED) make_cold(&m);
     if (result_of(s, gs4_add_material(s->sim, &m)) >= 0) s->materials++;
 }
 
@@ -46,10 +47,11 @@ static int build(scene *s, int seed, int threads)
     memset(s, 0, sizeof *s);
     random_begin(seed);
     make_desc(s, &d, threads);
+    if (seed % 4 == 0) make_partitioned(s, &d);
     i = gs4_create(&d, &s->sim);
     if (i < 0) return i;
     n = pick(1, 3);
-    for (i = 0; i < n; i++) add_material(s, d.sharp_gradients);
+    for (i = 0; i < n; i++) add_material(s, &d);
     n = pick(0, MAX_BODIES);
     for (i = 0; i < n; i++) add_body(s);
     n = one_in(3);

@@ -1833,7 +1833,7 @@ static void run_contact(void)
     RUN_FULL(test_contact_balls);
     RUN(test_contact_open);
     RUN(test_contact_emitter_holds);
-    RUN_ONCE(test_contact_flux);
+    RUN_FULL(test_contact_flux);
     RUN(test_contact_nozzle_velocity);
     RUN(test_contact_nozzle_starts);
     RUN(test_contact_nozzle_in_body);
@@ -1841,7 +1841,7 @@ static void run_contact(void)
     RUN(test_contact_gravity);
     RUN_ONCE(test_contact_lighter);
     RUN(test_contact_removal);
-    RUN_ONCE(test_contact_viscosity);
+    RUN_FULL(test_contact_viscosity);
     RUN(test_contact_budget);
     RUN(test_contact_puts_back);
 }

@@ -111,7 +111,7 @@ static void test_partitioned_rest(void)
     static const double rest[4] = { 0, 0.25, 0.5, 0.8 };
     const double limit = sizeof(gs4_real) == 8 ? 1e-9 : 1e-5;
     int n;
-    for (n = 0; n < 24; n += test_slow ? 1 : 5) {
+    for (n = 0; n < 24; n += test_slow ? 1 : test_full ? 5 : 11) {
         const int a = n / 8, down = n & 1, which = n / 2 % 4, cells = 8;
         const double H = (5 + rest[which]) / cells;
         gs4_sim_desc d = partitioned_cube(cells);
@@ -714,11 +714,11 @@ static void run_partitioned(void)
     RUN(test_partitioned_flight);
     RUN(test_partitioned_rest);
     RUN(test_partitioned_pressure);
-    RUN_ONCE(test_partitioned_bodies_at_rest);
+    RUN_FULL(test_partitioned_bodies_at_rest);
     RUN_ONCE(test_partitioned_slope);
     RUN_ONCE(test_partitioned_vortex);
     RUN(test_partitioned_order);
-    RUN_ONCE(test_partitioned_dam);
+    RUN_FULL(test_partitioned_dam);
     RUN_FULL(test_partitioned_moduli);
     RUN_FULL(test_partitioned_symmetry);
     RUN(test_partitioned_piston);

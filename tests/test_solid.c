@@ -1038,7 +1038,7 @@ static void run_solid(void)
     RUN_ONCE(test_solid_waves);
     RUN(test_solid_order);
     RUN_ONCE(test_solid_spin);
-    RUN_ONCE(test_solid_bounce);
+    RUN_FULL(test_solid_bounce);
     RUN_FULL(test_solid_ring);
     RUN_FULL(test_solid_yield);
     RUN_FULL(test_solid_extremes);

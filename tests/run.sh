@@ -3,8 +3,9 @@
 #                                      processor time, a third of it to compile (user + sys of `bash -c 'time sh tests/run.sh'`)
 #            sh tests/run.sh --full     all but the slow tests, and all compilers, machines and sanitizers that are installed
 #            sh tests/run.sh --nightly  the slow tests, too, and whether the tests catch mutants.sh
-# CC and CFLAGS choose compiler and flags of tests/main.c. The last line counts. Quick tests are compiled at -O1, in 9 s where -O2
-# takes 14, the tests themselves (not the header) without optimization; with -fexpensive-optimizations the stress of single particles takes a quarter of its time there.
+# CC and CFLAGS choose compiler and flags of tests/main.c. The last line counts. Quick tests are compiled at -O1, and what is not the
+# header without optimization: 9 s where -O2 takes 19. With -fexpensive-optimizations the stress of single particles takes a quarter
+# of its time there.
 # shellcheck disable=SC2086             # flags are split on purpose
 set -u
 cd "$(dirname "$0")/.." || exit 1

@@ -40,6 +40,7 @@ int main(int count, char **values)
     RUN_FULL(test_sticky_pipe);
     RUN_ONCE(test_column_at_rest);
     RUN(test_sound_speed);
+    RUN(test_sharp_mirrors);
     RUN_ONCE(test_drop_at_rest);
     RUN_FULL(test_noise_after_impact);
     RUN_SLOW(test_drop_impact);

@@ -1811,6 +1811,31 @@ static void test_contact_puts_back(void)
     }
 }
 
+/* A particle whose nodes all exist, of whatever blocks around it do: by looking at all 27. */
+static void test_contact_whole(void)
+{
+    uint32_t seed = 7;
+    int i, n, base, wrong = 0, counted[2] = { 0, 0 };
+    for (i = 0; i < 200; i++) {
+        gs4i_surroundings t;
+        memset(&t, 0, sizeof t);
+        /* one block is missing, or about one in ten */
+        for (n = 0; n < 27; n++)
+            t.slot[n] = (i < 27 ? n == i : stability_random(&seed) < -0.4) ? -1 : n;
+        for (base = 0; base < 6 * 64; base++) {
+            const int x = base % 8, y = base / 8 % 8, z = base / 64;
+            int whole = 1;
+            if (x > 5 || y > 5) continue;
+            for (n = 0; n < 27; n++)
+                whole &= gs4i_surrounding_node(&t, x + n % 3, y + n / 3 % 3, z + n / 9) >= 0;
+            wrong += gs4i_is_whole(&t, base) != whole;
+            counted[whole]++;
+        }
+    }
+    CHECK(wrong == 0);
+    CHECK(counted[0] > 1000 && counted[1] > 1000);
+}
+
 static void run_contact(void)
 {
     RUN(test_contact_node);
@@ -1844,4 +1869,5 @@ static void run_contact(void)
     RUN_FULL(test_contact_viscosity);
     RUN(test_contact_budget);
     RUN(test_contact_puts_back);
+    RUN_ONCE(test_contact_whole);
 }

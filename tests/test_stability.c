@@ -33,15 +33,67 @@ static double stability_energy(gs4_sim *sim, double sound_speed)
     return sum;
 }
 
-/* A jittered drop, 7 cells across, stirred by c0/1000: the most that 0.95 of the limit makes of
- * its energy in `steps` steps. */
-static double stability_growth(gs4_integrator integrator, double rho, double spurious,
-                               double viscosity, int steps)
+/* Nodes that particles reach, over particles: the share of what is stirred at random that nodes can
+ * have a say in, as they have that many degrees of freedom. 0.05 is three standard deviations of
+ * the share for 1400 particles. */
+static double stability_seen(gs4_sim *sim)
+{
+    static char reached[20 * 20 * 20];
+    const gs4_view x = gs4_particles(sim, GS4_FIELD_POSITION);
+    const int n = sim->desc.cells[0];
+    int i, k, nodes = 0;
+    memset(reached, 0, sizeof reached);
+    for (i = 0; i < x.count; i++) {
+        const gs4_real *at = x.data + (size_t)i * (size_t)x.stride;
+        for (k = 0; k < 27; k++)
+            reached[(((int)(at[2] / sim->desc.cell_size) + k / 9 - 1) * n
+                     + (int)(at[1] / sim->desc.cell_size) + k / 3 % 3 - 1)
+                        * n
+                    + (int)(at[0] / sim->desc.cell_size) + k % 3 - 1] = 1;
+    }
+    for (i = 0; i < n * n * n; i++) nodes += reached[i];
+    return (double)nodes / x.count + 0.05;
+}
+
+/* What energy, over that at the start, can be of a body that was stirred and is left alone, by
+ * `before`. At most 1, as none is given; 0.001 is for rounding and the time between velocity and
+ * stress. At least, with GS4 and without decay, what nodes have no say in. Symplectic Euler keeps
+ * that only which nodes see. So there this is the most, and the least is that of momentum. */
+typedef struct stability_bounds {
+    double least, most;
+} stability_bounds;
+
+static stability_bounds stability_before(gs4_sim *sim, double energy)
+{
+    const gs4_view v = gs4_particles(sim, GS4_FIELD_VELOCITY),
+                   m = gs4_particles(sim, GS4_FIELD_MASS);
+    double p[3] = { 0, 0, 0 }, mass = 0;
+    stability_bounds b;
+    int i, c;
+    b.least = 1 - stability_seen(sim);
+    b.most = 1.001;
+    if (sim->desc.integrator == GS4_INTEGRATOR_GS4) return b;
+    for (i = 0; i < v.count; i++) {
+        const double one = (double)m.data[(size_t)i * (size_t)m.stride];
+        for (c = 0; c < 3; c++)
+            p[c] += one * (double)v.data[(size_t)i * (size_t)v.stride + (size_t)c];
+        mass += one;
+    }
+    b.most = 1 - b.least;
+    b.least = 0.999 * (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) / (2 * mass * energy);
+    return b;
+}
+
+/* A jittered drop, 7 cells across, stirred by c0/1000: what 0.95 of the limit makes of its energy
+ * in `steps` steps. */
+static void stability_growth(gs4_integrator integrator, double rho, double spurious,
+                             double viscosity, int steps)
 {
     gs4_sim_desc d = scene_cube(16);
     gs4_material m = scene_liquid(1000, viscosity, 10);
     gs4_fill f = scene_fill(at(0, 0, 0));
     gs4_sim *sim;
+    stability_bounds bounds;
     double start, most = 0;
     uint64_t hash;
     int i, result;
@@ -55,6 +107,7 @@ static double stability_growth(gs4_integrator integrator, double rho, double spu
     CHECK(gs4_add_particles(sim, gs4_sphere(at(0.5, 0.5, 0.5), (gs4_real)(3.5 / 16)), &f) > 0);
     stability_stir(sim, 0.01, 1);
     start = stability_energy(sim, 10);
+    bounds = stability_before(sim, start);
     for (i = 0; i < steps && most < 100; i++) {
         CHECK_RESULT(sim, gs4_step(sim, (gs4_real)(0.95 * (double)gs4_stable_dt(sim))), GS4_OK);
         most = fmax(most, stability_energy(sim, 10) / start);
@@ -68,8 +121,9 @@ static double stability_growth(gs4_integrator integrator, double rho, double spu
         printf("integrator %d, rho %g %g, viscosity %g: energy at most %.4f, at the end %.4f of "
                "what it was\n",
                (int)integrator, rho, spurious, viscosity, most, stability_energy(sim, 10) / start);
+    CHECK_BETWEEN(most, bounds.least, bounds.most);
+    CHECK_BETWEEN(stability_energy(sim, 10) / start, bounds.least, bounds.most);
     gs4_destroy(sim);
-    return most;
 }
 
 static void test_stability(void)
@@ -81,13 +135,11 @@ static void test_stability(void)
         /* sound, both, viscosity limit the step */
         const double viscosity = k == 0 ? 0 : k == 1 ? 30 : 3000;
         for (i = 0; i < 5; i++)
-            CHECK(stability_growth(GS4_INTEGRATOR_GS4, family[i][0], family[i][1], viscosity, steps)
-                  < 1.1);
-        CHECK(stability_growth(GS4_INTEGRATOR_SYMPLECTIC_EULER, 0, 0, viscosity, steps) < 1.1);
+            stability_growth(GS4_INTEGRATOR_GS4, family[i][0], family[i][1], viscosity, steps);
+        stability_growth(GS4_INTEGRATOR_SYMPLECTIC_EULER, 0, 0, viscosity, steps);
         scene_sharp = 1;
         for (i = test_slow ? 0 : 4; i < 5; i++)
-            CHECK(stability_growth(GS4_INTEGRATOR_GS4, family[i][0], family[i][1], viscosity, steps)
-                  < 1.1);
+            stability_growth(GS4_INTEGRATOR_GS4, family[i][0], family[i][1], viscosity, steps);
         scene_sharp = 0;
     }
 }
@@ -100,6 +152,7 @@ static void test_stability_of_two_densities(void)
     gs4_material heavy = scene_liquid(2000, 0, 10), light = scene_liquid(50, 0, 10);
     gs4_fill f = scene_fill(at(0, 0, 0));
     gs4_sim *sim;
+    stability_bounds bounds;
     double start, most = 0;
     int i;
     d.sharp_gradients = 1;
@@ -112,13 +165,15 @@ static void test_stability_of_two_densities(void)
     CHECK(gs4_add_particles(sim, gs4_sphere(at(0.38, 0.5, 0.5), (gs4_real)0.15), &f) > 0);
     stability_stir(sim, 0.01, 1);
     start = gs4_get_stats(sim).kinetic_energy;
+    bounds = stability_before(sim, start);
     for (i = 0; i < (test_full ? 900 : 300) && most < 100; i++) {
         CHECK_RESULT(sim, gs4_step(sim, (gs4_real)(0.95 * (double)gs4_stable_dt(sim))), GS4_OK);
         most = fmax(most, gs4_get_stats(sim).kinetic_energy / start);
     }
     if (test_filter[0])
         printf("two densities, sharpened: energy at most %.3f of what it was\n", most);
-    CHECK(most < 1.05);
+    CHECK_BETWEEN(most, bounds.least, bounds.most);
+    CHECK_BETWEEN(gs4_get_stats(sim).kinetic_energy / start, bounds.least, bounds.most);
     gs4_destroy(sim);
 }
 
@@ -164,7 +219,7 @@ static const char *stability_fault(gs4_sim *sim, const stability_scene *s, int i
         return "neither taken nor refused with a sentence";
     if (i == 20 && result < 0 && speed2 < s->sound_speed * s->sound_speed) return "gives up";
     if (!physics_is_finite(sim)) return "not finite";
-    if (s->gravity == 0 && !(stability_energy(sim, s->sound_speed) < 1.1 * energy))
+    if (s->gravity == 0 && !(stability_energy(sim, s->sound_speed) < 1.001 * energy))
         return "energy from nowhere";
     return NULL;
 }
@@ -244,6 +299,7 @@ static void test_short_decay(void)
             gs4_material m = scene_liquid(1000, 0.1, 20);
             gs4_fill f = scene_fill(at(1, -5, 0));
             gs4_sim *sim;
+            gs4_stats after;
             double energy;
             d.cell_size = (gs4_real)0.01;
             d.gravity = at(0, -9.81, 0);
@@ -259,7 +315,10 @@ static void test_short_decay(void)
                 energy = gs4_get_stats(sim).kinetic_energy;
                 for (i = 0; i < 5; i++) {
                     CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)0.004), GS4_OK);
-                    CHECK(gs4_get_stats(sim).kinetic_energy < 0.3 * energy);
+                    /* a slip wall leaves momentum along it: 1 m/s of sqrt(26) */
+                    after = gs4_get_stats(sim);
+                    CHECK_BETWEEN(after.kinetic_energy / energy, wall ? 0.99 / 26 : 0, 0.3);
+                    CHECK_BETWEEN(after.momentum[0] / after.mass, wall ? 0.99 : 0, 1.001);
                 }
                 gs4_destroy(sim);
             }
@@ -483,7 +542,9 @@ static void stability_blade(int integrator, gs4_wall contact, double rim)
         printf("blade, integrator %d, contact %d, rim at %g: %llu steps, liquid at %.3f of it\n",
                integrator, (int)contact, rim, (unsigned long long)gs4_get_stats(sim).steps,
                (double)gs4_get_stats(sim).max_speed / rim);
-    if (integrator) CHECK((double)gs4_get_stats(sim).max_speed < 1.02 * (rim + 0.075 * w) + 30 / w);
+    /* what is before the outer half of the blade cannot be slower than half of its rim */
+    CHECK_BETWEEN((double)gs4_get_stats(sim).max_speed / rim, 0.5,
+                  integrator ? 1.02 * (1 + 0.075 * w / rim) + 30 / w / rim : 1e9);
     gs4_destroy(sim);
 }
 

@@ -379,8 +379,8 @@
  * each with an image, within three cells, and 20 (double: 40) a cell where such a collider is not
  * flat. Symplectic Euler: 89 and 33. A scene with a viscoelastic liquid: 48 more a particle (Euler
  * 24). With a solid: 96 more (Euler 36). With heat: 17 more a particle, 32 more with a
- * flux_relaxation_time, 16 (or 32) a cell near material, and about 150 a cell of the box around all
- * material, where the solver works.
+ * flux_relaxation_time, 16 (or 32) a cell near material, and about 100 a cell of the box around all
+ * material, where the solver works; 150 where an axis is periodic.
  * Partitioned: 161 a particle, and about 270 a cell of the box around all material (double 313 and
  * 480), solver included.
  * A mesh: about 400 (double 800) per cell face of its surface in the domain or within 10 cells of

@@ -367,10 +367,11 @@
  *
  * ERRORS. Every call returns 0 or more for success and a negative gs4_result otherwise;
  * gs4_last_error has a sentence. Every field is checked, NaN included. A call that fails has
- * changed nothing but the order of particles, out of memory included; a step that is refused has
- * not been taken, though gs4_advance keeps those before it. Callbacks, go_on of a budget too, must
- * not change the simulation that calls them: such calls are refused. What is allowed but hardly
- * meant is said through `log`, once.
+ * changed nothing but the order of particles, out of memory included (sums follow that order: later
+ * steps may differ in their last bits); a step that is refused has not been taken, though
+ * gs4_advance keeps those before it. Callbacks, go_on of a budget too, must not change the
+ * simulation that calls them: such calls are refused. What is allowed but hardly meant is said
+ * through `log`, once.
  *
  * MEMORY. GS4: 65 bytes a particle in float (position, velocity, J and their rates, mass, id,
  * material, and 4 for sorting), 16 more unless flip_decay_time is INFINITY, 49 a cell near material
@@ -907,7 +908,7 @@ typedef struct gs4_stats {
     double max_speed, min_volume_ratio, max_volume_ratio, min_temperature, max_temperature;
     /* of the last solves; the explicit scheme solves for heat alone */
     int pressure_iterations, viscous_iterations, heat_iterations, elastic_iterations;
-    double solver_residual;
+    double solver_residual; /* finite, the largest; of a step that was refused, too */
     /* So far: particles whose stress needed substeps; whose stretch had to be bounded, of liquids
      * with anisotropy above 1 and of solids without yield beyond 512. */
     uint64_t stress_substeps;
@@ -4149,7 +4150,7 @@ typedef struct gs4i_krylov {
     /* M^-1 r, M fixed, symmetric, positive definite; gives GS4_OK, or what ends the solve */
     int (*precondition)(void *context, const double *r, double *out);
     void *context;
-    double residual; /* |r| / |b| of the last look */
+    double residual; /* |r| / |b| of the last look; 1 and x = 0 after a breakdown */
 } gs4i_krylov;
 
 static double gs4i_krylov_dot(const double *a, const double *b, size_t n)
@@ -4173,6 +4174,11 @@ static int gs4i_conjugate_gradients(gs4i_krylov *k, double tolerance, int max_it
         double beta, alpha;
         int result;
         k->residual = size > 0 ? norm / size : 0;
+        if (!(norm <= DBL_MAX)) {
+            for (i = 0; i < k->n; i++) k->x[i] = 0;
+            k->residual = 1;
+            return GS4_ERROR_NOT_CONVERGED;
+        }
         if (norm <= tolerance * size) return GS4_OK;
         if (iteration >= max_iterations) return GS4_ERROR_NOT_CONVERGED;
         result = k->precondition(k->context, k->r, k->q);
@@ -6234,7 +6240,8 @@ typedef uint16_t gs4i_half; /* the upper half of a float, rounded */
 GS4I_INLINE gs4i_half gs4i_to_half(gs4_real v)
 {
 #ifdef GS4_DOUBLE
-    return (gs4i_half)v;
+    /* a jump may give more than there is room for: C has no such conversion */
+    return (gs4i_half)(v > FLT_MAX ? FLT_MAX : v < -FLT_MAX ? -FLT_MAX : v);
 #else
     uint32_t u;
     memcpy(&u, &v, sizeof u);
@@ -18373,10 +18380,10 @@ static int gs4i_are_sane(const gs4_real *v, int n)
     return sane;
 }
 
-/* Rates, gradients and fluxes have more room: what changes in 1e-18 s or m. */
+/* Rates, gradients and fluxes have more room: speeds over the time of a cell go as their square. */
 static int gs4i_are_rates(const gs4_real *v, int n)
 {
-    const gs4_real most = GS4I_HUGE * GS4I_C(1e18);
+    const gs4_real most = GS4I_HUGE * GS4I_HUGE;
     int i, sane = 1;
     for (i = 0; i < n; i++) sane &= v[i] < most && v[i] > -most;
     return sane;

@@ -59,6 +59,7 @@ int main(int count, char **values)
     RUN_FULL(test_heat_surface);
     RUN(test_heat_seam);
     RUN(test_heat_periodic_mean);
+    RUN_ONCE(test_heat_breakdown);
     RUN_ONCE(test_heat_on_each_wall);
     RUN_ONCE(test_heat_one_wall);
     RUN_ONCE(test_heat_drifts);

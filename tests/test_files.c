@@ -317,6 +317,38 @@ enum {
     FILES_RUN = 5
 }; /* steps of the scenario */
 
+/* A collider at any speed that is accepted leaves numbers, of which the next step and gs4_load
+ * know what to do. */
+static void test_files_fast_collider(void)
+{
+    const double speeds[2] = { sizeof(gs4_real) == 8 ? 1e45 : 1e14,
+                               sizeof(gs4_real) == 8 ? 1e90 : 1e16 };
+    int i, k;
+    for (k = 0; k < 2; k++) {
+        gs4_sim_desc d = scene_cube(8);
+        const gs4_material m = scene_liquid(1000, 0, 10);
+        const gs4_fill f = scene_fill(at(0, 0, 0));
+        gs4_collider c;
+        gs4_sim *sim = NULL;
+        memset(&c, 0, sizeof c);
+        d.cell_size = (gs4_real)0.125;
+        c.shape = gs4_sphere(at(0.5, 0.5, 0.2), (gs4_real)0.2);
+        c.contact = GS4_WALL_SLIP;
+        c.velocity = at(speeds[k], 0, speeds[k]);
+        CHECK(gs4_create(&d, &sim) == GS4_OK);
+        CHECK(gs4_add_material(sim, &m) == 0);
+        CHECK(gs4_add_particles(sim, gs4_box(at(0.25, 0.25, 0.25), at(0.75, 0.75, 0.75)), &f) > 0);
+        CHECK(gs4_add_collider(sim, &c) == 0);
+        for (i = 0; i < 3; i++) {
+            CHECK_RESULT(sim, gs4_step(sim, gs4_stable_dt(sim) / 2), GS4_OK);
+            CHECK_RESULT(sim, gs4_save(sim, files_path("fast.sav")), GS4_OK);
+            CHECK_RESULT(sim, gs4_load(sim, files_path("fast.sav")), GS4_OK);
+        }
+        gs4_destroy(sim);
+    }
+    remove(files_path("fast.sav"));
+}
+
 /* The grid is long, so that what is loaded may be out of reach of what was there. */
 static gs4_sim_desc files_long_desc(int euler)
 {
@@ -1629,6 +1661,7 @@ static void run_files(void)
 {
     files_begin();
     RUN_FULL(test_files_memory);
+    RUN(test_files_fast_collider);
     RUN_ONCE(test_files_load_refused);
     RUN(test_files_frames);
     RUN(test_files_places);

@@ -318,6 +318,39 @@ static double heat_slab(int first, int with_block)
     return left;
 }
 
+static void heat_stiff_product(void *context, const double *p, double *out)
+{
+    (void)context;
+    out[0] = p[0];
+    out[1] = 0;
+}
+
+static int heat_no_precondition(void *context, const double *r, double *out)
+{
+    (void)context;
+    out[0] = 0;
+    out[1] = r[1];
+    return GS4_OK;
+}
+
+/* A residual is a number after a breakdown, too: here p is in the null space of A. */
+static void test_heat_breakdown(void)
+{
+    double numbers[8] = { 5, 5, 0, 1, 0, 0, 0, 0 };
+    gs4i_krylov k;
+    memset(&k, 0, sizeof k);
+    k.n = 2;
+    k.x = numbers;
+    k.r = numbers + 2;
+    k.p = numbers + 4;
+    k.q = numbers + 6;
+    k.apply = heat_stiff_product;
+    k.precondition = heat_no_precondition;
+    CHECK(gs4i_conjugate_gradients(&k, 1e-6, 10) == GS4_ERROR_NOT_CONVERGED);
+    CHECK(k.residual == 1);
+    CHECK(k.x[0] == 0 && k.x[1] == 0);
+}
+
 /* Two slabs apart in a periodic box, whose heat goes 250 000 cells in a step: each keeps its own.
  * What is left is rounding of the heat that flows: of `number` times a difference of 3 K in each of
  * `cells` cells, at random. */

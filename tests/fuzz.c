@@ -358,7 +358,7 @@ static void check_views(void)
                     && !(x >= (double)low[c] - 0.1 * h
                          && x <= (double)low[c] + (d->cells[c] + 0.1) * h))
                     fail("a place outside of the grid", x);
-                if (f == GS4_FIELD_VOLUME_RATIO && !(x > 0.06 && x < 16.1)) fail("J", x);
+                if (f == GS4_FIELD_VOLUME_RATIO && !(x > 0.06 && x < 256.1)) fail("J", x);
             }
     }
 }
@@ -374,7 +374,11 @@ static void check_stats(const gs4_stats *s)
                               s->volume,
                               s->max_speed,
                               s->time_left,
+                              s->min_temperature,
                               s->max_temperature,
+                              s->min_volume_ratio,
+                              s->max_volume_ratio,
+                              s->solver_residual,
                               s->angular_momentum[0] };
     int i;
     for (i = 0; i < COUNT(values); i++)
@@ -452,6 +456,11 @@ static const field of_material[] = { REAL(gs4_material, density, -3, 0, 1, 1),
                                      REAL(gs4_material, cross_wlf.a, 0, 0, 0, 2),
                                      REAL(gs4_material, cross_wlf.d1, -1, -1, 1, 1),
                                      REAL(gs4_material, cross_wlf.a1, 0, 0, 0, 3),
+                                     REAL(gs4_material, herschel_bulkley.yield_stress, -1, -2, 1,
+                                          1),
+                                     REAL(gs4_material, herschel_bulkley.consistency, -1, -1, 1, 1),
+                                     REAL(gs4_material, herschel_bulkley.index, 0, 0, 0, 1),
+                                     REAL(gs4_material, herschel_bulkley.creep_rate, 0, -1, 0, 1),
                                      REAL(gs4_material, bulk_modulus, -1, -2, 1, 1),
                                      REAL(gs4_material, sound_speed, 1, -1, 0, 1),
                                      REAL(gs4_material, shear_modulus, -1, -2, 1, 1),
@@ -511,13 +520,31 @@ static void any_desc(gs4_sim_desc *d)
     if (!one_in(4)) d->now = clock_of;
 }
 
+/* The consistency is in Pa s^index; `disturb` takes it for Pa s. */
+static void make_yielding(gs4_material *m)
+{
+    m->liquid = GS4_NEWTONIAN;
+    m->viscosity_law = GS4_VISCOSITY_HERSCHEL_BULKLEY;
+    m->viscosity_fn = NULL;
+    m->viscosity = m->local_fraction = m->relaxation_time = m->stretch_time = m->anisotropy =
+        m->arms = 0;
+    memset(&m->cross_wlf, 0, sizeof m->cross_wlf);
+    if (!one_in(4)) m->herschel_bulkley.yield_stress = number(1, 100, 1);
+    m->herschel_bulkley.index = one_in(4) ? 1 : number(1, 20, 10);
+    m->herschel_bulkley.consistency =
+        (gs4_real)(pick(0, 100) * 0.1 * pow(r.time, (double)m->herschel_bulkley.index - 1));
+    m->herschel_bulkley.creep_rate = number(1, 100, 10);
+}
+
 static void any_material(gs4_material *m)
 {
-    static const char *const names[] = { "water",     "olive oil", "glycerol",    "honey",
-                                         "cream",     "ice cream", "boger fluid", "polymer melt",
-                                         "chocolate", "wax",       "butter",      "lava",
-                                         "ice",       "" };
+    static const char *const names[] = {
+        "water",        "olive oil",  "glycerol", "honey",  "cream", "ice cream", "boger fluid",
+        "polymer melt", "chocolate",  "wax",      "butter", "lava",  "ketchup",   "yoghurt",
+        "mayonnaise",   "toothpaste", "mud",      "paint",  "blood", "ice",       ""
+    };
     make_material(&r.s, r.desc.sharp_gradients, m);
+    if ((m->solid == GS4_NO_SOLID || m->can_melt) && one_in(5)) make_yielding(m);
     if (one_in(5) && gs4_material_preset(names[pick(0, COUNT(names) - 1)], m) < 0)
         check(strlen(gs4_last_error(NULL)) > 10, "a sentence about presets", 0);
     if (r.desc.scheme == GS4_PARTITIONED) make_cold(m);
@@ -1328,8 +1355,8 @@ static int make_call(int call)
 }
 
 /* The outcomes of seed and variant; those there are must be the same. Steps that are refused are
- * not
- * left out: they may have sorted the particles, and sums are in another order then. */
+ * not left out: they sort the particles by places predicted for their own dt, and sums are in
+ * another order then. Seen: 5 of 295 particles differ after the next step, by 2e-17 to 4e-16. */
 static void run_scene(int seed, variant how)
 {
     int call, result, calls;

@@ -6241,7 +6241,8 @@ GS4I_INLINE gs4i_half gs4i_to_half(gs4_real v)
 {
 #ifdef GS4_DOUBLE
     /* a jump may give more than there is room for: C has no such conversion */
-    return (gs4i_half)(v > FLT_MAX ? FLT_MAX : v < -FLT_MAX ? -FLT_MAX : v);
+    const gs4_real most = GS4I_C(FLT_MAX);
+    return (gs4i_half)(v > most ? most : v < -most ? -most : v);
 #else
     uint32_t u;
     memcpy(&u, &v, sizeof u);

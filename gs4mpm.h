@@ -9329,22 +9329,15 @@ static void gs4i_collider_orient(gs4i_collider *b)
     for (i = 0; i < 9; i++) b->axes[i] = GS4I_C(r[i]);
 }
 
-/* sin(x)/x and cos x from x^2 by their series, of an angle halved until that is short: the same
- * bits with every libm. To rounding where |x| < 1/2, as in a step that is stable. */
+/* sin(x)/x and cos x from x^2 by their series: the same bits with every libm. To rounding where
+ * |x| < 1/2; x is half the angle of a step, which the stable step keeps within 1/sqrt(8). */
 static void gs4i_sinc_cos(double x2, double *sinc, double *cosine)
 {
-    int halved = 0, k;
     double s = 1, c = 1;
-    for (; x2 > 0.25 && halved < 64; halved++) x2 *= 0.25;
+    int k;
     for (k = 16; k >= 2; k -= 2) { /* the rest is less than 2^-18/18! */
         s = 1 - x2 / (k * (k + 1)) * s;
         c = 1 - x2 / (k * (k - 1)) * c;
-    }
-    for (; halved > 0; halved--) {
-        const double twice = s * c;
-        c = 1 - 2 * x2 * s * s;
-        s = twice;
-        x2 *= 4;
     }
     *sinc = s;
     *cosine = c;

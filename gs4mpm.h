@@ -31,7 +31,7 @@
  *     }
  *
  * WHAT IT DOES NOT DO, YET. The semi-implicit scheme is declared and refused with a sentence; so
- * are, with the partitioned scheme, heat, separating and periodic walls, and separating colliders.
+ * are, with the partitioned scheme, separating and periodic walls, and separating colliders.
  * It has no surface tension, no two-way coupling to colliders, no domain beyond
  * 3992^3 cells.
  *
@@ -14863,10 +14863,10 @@ GS4I_INLINE void gs4i_scatter_slope(gs4_real *tile, const gs4i_stencils *s, int 
     }
 }
 
-/* Stress of the stage, in grad v_i, to faces: f_c = - sum over particles of V sigma_ca dw/dx_a. */
-static void gs4i_scatter_stress(int index, void *context)
+/* Stress of the stage, in grad v_i, to faces: f_c = - sum over particles of V sigma_ca dw/dx_a.
+ * Heat to nodes, which are the centres of cells. */
+static void gs4i_scatter_stress(const gs4i_pass *pass, int index, gs4i_heat_pass *heat)
 {
-    const gs4i_pass *pass = (const gs4i_pass *)context;
     gs4_sim *sim = pass->sim;
     gs4i_staggered *f = &sim->staggered;
     const gs4i_particles p = sim->particles;
@@ -14877,9 +14877,10 @@ static void gs4i_scatter_stress(int index, void *context)
     gs4_real force[3][GS4I_TILE * GS4I_TILE * GS4I_TILE + 4];
     gs4i_response r;
     int c, a;
-    gs4i_begin_response(&r, sim, &p, &sim->integrator, &sim->reports[o], NULL);
+    gs4i_begin_response(&r, sim, &p, &sim->integrator, &sim->reports[o], heat);
     for (c = 0; c < 3; c++) gs4i_load_face_tile(sim, o, 1 << c, f->given[c], given[c]);
     memset(force, 0, sizeof force);
+    if (heat) gs4i_clear_heat_tiles(heat);
     for (; i < end; i += GS4I_BATCH) {
         const int n = gs4i_batch_size(i, end);
         gs4i_batch q;
@@ -14894,8 +14895,13 @@ static void gs4i_scatter_stress(int index, void *context)
         gs4i_gradient_lanes(slope.dx, slope.dy, slope.dz, n, L);
         GS4I_BATCH_LOOP(b) J[b] = q.v[3][b] + sim->integrator.before * q.a[3][b];
         gs4i_turn_to_batch(&r, i, n);
+        if (heat) gs4i_load_batch_heat(&r);
         gs4i_stress(&r, L, J, sigma, mu);
         gs4i_check_liquids(r.report, J, mu, p.id + i, n);
+        if (heat) {
+            gs4i_heat_of_stress(&r, q.x[3], J, L, sigma);
+            gs4i_scatter_heat(sim, heat, &s[0], n);
+        }
         for (c = 0; c < 3; c++)
             for (a = 0; a < 3; a++)
                 GS4I_BATCH_LOOP(b)
@@ -14906,6 +14912,17 @@ static void gs4i_scatter_stress(int index, void *context)
     }
     for (c = 0; c < 3; c++) gs4i_add_face_tile(sim, o, 1 << c, 1, force[c], f->force[c]);
     gs4i_report_liquids(r.report, &r.seen);
+    if (heat) gs4i_add_heat(sim, o, heat);
+}
+
+static void gs4i_scatter_stress_task(int index, void *context)
+{
+    gs4i_scatter_stress((const gs4i_pass *)context, index, NULL);
+}
+static void gs4i_scatter_stress_and_heat_task(int index, void *context)
+{
+    gs4i_heat_pass heat;
+    gs4i_scatter_stress((const gs4i_pass *)context, index, &heat);
 }
 
 /* C as the faces see it now: where velocities were set by hand. */
@@ -15033,7 +15050,8 @@ static int gs4i_correct_volume(gs4_sim *sim, gs4_real fastest)
 
 static int gs4i_clear_faces(gs4_sim *sim, gs4i_node_pass *nodes)
 {
-    (void)nodes;
+    if (sim->particles.with_heat)
+        gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_clear_nodes, nodes);
     return gs4i_begin_staggered(sim);
 }
 
@@ -15091,7 +15109,7 @@ static int gs4i_finish_acceleration(gs4_sim *sim, gs4_real fastest)
 static int gs4i_accelerate_by_projection(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     gs4i_staggered *f = &sim->staggered;
-    const int planes = f->box.size[2], has_stress = gs4i_has_stress(sim);
+    const int planes = f->box.size[2], with_heat = sim->particles.with_heat;
     const double start = gs4i_now(sim);
     gs4i_staggered_pass pass;
     gs4_real fastest, most = 0;
@@ -15099,9 +15117,9 @@ static int gs4i_accelerate_by_projection(gs4_sim *sim, gs4i_node_pass *nodes)
     pass.sim = sim;
     pass.lightest = nodes->lightest;
     gs4i_place_bodies(sim, nodes);
-    if (has_stress) {
+    if (f->is_viscous || with_heat) {
         gs4i_mirror_faces(sim, f->given, gs4i_fill_first);
-        gs4i_scatter(sim, gs4i_scatter_stress);
+        gs4i_scatter(sim, with_heat ? gs4i_scatter_stress_and_heat_task : gs4i_scatter_stress_task);
         gs4i_mirror_faces(sim, f->force, gs4i_fold_number);
     }
     gs4i_parallel_for(&sim->tasks, planes + 1, gs4i_predict_faces, &pass);
@@ -15272,7 +15290,8 @@ static void gs4i_correct_by_faces(gs4i_integrator r, const gs4i_face_corrections
     }
 }
 
-static void gs4i_correct_from_faces(const gs4i_pass *pass, int index, int commit)
+static void gs4i_correct_from_faces(const gs4i_pass *pass, int index, int commit,
+                                    gs4i_heat_pass *heat)
 {
     gs4_sim *sim = pass->sim;
     const gs4i_grid *g = &sim->grid;
@@ -15286,7 +15305,8 @@ static void gs4i_correct_from_faces(const gs4i_pass *pass, int index, int commit
     size_t i = (size_t)g->first[o], end = (size_t)g->first[o + 1];
     if (!commit && sim->staggered.is_safe) return;
     gs4i_load_taken(sim, o, &tiles);
-    gs4i_begin_response(&r, sim, &p, &integrator, report, NULL);
+    gs4i_begin_response(&r, sim, &p, &integrator, report, heat);
+    if (heat) gs4i_load_heat_tiles(sim, o, heat);
     for (; i < end; i += GS4I_BATCH) {
         const int n = gs4i_batch_size(i, end);
         gs4i_batch q;
@@ -15302,6 +15322,7 @@ static void gs4i_correct_from_faces(const gs4i_pass *pass, int index, int commit
             gs4i_validate_batch(&q, k.L, p.position + 4 * i, n, g->h, p.id + i, report);
             continue;
         }
+        if (heat) gs4i_gather_heat(&r, &s[0], k.L, heat);
         gs4i_pack_batch(&q, 1, &out);
         gs4i_correct_contact(sim, i, n, NULL, &out, &slope, report);
         gs4i_see_motion(&r.seen, q.v, k.L);
@@ -15313,11 +15334,21 @@ static void gs4i_correct_from_faces(const gs4i_pass *pass, int index, int commit
 
 static void gs4i_correct_from_faces_task(int index, void *context)
 {
-    gs4i_correct_from_faces((const gs4i_pass *)context, index, 1);
+    gs4i_correct_from_faces((const gs4i_pass *)context, index, 1, NULL);
 }
 static void gs4i_trial_from_faces_task(int index, void *context)
 {
-    gs4i_correct_from_faces((const gs4i_pass *)context, index, 0);
+    gs4i_correct_from_faces((const gs4i_pass *)context, index, 0, NULL);
+}
+static void gs4i_correct_from_faces_with_heat_task(int index, void *context)
+{
+    gs4i_heat_pass heat;
+    gs4i_correct_from_faces((const gs4i_pass *)context, index, 1, &heat);
+}
+static void gs4i_trial_from_faces_with_heat_task(int index, void *context)
+{
+    gs4i_heat_pass heat;
+    gs4i_correct_from_faces((const gs4i_pass *)context, index, 0, &heat);
 }
 
 /* ag of the faces before a node, where they know theirs. */
@@ -15382,8 +15413,8 @@ static const gs4i_scheme *gs4i_scheme_of(const gs4_sim *sim)
                                        gs4i_stable_euler_dt };
     static const gs4i_scheme partitioned = {
         { gs4i_scatter_to_faces, gs4i_scatter_to_faces },
-        { gs4i_trial_from_faces_task, gs4i_trial_from_faces_task },
-        { gs4i_correct_from_faces_task, gs4i_correct_from_faces_task },
+        { gs4i_trial_from_faces_task, gs4i_trial_from_faces_with_heat_task },
+        { gs4i_correct_from_faces_task, gs4i_correct_from_faces_with_heat_task },
         gs4i_remember_faces,
         gs4i_clear_faces,
         gs4i_finish_faces,
@@ -15520,7 +15551,9 @@ static void gs4i_heat_to_box(int index, void *context)
     const gs4_sim *sim = pass->sim;
     const gs4i_grid *g = &sim->grid;
     const gs4i_conduction *k = &sim->conduction;
-    const gs4_real inv_cell = 1 / (g->h * g->h * g->h);
+    const gs4_real inv_cell = 1 / (g->h * g->h * g->h),
+                   /* of the lightest material, m^3: what is below has no mass but rounding */
+        least = pass->lightest * sim->integrator.inv_node_mass * (g->h * g->h * g->h);
     int s, i;
     for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
         int first[3], x[3], at[3];
@@ -15531,9 +15564,7 @@ static void gs4i_heat_to_box(int index, void *context)
             size_t cell;
             gs4i_node_coordinates(first, i, x);
             if (!gs4i_box_cell_at(&k->box, x, at, &cell)) continue;
-            if (!(g->momentum[node + 3] > pass->lightest) || !(q[GS4I_NODE_CAPACITY] > 0)
-                || !(q[GS4I_NODE_VOLUME] > 0))
-                continue;
+            if (!(q[GS4I_NODE_VOLUME] > least) || !(q[GS4I_NODE_CAPACITY] > 0)) continue;
             k->system.kind[cell] = GS4_CELL_LIQUID;
             k->temperature[cell] = q[GS4I_NODE_HEAT] / q[GS4I_NODE_CAPACITY];
             /* harmonic mean: materials of one node conduct in series */
@@ -19331,14 +19362,10 @@ static GS4I_COLD int gs4i_check_material(gs4i_error *e, const gs4i_scene *scene,
     if (scene->scheme == GS4_EXPLICIT)
         GS4I_TRY(gs4i_check_absent(e, "incompressible", GS4I_C(m->incompressible),
                                    "the explicit scheme is weakly compressible, leave it 0"));
-    else {
+    else
         GS4I_TRY(gs4i_require(e, !m->incompressible || !(m->bulk_modulus > 0 || m->sound_speed > 0),
                               "incompressible: bulk_modulus and sound_speed are infinite then, "
                               "leave them 0"));
-        GS4I_TRY(gs4i_require(e, !gs4i_has_heat(m),
-                              "conductivity: the partitioned scheme of this version has no heat; "
-                              "use GS4_EXPLICIT"));
-    }
     return gs4i_check_heat(e, scene, m);
 }
 
@@ -20958,4 +20985,5 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  * tight, so emitters of that shape fill a little differently.
  * flip_decay_time 0, the default: noise of velocities and J after impacts decays as fast as it
  * crosses cells (NOISE); other values mean what they did. gs4_get_desc gives 0 for it, before
- * 0.5. GS4_FIELD_PRESSURE, of the partitioned scheme, in frames too. */
+ * 0.5. GS4_FIELD_PRESSURE, of the partitioned scheme, in frames too; that has
+ * heat now. */

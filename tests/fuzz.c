@@ -547,7 +547,7 @@ static void any_material(gs4_material *m)
     if ((m->solid == GS4_NO_SOLID || m->can_melt) && one_in(5)) make_yielding(m);
     if (one_in(5) && gs4_material_preset(names[pick(0, COUNT(names) - 1)], m) < 0)
         check(strlen(gs4_last_error(NULL)) > 10, "a sentence about presets", 0);
-    if (r.desc.scheme == GS4_PARTITIONED) make_cold(m);
+    if (r.desc.scheme == GS4_PARTITIONED) make_incompressible(m);
     disturb(m, of_material, COUNT(of_material));
     if (m->viscosity_fn) m->viscosity_fn = any_viscosity;
     m->liquid = (gs4_liquid)any_int((int)m->liquid);

@@ -86,6 +86,7 @@ int main(int count, char **values)
     RUN(test_heat_poured);
     RUN_ONCE(test_heat_uneven_steps);
     RUN_ONCE(test_heat_draws);
+    RUN_ONCE(test_heat_partitioned);
     run_solid();
     run_errors();
     run_files();

@@ -321,12 +321,8 @@ static void make_partitioned(scene *s, gs4_sim_desc *d)
             d->walls[a] = one_in(2) ? GS4_WALL_SLIP : GS4_WALL_STICK;
 }
 
-static void make_cold(gs4_material *m)
+static void make_incompressible(gs4_material *m)
 {
-    m->conductivity = m->flux_relaxation_time = m->fourier_fraction = m->melting_temperature =
-        m->latent_heat = 0;
-    m->can_melt = m->viscous_heating = 0;
-    if (m->solid) m->liquid = GS4_NEWTONIAN;
     m->incompressible = !m->solid && one_in(2);
     if (m->incompressible) m->bulk_modulus = m->sound_speed = 0;
 }

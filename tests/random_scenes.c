@@ -21,7 +21,7 @@ static void add_material(scene *s, const gs4_sim_desc *d)
 {
     gs4_material m;
     make_material(s, d->sharp_gradients, &m);
-    if (d->scheme == GS4_PARTITIONED) make_cold(&m);
+    if (d->scheme == GS4_PARTITIONED) make_incompressible(&m);
     if (result_of(s, gs4_add_material(s->sim, &m)) >= 0) s->materials++;
 }
 

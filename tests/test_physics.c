@@ -8,10 +8,22 @@ static int physics_run(gs4_sim *sim, double time)
     return result;
 }
 
-static gs4_sim *physics_create(const gs4_sim_desc *d, const gs4_material *m)
+static gs4_scheme physics_scheme; /* of the next scenes */
+
+/* With the partitioned scheme backward Euler stands for symplectic Euler. */
+static gs4_sim *physics_create(const gs4_sim_desc *desc, const gs4_material *m)
 {
+    gs4_sim_desc d = *desc;
     gs4_sim *sim = NULL;
-    CHECK_RESULT(NULL, gs4_create(d, &sim), GS4_OK);
+    int w;
+    d.scheme = physics_scheme;
+    if (d.scheme == GS4_PARTITIONED) {
+        if (d.integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER)
+            d.integrator = GS4_INTEGRATOR_BACKWARD_EULER;
+        for (w = 0; w < 6; w++)
+            if (d.walls[w] == GS4_WALL_SEPARATE) d.walls[w] = GS4_WALL_SLIP;
+    }
+    CHECK_RESULT(NULL, gs4_create(&d, &sim), GS4_OK);
     if (sim && m) CHECK_RESULT(sim, gs4_add_material(sim, m), GS4_OK);
     return sim;
 }
@@ -21,7 +33,7 @@ static int physics_is_finite(const gs4_sim *sim)
 {
     const double absurd = sizeof(gs4_real) == 8 ? 1e200 : 1e37;
     int field, i, c;
-    for (field = 0; field <= GS4_FIELD_MASS; field++) {
+    for (field = 0; field <= GS4_FIELD_PRESSURE; field++) {
         const gs4_view v = gs4_particles(sim, (gs4_field)field);
         for (i = 0; i < v.count; i++)
             for (c = 0; c < v.components; c++)

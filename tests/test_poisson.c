@@ -910,6 +910,65 @@ static void test_poisson_never_worse(void)
     if (worse) printf("    worse than 0: %d of %d\n", worse, ended_early);
 }
 
+/* Coefficients that jump by `jump` squared from face to face, at random. One solve. */
+static double poisson_jumps(int seed, double jump, int limit, int *iterations, int *result)
+{
+    enum {
+        N = 8
+    };
+    static uint8_t kind[N * N * N];
+    static gs4_real c[N * N * (N + 1)], rhs[N * N * N], x[N * N * N];
+    gs4_poisson_desc d;
+    gs4_poisson *p = NULL;
+    gs4_solve_stats stats;
+    uint64_t state = (uint64_t)seed;
+    int i, a;
+    memset(&d, 0, sizeof d);
+    for (i = 0; i < N * N * N; i++) {
+        state = gs4i_mix(state);
+        kind[i] = (uint8_t)(state % 16 ? GS4_CELL_LIQUID : GS4_CELL_AIR);
+        rhs[i] = (gs4_real)((double)(state >> 40) / (1 << 24) - 0.5);
+        x[i] = 0;
+    }
+    for (i = 0; i < N * N * (N + 1); i++) {
+        state = gs4i_mix(state);
+        c[i] = (gs4_real)(state & 1024 ? jump : 1 / jump);
+    }
+    for (a = 0; a < 3; a++) {
+        d.cells[a] = N;
+        d.coefficient[a] = c;
+    }
+    d.cell_size = 1;
+    d.kind = kind;
+    d.tolerance = (gs4_real)1e-7;
+    d.max_iterations = limit;
+    CHECK(gs4_poisson_create(&d, &p) == GS4_OK);
+    *result = gs4_poisson_solve(p, rhs, x, &stats);
+    *iterations = stats.iterations;
+    gs4_poisson_destroy(p);
+    return stats.residual;
+}
+
+/* What does not converge is the best of all iterates: none of those of fewer iterations has a
+ * smaller residual. */
+static void test_poisson_best(void)
+{
+    int seed, limit, refused = 0;
+    for (seed = 1; seed < 12; seed++) {
+        double least = 1, residual;
+        int iterations, result;
+        for (limit = 1; limit < 16; limit++) {
+            residual = poisson_jumps(seed, 1e4, limit, &iterations, &result);
+            if (result != GS4_ERROR_NOT_CONVERGED) break;
+            refused++;
+            CHECK(iterations <= limit);
+            CHECK(residual <= least * 1.001);
+            if (residual < least) least = residual;
+        }
+    }
+    CHECK(refused > 100);
+}
+
 static void run_poisson(void)
 {
     RUN(test_poisson_never_worse);
@@ -933,4 +992,5 @@ static void run_poisson(void)
     RUN(test_poisson_arguments);
     RUN(test_poisson_bad_numbers);
     RUN_ONCE(test_poisson_memory);
+    RUN_ONCE(test_poisson_best);
 }

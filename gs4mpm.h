@@ -14946,7 +14946,8 @@ static void gs4i_scatter_stress(const gs4i_pass *pass, int index, gs4i_heat_pass
         for (b = 0; b < n; b++)
             for (c = 0; c < 3; c++) gs4i_scatter_slope(force[c], &s[1 + c], b, push[c]);
     }
-    for (c = 0; c < 3; c++) gs4i_add_face_tile(sim, o, 1 << c, 1, force[c], f->force[c]);
+    for (c = 0; c < 3; c++)
+        if (f->is_viscous) gs4i_add_face_tile(sim, o, 1 << c, 1, force[c], f->force[c]);
     gs4i_report_liquids(r.report, &r.seen);
     if (heat) gs4i_add_heat(sim, o, heat);
 }
@@ -15156,7 +15157,7 @@ static int gs4i_accelerate_by_projection(gs4_sim *sim, gs4i_node_pass *nodes)
     if (f->is_viscous || with_heat) {
         gs4i_mirror_faces(sim, f->given, gs4i_fill_first);
         gs4i_scatter(sim, with_heat ? gs4i_scatter_stress_and_heat_task : gs4i_scatter_stress_task);
-        gs4i_mirror_faces(sim, f->force, gs4i_fold_number);
+        if (f->is_viscous) gs4i_mirror_faces(sim, f->force, gs4i_fold_number);
     }
     gs4i_parallel_for(&sim->tasks, planes + 1, gs4i_predict_faces, &pass);
     gs4i_parallel_for(&sim->tasks, planes, gs4i_classify_cells, &pass);

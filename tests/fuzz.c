@@ -497,7 +497,7 @@ static void any_desc(gs4_sim_desc *d)
     const int threads = r.how == TWO_THREADS ? 2 : r.how == THREE_THREADS ? 3 : 1;
     int a;
     make_desc(&r.s, d, threads);
-    if (one_in(4)) make_partitioned(&r.s, d);
+    if (one_in(4)) make_partitioned(d);
     for (a = 0; a < 3; a++)
         if (!one_in(3)) d->cells[a] = r.s.cells[a] = one_in(8) ? pick(15, 24) : pick(4, 10);
     if (one_in(4)) d->max_particles = pick(1, MOST_PARTICLES);

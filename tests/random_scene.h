@@ -308,10 +308,9 @@ static void make_emitter(scene *s, gs4_emitter *e)
 }
 
 /* Scenes of the partitioned scheme, without what that refuses. */
-static void make_partitioned(scene *s, gs4_sim_desc *d)
+static void make_partitioned(gs4_sim_desc *d)
 {
     int a;
-    s->with_heat = 0;
     d->scheme = GS4_PARTITIONED;
     d->integrator = one_in(3) ? GS4_INTEGRATOR_BACKWARD_EULER : GS4_INTEGRATOR_GS4;
     if (d->integrator != GS4_INTEGRATOR_GS4) d->rho_inf = d->rho_inf_spurious = 0;

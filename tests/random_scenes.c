@@ -47,7 +47,7 @@ static int build(scene *s, int seed, int threads)
     memset(s, 0, sizeof *s);
     random_begin(seed);
     make_desc(s, &d, threads);
-    if (seed % 4 == 0) make_partitioned(s, &d);
+    if (seed % 4 == 0) make_partitioned(&d);
     i = gs4_create(&d, &s->sim);
     if (i < 0) return i;
     n = pick(1, 3);

@@ -14663,8 +14663,9 @@ static int gs4i_check_inflow(gs4_sim *sim)
 {
     const gs4i_staggered *f = &sim->staggered;
     double inflow = 0, liquid = 0;
-    gs4_real fastest;
+    gs4_real fastest = 0;
     size_t i;
+    int n;
     if (f->compressible) return GS4_OK;
     for (i = 0; i < gs4i_box_count(&f->box, GS4I_AT_CELL); i++) {
         if (f->kind[i] == GS4_CELL_AIR) return GS4_OK;
@@ -14673,7 +14674,9 @@ static int gs4i_check_inflow(gs4_sim *sim)
             liquid++;
         }
     }
-    fastest = gs4i_fastest_face(f);
+    for (n = 0; n < sim->boundary.collider_count; n++)
+        fastest = gs4i_max(fastest, gs4i_collider_speed(&sim->boundary.colliders[n], &sim->grid));
+    fastest = gs4i_max(fastest, gs4i_fastest_face(f));
     /* rounding gives 1e-6 of U/h; a piston that crosses a box of 1000 cells 1e-3 */
     if (liquid < 1 || fabs(inflow) <= 1e-4 * liquid * (double)(fastest * sim->grid.inv_h))
         return GS4_OK;

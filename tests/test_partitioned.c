@@ -257,6 +257,113 @@ static void test_partitioned_slope(void)
     }
 }
 
+/* A standing wave in a box, half a wave long, along `across` with gravity along `down`: its first
+ * velocities are those of linear theory. `frequency` over sqrt(g k tanh(k H)); what is left of the
+ * amplitude after five periods is returned. */
+static double partitioned_slosh(int down, int across, int steps, double *frequency)
+{
+    const double k = 3.14159265358979, H = 0.5, omega = sqrt(k * tanh(k * H));
+    const double period = 2 * 3.14159265358979 / omega, dt = period / steps;
+    gs4_sim_desc d = partitioned_cube(16);
+    const gs4_material m = partitioned_liquid(0);
+    gs4_real gravity[3] = { 0, 0, 0 }, low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 };
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    double before = 0, first = 0, last = 0, most = 0, most_first = 0;
+    gs4_view x;
+    gs4_edit v;
+    gs4_sim *sim;
+    int i, n, crossings = 0;
+    d.cells[3 - down - across] = 4;
+    gravity[down] = -1;
+    high[down] = (gs4_real)H;
+    high[3 - down - across] = (gs4_real)0.25;
+    d.gravity = at(gravity[0], gravity[1], gravity[2]);
+    for (i = 0; i < 6; i++) d.walls[i] = GS4_WALL_SLIP;
+    CHECK_RESULT(NULL, gs4_create(&d, &sim), GS4_OK);
+    f.material = gs4_add_material(sim, &m);
+    gs4_add_particles(sim, gs4_box(at(low[0], low[1], low[2]), at(high[0], high[1], high[2])), &f);
+    v = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
+    x = gs4_particles(sim, GS4_FIELD_POSITION);
+    for (i = 0; i < x.count; i++) {
+        const double up = k * (double)x.data[i * x.stride + down],
+                     along = k * (double)x.data[i * x.stride + across];
+        v.data[i * v.stride + across] = (gs4_real)(0.03 * cosh(up) / cosh(k * H) * sin(along));
+        v.data[i * v.stride + down] = (gs4_real)(-0.03 * sinh(up) / cosh(k * H) * cos(along));
+    }
+    for (n = 0; n <= 21 * steps / 4; n++) {
+        const double now = gs4_get_stats(sim).momentum[across];
+        if (n && before * now <= 0) {
+            last = (n - now / (now - before)) * dt;
+            if (!crossings++) first = last;
+        }
+        if (n < steps / 4) most_first = fmax(most_first, fabs(now));
+        if (n > 19 * steps / 4) most = fmax(most, fabs(now));
+        before = now;
+        if (gs4_step(sim, (gs4_real)dt) != GS4_OK) break;
+    }
+    CHECK_RESULT(sim, n <= 21 * steps / 4 ? GS4_ERROR_UNSTABLE : GS4_OK, GS4_OK);
+    *frequency = (crossings - 1) * 0.5 * period / (last - first);
+    gs4_destroy(sim);
+    return most / most_first;
+}
+
+static void test_partitioned_sloshing(void)
+{
+    int down, across;
+    for (down = 0; down < 3; down++)
+        for (across = 0; across < 3; across++) {
+            double frequency, left;
+            if (down == across) continue;
+            left = partitioned_slosh(down, across, 40, &frequency);
+            CHECK_CLOSE(frequency, 1, 0.01);
+            CHECK_BETWEEN(left, 0.97, 1);
+            if (down + across == 1 && test_slow) {
+                left = partitioned_slosh(down, across, 20, &frequency);
+                CHECK_CLOSE(frequency, 1, 0.02);
+                CHECK_BETWEEN(left, 0.85, 1);
+            }
+        }
+}
+
+/* Ripples of a pool whose particles lie anyhow, in steps as long as may be: they die out. */
+static void test_partitioned_ripples(void)
+{
+    static const double members[6][2] = { { 0, 0 },   { 0.5, 0 }, { 1, 0 },
+                                          { 1, 0.5 }, { 1, 0.9 }, { 0, 0 } };
+    int n;
+    for (n = 0; n < 6; n++) {
+        const int down = n % 3, across = (down + 1) % 3, backward = n == 5;
+        gs4_real gravity[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 };
+        const gs4_material m = partitioned_liquid(0);
+        gs4_sim_desc d = partitioned_cube(16);
+        gs4_fill f = scene_fill(at(0, 0, 0));
+        double energy, before = 0, after = 0;
+        gs4_sim *sim;
+        int i;
+        d.cells[across] = 4;
+        gravity[down] = -1;
+        high[down] = (gs4_real)0.52;
+        d.gravity = at(gravity[0], gravity[1], gravity[2]);
+        d.rho_inf = (gs4_real)members[n][0];
+        d.rho_inf_spurious = (gs4_real)members[n][1];
+        if (backward) d.integrator = GS4_INTEGRATOR_BACKWARD_EULER;
+        for (i = 0; i < 6; i++) d.walls[i] = GS4_WALL_SLIP;
+        CHECK_RESULT(NULL, gs4_create(&d, &sim), GS4_OK);
+        f.material = gs4_add_material(sim, &m);
+        f.jitter = (gs4_real)0.3;
+        gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(high[0], high[1], high[2])), &f);
+        for (i = 0; i < 400; i++) {
+            if (gs4_step(sim, gs4_stable_dt(sim)) != GS4_OK) break;
+            energy = gs4_get_stats(sim).kinetic_energy;
+            if (i >= 50 && i < 100) before = fmax(before, energy);
+            if (i >= 350) after = fmax(after, energy);
+        }
+        CHECK_RESULT(sim, i < 400 ? GS4_ERROR_UNSTABLE : GS4_OK, GS4_OK);
+        CHECK_BETWEEN(after / before, 0, 0.9);
+        gs4_destroy(sim);
+    }
+}
+
 /* u = (sin cos, - cos sin) in a slippery box is steady without viscosity, and decays with
  * exp(-2 nu pi^2 t) with it. Amplitude over that after a time 0.4, with the vortex about axis a. */
 static double partitioned_vortex(int a, int n, double nu)
@@ -771,6 +878,8 @@ static void run_partitioned(void)
     RUN(test_partitioned_pressure);
     RUN_FULL(test_partitioned_bodies_at_rest);
     RUN_ONCE(test_partitioned_slope);
+    RUN_FULL(test_partitioned_ripples);
+    RUN_FULL(test_partitioned_sloshing);
     RUN_ONCE(test_partitioned_vortex);
     RUN(test_partitioned_order);
     RUN_FULL(test_partitioned_dam);

@@ -13514,7 +13514,7 @@ GS4I_INLINE void gs4i_affine_momentum(gs4i_response *r, const gs4i_batch *q, con
 /* Symplectic Euler, there: one affine scatter with stress (MLS-MPM). */
 static void gs4i_scatter_affinely(const gs4i_pass *pass, int index, gs4i_heat_pass *heat)
 {
-    const gs4i_prediction now = { 0, 0 };
+    const gs4i_prediction now = { 0, 0, 0 };
     gs4_sim *sim = pass->sim;
     const gs4i_grid *g = &sim->grid;
     const gs4i_particles p = sim->particles;
@@ -13592,7 +13592,7 @@ GS4I_INLINE void gs4i_advect_batch(gs4_real dt, const gs4i_gathered *u, int n, g
 /* Symplectic Euler, and back. */
 static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, gs4i_heat_pass *heat)
 {
-    const gs4i_prediction now = { 0, 0 };
+    const gs4i_prediction now = { 0, 0, 0 };
     gs4_sim *sim = pass->sim;
     const gs4i_grid *g = &sim->grid;
     const gs4i_particles p = sim->particles;
@@ -17409,7 +17409,7 @@ static void gs4i_follow_speed(const gs4_sim *sim, gs4_real top_speed, gs4i_batch
 static void gs4i_find_limits(const gs4_sim *sim, gs4_real top_speed, gs4i_report *report)
 {
     const gs4i_particles *p = &sim->particles;
-    const gs4i_prediction now = { 0, 0 };
+    const gs4i_prediction now = { 0, 0, 0 };
     gs4i_heat_work heat;
     gs4i_response r;
     int i;

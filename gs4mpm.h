@@ -240,7 +240,8 @@
  *
  * THE PARTITIONED SCHEME has pressure from a solve, so that no step follows sound: for liquids of
  * any bulk modulus, `incompressible` too. Velocities are on faces of cells, one component each, and
- * particles give momentum affinely, m (v~ + C (x_f - x~)), C = grad u~ extrapolated to the stage.
+ * particles give momentum affinely, m (v~ + C (x_f - x~)), C = grad u~ extrapolated to the stage;
+ * x~ has (alpha_f dt)^2/2 dv/dt more than (4), or long steps would drive waves of surfaces.
  *     acc = (forces of stress)/m + g - grad p/(w rho),   u~ = v_i + s (acc - ag)
  *     p + s K div u~ = -K (J** - 1);   div u~ = 0 where K is infinite
  * Cells are liquid where material fills more than 51.5 % of their kernel. p is 0 where the surface
@@ -328,7 +329,7 @@
  *                           more than 1, x = mass of a cell of the lightest material over that of
  *                           the heaviest particle: one among lighter ones swings by itself
  *                           partitioned: nu dt <= 0.4 h^2 (backward Euler 0.2), c dt <= h/2, c
- *                           of elastic waves alone
+ *                           of elastic waves alone; of surfaces dt <= (1/2 - rho_sp/4) sqrt(h/g)
  *     flow                  one cell a step along each axis, the fall within the step included,
  *                           and the rim of a collider that turns, where the domain can meet it
  *     strain, relaxation    |grad v| dt <= 1, of colliders too (sqrt(2) |w|),  dt <= 1000 lambda_b
@@ -21038,5 +21039,5 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  * tight, so emitters of that shape fill a little differently.
  * flip_decay_time 0, the default: noise of velocities and J after impacts decays as fast as it
  * crosses cells (NOISE); other values mean what they did. gs4_get_desc gives 0 for it, before
- * 0.5. GS4_FIELD_PRESSURE, of the partitioned scheme, in frames too; that has
- * heat now. */
+ * 0.5. GS4_FIELD_PRESSURE, of the partitioned scheme, in frames too; that has heat now, and steps
+ * no longer than ripples of its surfaces bear. */

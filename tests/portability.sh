@@ -366,8 +366,12 @@ fused() {
 
 # ==== sanitizers ===============================================================================================
 
-# sanitized COMPILER FLAGS
-sanitized_det() { $1 -g -O1 -DGS4_PTHREADS -pthread -I. tests/determinism.c -o "$tmp/det" -lm && "$tmp/det" steps=100 $2; }
+# sanitized_det BUILD ARGUMENTS: tests/determinism.c, built once
+sanitized_det() {
+    program=$tmp/det$(echo "$1" | cksum | tr ' ' _)
+    [ -x "$program" ] || $1 -g1 -O1 -w -DGS4_PTHREADS -pthread -I. tests/determinism.c -o "$program" -lm || return 1
+    "$program" steps=100 $2
+}
 sanitized_main() { $1 -g1 -O1 -fno-var-tracking-assignments -w -DGS4_PTHREADS -pthread -I. tests/main.c -o "$tmp/main" -lm && "$tmp/main" ${2:-}; }
 
 # Sanitizers take ten times as long: all quick tests, and the full ones that go where no quick one does.
@@ -392,7 +396,7 @@ fuzzed() { $1 -DGS4_PTHREADS -pthread -I. tests/fuzz.c -o "$tmp/fuzz" -lm && "$t
 fuzz() {
     check "calls each public function" sh -c 'for f in $(sed -n "s/^#define \(gs4_[a-z_]*\) gs4_[a-z_]*_f64$/\1/p" gs4mpm.h); do grep -q "$f(" tests/fuzz.c tests/random_scene.h || { echo "$f"; exit 1; }; done'
     have gcc || return
-    build="gcc -O1 -g -w -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all"
+    build="gcc -O1 -g1 -fno-var-tracking-assignments -w -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all"
     check "in float" fuzzed "$build" 1 80
     check "in double" fuzzed "$build -DGS4_DOUBLE" 1101 50
 }

@@ -376,7 +376,7 @@ sanitized_main() { $1 -g1 -O1 -fno-var-tracking-assignments -w -DGS4_PTHREADS -p
 
 # Sanitizers take ten times as long: all quick tests, and the full ones that go where no quick one does.
 robust='files_memory files_forged mesh_memory mesh_fan poisson_same_bits stress_random symmetry_ solid_extremes stability_of_blades
-    partitioned_moduli contact_ yield_'
+    partitioned_moduli contact_'
 
 asan() {
     if have clang; then

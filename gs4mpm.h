@@ -6089,8 +6089,7 @@ static void gs4i_find_parts(gs4i_elliptic *e)
 {
     const gs4i_box *box = e->box;
     const size_t n = gs4i_box_count(box, GS4I_AT_CELL);
-    size_t k;
-    size_t face[6], i;
+    size_t face[6], i, k;
     int at[3], a, z;
     for (k = 0; k < n; k++) e->part[k] = k;
     for (z = 0; z < box->size[2]; z++)
@@ -8326,8 +8325,8 @@ GS4I_INLINE void gs4i_largest_row(const gs4i_wide s[6], gs4i_wide *most)
 }
 
 /* B - V of F = V R, det F = 1, and the largest row sum of V. R by Newton's rule R <- (R + R^-T)/2
- * from F. Returns whether that has converged for all; in nine steps stretches from 1/32 to 32 do.
- * */
+ * from F. Returns whether that has converged for all; in nine steps stretches from 1/32 to 32
+ * do. */
 static int gs4i_corotated_strain(gs4i_matrix F, gs4i_symmetric strain, gs4i_lanes most)
 {
     gs4i_matrix R;

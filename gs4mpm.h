@@ -9293,12 +9293,11 @@ typedef struct gs4i_collider {
 /* A particle of a block near sticky bodies. */
 typedef struct gs4i_near_particle {
     /* how far it is from the nearest body, how far that bends away from a half space, the sum of
-     * its curvatures there, see gs4i_sample_patch, and its normal; before the step it is farther
-     * than `room` from all */
-    gs4_real d, bend, curvature, n[3], room;
+     * its curvatures there, see gs4i_sample_patch, and its normal */
+    gs4_real d, bend, curvature, n[3];
     int32_t body; /* the nearest, -1: none is within three cells */
-    /* the first node that it sees in the tile of its block; number of its image, or GS4I_NO_IMAGE,
-     * GS4I_HOLDS_NODES */
+    /* the first node that it sees in the tile of its block; slot of its image, later the image's
+     * number, or GS4I_NO_IMAGE, GS4I_HOLDS_NODES */
     int32_t base, image;
 } gs4i_near_particle;
 
@@ -9323,13 +9322,22 @@ typedef struct gs4i_image_particle {
  * three are in use: see gs4i_sample_patch. */
 typedef struct gs4i_patch {
     int collider, slot;
+    gs4_real nearest, bend[2]; /* least distance, least and greatest bend of its nodes */
 } gs4i_patch;
+
+/* What the particles of a block have of the surface of a body. */
+typedef struct gs4i_surface {
+    int kind, has_images; /* GS4I_SURFACE_*; may particles have images by it? */
+    gs4_vec3 at, n;       /* midst of the block; where the body is flat, its normal */
+    gs4_real d;           /* distance of `at` */
+    gs4_real nearest;     /* no node that particles of the block see is nearer, up to three cells */
+} gs4i_surface;
 
 typedef struct gs4i_patches {
     int count, still; /* so many, those of bodies at rest first */
     /* int32_t: 1 + number of the patch, or 0, per collider and slot; gs4i_patch; distances of
-     * nodes; their four numbers */
-    gs4i_scratch of, all, distance, nodes;
+     * nodes; their four numbers; gs4i_surface, per collider and occupied block */
+    gs4i_scratch of, all, distance, nodes, surfaces;
     /* for which those at rest hold: gs4i_collider, block of each slot */
     gs4i_scratch colliders, blocks;
     int collider_count, active, occupied;
@@ -11438,12 +11446,6 @@ enum {
 /* how far a body may bend from a half space under an image, in cells */
 #define GS4I_IMAGE_BEND GS4I_C(0.25)
 
-/* A flat surface near a block. */
-typedef struct gs4i_face {
-    gs4_vec3 at, n;
-    gs4_real d; /* distance of `at` */
-} gs4i_face;
-
 enum {
     GS4I_SURFACE_FAR,
     GS4I_SURFACE_FLAT,
@@ -11451,15 +11453,26 @@ enum {
 };
 
 /* What a block has of the surface of a body: particles in it may have images by it, or none. */
-static int gs4i_find_face(const gs4i_grid *g, const gs4i_collider *b, uint32_t block, gs4i_face *f)
+static gs4i_surface gs4i_find_surface(const gs4i_grid *g, const gs4i_collider *b, uint32_t block)
 {
     const gs4_real reach = GS4I_BLOCK_REACH * g->h;
-    f->at = gs4i_block_centre(g, block);
-    f->d = gs4i_collider_distance(b, f->at);
-    if (!(f->d < reach + GS4I_IMAGE_REACH * g->h)) return GS4I_SURFACE_FAR;
-    return gs4i_collider_is_flat(b, f->at, reach, GS4I_IMAGE_NODES * g->h, &f->n)
-               ? GS4I_SURFACE_FLAT
-               : GS4I_SURFACE_CURVED;
+    gs4i_surface f;
+    memset(&f, 0, sizeof f);
+    f.at = gs4i_block_centre(g, block);
+    f.d = gs4i_collider_distance(b, f.at);
+    f.kind = GS4I_SURFACE_FAR;
+    if (f.d < reach + GS4I_IMAGE_REACH * g->h)
+        f.kind = gs4i_collider_is_flat(b, f.at, reach, GS4I_IMAGE_NODES * g->h, &f.n)
+                     ? GS4I_SURFACE_FLAT
+                     : GS4I_SURFACE_CURVED;
+    return f;
+}
+
+/* The same of occupied block o, once it is found. */
+GS4I_INLINE const gs4i_surface *gs4i_surface_of(const gs4_sim *sim, int collider, int o)
+{
+    return (const gs4i_surface *)sim->image_particles.patches.surfaces.data
+           + (size_t)collider * (size_t)sim->grid.occupied + (size_t)o;
 }
 
 /* Number of the patch of a body in a slot, or -1. */
@@ -11477,6 +11490,18 @@ static gs4_real gs4i_node_distance(const gs4_sim *sim, int collider, int slot, i
     return patch < 0 ? gs4i_collider_distance(&sim->boundary.colliders[collider], p)
                      : ((const gs4_real *)
                             patches->distance.data)[(size_t)patch * GS4I_BLOCK_NODES + (size_t)i];
+}
+
+/* Distance of a node of the tile of occupied block o from a body that is curved there. */
+GS4I_INLINE gs4_real gs4i_tile_distance(const gs4_sim *sim, int collider, int o, int node)
+{
+    const gs4i_patches *patches = &sim->image_particles.patches;
+    const int x = node % GS4I_TILE + 2, y = node / GS4I_TILE % GS4I_TILE + 2,
+              z = node / (GS4I_TILE * GS4I_TILE) + 2,
+              slot = sim->grid.neighbour[27 * o + ((z >> 2) * 3 + (y >> 2)) * 3 + (x >> 2)],
+              patch = gs4i_patch_of(sim, collider, slot);
+    const gs4_real *d = (const gs4_real *)patches->distance.data;
+    return patch < 0 ? GS4I_HUGE : d[patch * GS4I_BLOCK_NODES + gs4i_place_of(x, y, z)];
 }
 
 static void gs4i_sample_distances(int index, void *context)
@@ -11535,23 +11560,23 @@ static void gs4i_sample_patch(int index, void *context)
     const gs4_sim *sim = ((const gs4i_pass *)context)->sim;
     const gs4i_patches *patches = &sim->image_particles.patches;
     const int number = ((const gs4i_pass *)context)->count + index;
-    const gs4i_patch *patch = (const gs4i_patch *)patches->all.data + number;
+    gs4i_patch *patch = (gs4i_patch *)patches->all.data + number;
     const gs4i_collider *b = &sim->boundary.colliders[patch->collider];
     const gs4_real h = sim->grid.h, deep = GS4I_IMAGE_NODES * h;
     gs4_real d[216], *to = gs4i_of_slot((gs4_real *)patches->nodes.data, number);
     int first[3], x[3], i;
     gs4i_load_distances(sim, patch, d);
     gs4i_block_origin(&sim->grid, sim->grid.block[patch->slot], first);
-    for (i = 0; i < GS4I_BLOCK_NODES; i++, to += 4) {
+    for (i = 0; i < GS4I_BLOCK_NODES; i++) {
         const gs4_real *at = d + 43 + (i & 3) + 6 * (i >> 2 & 3) + 36 * (i >> 4);
         const gs4_vec3 g = gs4i_vec3(at[1] - at[-1], at[6] - at[-6], at[36] - at[-36]);
         const gs4_real length = gs4i_length(g),
                        lap = at[1] + at[-1] + at[6] + at[-6] + at[36] + at[-36] - 6 * *at;
         gs4_vec3 p, n;
-        to[0] = *at - lap * GS4I_C(0.125);
-        to[1] = h;
-        to[2] = lap * sim->grid.inv_h * sim->grid.inv_h;
-        to[3] = 0;
+        to[4 * i] = *at - lap * GS4I_C(0.125);
+        to[4 * i + 1] = h;
+        to[4 * i + 2] = lap * sim->grid.inv_h * sim->grid.inv_h;
+        to[4 * i + 3] = 0;
         /* what particles see that may have images */
         if (!(*at > -2 * GS4I_NODES_REACH * h && *at < (GS4I_IMAGE_REACH + GS4I_NODES_REACH) * h
               && length > 0))
@@ -11559,7 +11584,16 @@ static void gs4i_sample_patch(int index, void *context)
         gs4i_node_coordinates(first, i, x);
         p = gs4i_place_position(&sim->grid, x, GS4I_AT_CELL);
         n = gs4i_scale(g, 1 / length);
-        to[1] = gs4i_collider_distance(b, gs4i_sub(p, gs4i_scale(n, *at + deep))) + deep;
+        to[4 * i + 1] = gs4i_collider_distance(b, gs4i_sub(p, gs4i_scale(n, *at + deep))) + deep;
+    }
+    patch->nearest = GS4I_HUGE;
+    patch->bend[0] = h;
+    patch->bend[1] = -h;
+    for (i = 0; i < GS4I_BLOCK_NODES; i++) {
+        const gs4_real own = d[43 + (i & 3) + 6 * (i >> 2 & 3) + 36 * (i >> 4)];
+        patch->nearest = gs4i_min(patch->nearest, gs4i_min(own, to[4 * i]));
+        patch->bend[0] = gs4i_min(patch->bend[0], to[4 * i + 1]);
+        patch->bend[1] = gs4i_max(patch->bend[1], to[4 * i + 1]);
     }
 }
 
@@ -11604,7 +11638,8 @@ static int gs4i_keep_patches(gs4_sim *sim)
     return GS4_OK;
 }
 
-/* List the patches of a body: around blocks that are near it, where it is not flat. */
+/* Find a body's surfaces, and list its patches: around blocks that are near it, where it is not
+ * flat. */
 static int gs4i_list_patches(gs4_sim *sim, int collider)
 {
     gs4i_patches *p = &sim->image_particles.patches;
@@ -11614,17 +11649,19 @@ static int gs4i_list_patches(gs4_sim *sim, int collider)
     gs4i_patch *all = (gs4i_patch *)gs4i_scratch_reserve(
         &sim->memory, &p->all, (size_t)(p->count + g->active) * sizeof *all,
         (size_t)p->count * sizeof *all);
-    gs4i_face face;
+    gs4i_surface *surface =
+        (gs4i_surface *)p->surfaces.data + (size_t)collider * (size_t)g->occupied;
     int o, i;
     if (!all) return gs4i_fail_memory(&sim->error);
     memset(of, 0, (size_t)g->active * sizeof *of);
-    for (o = 0; o < g->occupied; o++) {
-        if (gs4i_find_face(g, b, g->occupied_block[o], &face) != GS4I_SURFACE_CURVED) continue;
+    for (o = 0; o < g->occupied; o++, surface++) {
+        *surface = gs4i_find_surface(g, b, g->occupied_block[o]);
+        if (surface->kind != GS4I_SURFACE_CURVED) continue;
         for (i = 0; i < 27; i++) {
             const int slot = g->neighbour[27 * o + i];
             if (of[slot]) continue;
             of[slot] = -1; /* none of its nodes is seen */
-            if (gs4i_find_face(g, b, g->block[slot], &face) == GS4I_SURFACE_FAR) continue;
+            if (gs4i_find_surface(g, b, g->block[slot]).kind == GS4I_SURFACE_FAR) continue;
             all[p->count].collider = collider;
             all[p->count].slot = slot;
             of[slot] = ++p->count;
@@ -11633,13 +11670,43 @@ static int gs4i_list_patches(gs4_sim *sim, int collider)
     return GS4_OK;
 }
 
+/* What the nodes that particles of its blocks see say of a body: how near it comes, and whether
+ * particles may have images by it. */
+static void gs4i_finish_surfaces(gs4_sim *sim, int collider)
+{
+    const gs4i_grid *g = &sim->grid;
+    const gs4i_patch *all = (const gs4i_patch *)sim->image_particles.patches.all.data;
+    const gs4_real h = g->h;
+    gs4i_surface *surface = (gs4i_surface *)sim->image_particles.patches.surfaces.data
+                            + (size_t)collider * (size_t)g->occupied;
+    int o, i;
+    for (o = 0; o < g->occupied; o++, surface++) {
+        gs4_real bend[2] = { h, -h };
+        surface->nearest = surface->kind == GS4I_SURFACE_FLAT ? surface->d - GS4I_BLOCK_REACH * h
+                                                              : GS4I_IMAGE_REACH * h;
+        surface->has_images = surface->kind == GS4I_SURFACE_FLAT;
+        if (surface->kind != GS4I_SURFACE_CURVED) continue;
+        for (i = 0; i < 27; i++) {
+            const int patch = gs4i_patch_of(sim, collider, g->neighbour[27 * o + i]);
+            if (patch < 0) continue;
+            surface->nearest = gs4i_min(surface->nearest, all[patch].nearest);
+            bend[0] = gs4i_min(bend[0], all[patch].bend[0]);
+            bend[1] = gs4i_max(bend[1], all[patch].bend[1]);
+        }
+        surface->has_images = surface->nearest < GS4I_IMAGE_REACH * h
+                              && bend[0] < GS4I_IMAGE_BEND * h && bend[1] > -GS4I_IMAGE_BEND * h;
+    }
+}
+
 /* The patches of all sticky bodies; those of bodies at rest are made anew where blocks or bodies
  * have changed. */
 static int gs4i_sample_patches(gs4_sim *sim)
 {
     gs4i_patches *p = &sim->image_particles.patches;
     const int hold = gs4i_patches_hold(sim), kept = hold ? p->still : 0;
-    const size_t nodes = GS4I_BLOCK_NODES * sizeof(gs4_real);
+    const size_t nodes = GS4I_BLOCK_NODES * sizeof(gs4_real),
+                 surfaces = (size_t)sim->boundary.collider_count * (size_t)sim->grid.occupied
+                            * sizeof(gs4i_surface);
     gs4i_pass pass;
     int i, moving;
     p->collider_count = -1;
@@ -11647,7 +11714,8 @@ static int gs4i_sample_patches(gs4_sim *sim)
     p->count = kept;
     if (!gs4i_scratch_reserve(
             &sim->memory, &p->of,
-            (size_t)sim->boundary.collider_count * (size_t)p->active * sizeof(int32_t), 0))
+            (size_t)sim->boundary.collider_count * (size_t)p->active * sizeof(int32_t), 0)
+        || !gs4i_scratch_reserve(&sim->memory, &p->surfaces, surfaces, hold ? surfaces : 0))
         return gs4i_fail_memory(&sim->error);
     if (!hold)
         memset(p->of.data, 0,
@@ -11670,7 +11738,60 @@ static int gs4i_sample_patches(gs4_sim *sim)
     pass.count = kept;
     gs4i_parallel_for(&sim->tasks, p->count - kept, gs4i_sample_distances, &pass);
     gs4i_parallel_for(&sim->tasks, p->count - kept, gs4i_sample_patch, &pass);
+    for (i = 0; i < sim->boundary.collider_count; i++)
+        if (gs4i_is_sticky(&sim->boundary.colliders[i])
+            && (!hold || gs4i_is_moving(&sim->boundary.colliders[i])))
+            gs4i_finish_surfaces(sim, i);
     return sim->bad_distance ? GS4_OK : gs4i_keep_patches(sim);
+}
+
+/* Does the node nearest to a particle, `away` from it in cells, say that it is outside of a body?
+ * `node` is its number in the tile of occupied block o. A distance that grows by the way alone
+ * would be known by that; half as much again (chosen) forgives functions that are no true
+ * distances. */
+static int gs4i_is_outside(const gs4_sim *sim, int collider, int o, int node, gs4_real away2)
+{
+    const gs4_real sure = GS4I_C(1.5) * sim->grid.h,
+                   d = gs4i_tile_distance(sim, collider, o, node) - GS4I_C(0.01) * sim->grid.h;
+    return d > 0 && d * d > sure * sure * away2;
+}
+
+/* Which of n particles of occupied block o are inside of a sticky body where they ended, at x? A
+ * bit each. Bodies are asked only where their patches do not know. */
+static unsigned gs4i_ended_inside(const gs4_sim *sim, int o, const gs4_real *x, int n)
+{
+    const gs4_real h = sim->grid.h;
+    const gs4i_frame frame = gs4i_tile_frame(&sim->grid, sim->grid.occupied_block[o]);
+    gs4i_lanes at[4], away2;
+    gs4i_stencils s;
+    unsigned inside = 0;
+    int i, b;
+    gs4i_to_lanes(x, n, at);
+    gs4i_stencils_at(&s, &frame, at);
+    GS4I_BATCH_LOOP(b)
+        away2[b] = s.xi[0][b] * s.xi[0][b] + s.xi[1][b] * s.xi[1][b] + s.xi[2][b] * s.xi[2][b];
+    for (i = 0; i < sim->boundary.collider_count; i++) {
+        const gs4i_collider *body = &sim->boundary.colliders[i];
+        const gs4i_surface *surface;
+        int far;
+        if (!gs4i_is_sticky(body)) continue;
+        surface = gs4i_surface_of(sim, i, o);
+        far = !(surface->nearest < GS4I_C(1.32) * h); /* 1.5 sqrt(3)/2, and more */
+        for (b = 0; b < n; b++) {
+            const gs4_vec3 p = gs4i_vec3(x[4 * b], x[4 * b + 1], x[4 * b + 2]);
+            if (s.base[b] >= 0
+                && (far
+                    || (surface->kind == GS4I_SURFACE_FLAT
+                            ? surface->d + gs4i_dot(surface->n, gs4i_sub(p, surface->at))
+                                  > GS4I_C(0.01) * h
+                            : gs4i_is_outside(sim, i, o,
+                                              s.base[b] + 1 + GS4I_TILE + GS4I_TILE * GS4I_TILE,
+                                              GS4I_NTH(away2, b)))))
+                continue;
+            if (gs4i_collider_distance(body, p) < 0) inside |= 1u << b;
+        }
+    }
+    return inside;
 }
 
 /* What the patches of a body have around occupied block o, as a tile. */
@@ -11699,14 +11820,22 @@ static void gs4i_load_patches(const gs4_sim *sim, int collider, int o, gs4_real 
     memset(tile, 0, 16 * sizeof *tile);
 }
 
+/* The least distance of the 27 nodes from each node of a tile on: no particle that sees them is
+ * nearer, as weights are positive. */
+static void gs4i_find_least(const gs4_real *tile, gs4_real *least)
+{
+    const int nodes = GS4I_TILE * GS4I_TILE * GS4I_TILE;
+    int apart, i;
+    for (i = 0; i < nodes; i++) least[i] = tile[4 * i];
+    for (apart = 1; apart < nodes; apart *= GS4I_TILE)
+        for (i = 0; i < nodes - 2 * apart; i++)
+            least[i] = gs4i_min(least[i], gs4i_min(least[i + apart], least[i + 2 * apart]));
+}
+
 /* A particle is near body number `collider`, by what it has of the numbers of a patch. */
-static void gs4i_meet_particle(const gs4_sim *sim, int collider, const gs4_real four[4], gs4_vec3 n,
+static void gs4i_meet_particle(int collider, const gs4_real four[4], gs4_vec3 n,
                                gs4i_near_particle *g)
 {
-    const gs4_real h = sim->grid.h,
-                   /* thin bodies lie between nodes */
-        error = gs4i_abs(four[1]) < GS4I_IMAGE_BEND * h ? GS4I_IMAGE_BEND * h : h;
-    g->room = gs4i_min(g->room, four[0] - error);
     if (!(four[0] < g->d)) return;
     g->d = four[0];
     g->bend = four[1];
@@ -11723,13 +11852,15 @@ static void gs4i_meet_body(const gs4_sim *sim, int collider, int o, gs4i_near_pa
     const gs4i_grid *grid = &sim->grid;
     const gs4i_frame frame = gs4i_tile_frame(grid, grid->occupied_block[o]);
     const gs4_real deep = GS4I_IMAGE_NODES * grid->h;
-    gs4_real tile[GS4I_TILE_REALS];
-    gs4i_face face;
+    const gs4i_surface *surface = gs4i_surface_of(sim, collider, o);
+    const gs4_real reach = GS4I_IMAGE_REACH * grid->h;
+    gs4_real tile[GS4I_TILE_REALS], least[GS4I_TILE * GS4I_TILE * GS4I_TILE];
     size_t i = (size_t)grid->first[o], end = (size_t)grid->first[o + 1];
-    const int kind =
-        gs4i_find_face(grid, &sim->boundary.colliders[collider], grid->occupied_block[o], &face);
-    if (kind == GS4I_SURFACE_FAR) return;
-    if (kind == GS4I_SURFACE_CURVED) gs4i_load_patches(sim, collider, o, tile);
+    if (surface->kind == GS4I_SURFACE_FAR || !(surface->nearest < reach)) return;
+    if (surface->kind == GS4I_SURFACE_CURVED) {
+        gs4i_load_patches(sim, collider, o, tile);
+        gs4i_find_least(tile, least);
+    }
     for (; i < end; i += GS4I_BATCH) {
         const int n = gs4i_batch_size(i, end);
         gs4i_batch q;
@@ -11745,19 +11876,20 @@ static void gs4i_meet_body(const gs4_sim *sim, int collider, int o, gs4i_near_pa
             gs4_vec3 slope;
             g->base = s.base[b];
             if (g->base < 0) continue; /* it will be sorted first */
-            if (kind == GS4I_SURFACE_FLAT) {
+            if (surface->kind == GS4I_SURFACE_FLAT) {
                 const gs4_vec3 p =
                     gs4i_vec3(GS4I_NTH(x[0], b), GS4I_NTH(x[1], b), GS4I_NTH(x[2], b));
-                u.value[0] = face.d + gs4i_dot(face.n, gs4i_sub(p, face.at));
+                u.value[0] = surface->d + gs4i_dot(surface->n, gs4i_sub(p, surface->at));
                 u.value[1] = u.value[0] > -deep ? GS4I_C(0) : grid->h;
                 u.value[2] = 0;
-                gs4i_meet_particle(sim, collider, u.value, face.n, g);
+                gs4i_meet_particle(collider, u.value, surface->n, g);
                 continue;
             }
+            if (!(least[g->base] < reach)) continue;
             gs4i_x_weights(&s, b, &w, &dw);
             gs4i_gather_local(tile + 4 * s.base[b], &s, b, &w, &dw, &u);
             slope = gs4i_vec3(u.dx[4 * b], u.dy[4 * b], u.dz[4 * b]);
-            gs4i_meet_particle(sim, collider, u.value + 4 * b, slope, g);
+            gs4i_meet_particle(collider, u.value + 4 * b, slope, g);
         }
     }
 }
@@ -11782,8 +11914,8 @@ static int gs4i_slot_of_image(const gs4i_grid *grid, const gs4i_near_particle *g
 }
 
 /* Has a particle at p an image? It can be had where the body is flat and thick enough: a point one
- * and a half cells behind the surface is as deep in the body, within a quarter of a cell. It is 0
- * then for now. */
+ * and a half cells behind the surface is as deep in the body, within a quarter of a cell. `image`
+ * is the image's slot then for now. */
 static void gs4i_seek_image(const gs4i_grid *grid, gs4_vec3 p, gs4i_near_particle *g)
 {
     const gs4_real h = grid->h, length = gs4i_length(gs4i_vec3(g->n[0], g->n[1], g->n[2]));
@@ -11792,7 +11924,7 @@ static void gs4i_seek_image(const gs4i_grid *grid, gs4_vec3 p, gs4i_near_particl
     if (g->body < 0 || !(length > 0)) return;
     for (c = 0; c < 3; c++) g->n[c] *= 1 / length;
     if (g->d > -GS4I_C(0.5) * h && gs4i_abs(g->bend) < GS4I_IMAGE_BEND * h) {
-        if (gs4i_slot_of_image(grid, g, p) >= 0) g->image = 0;
+        g->image = gs4i_slot_of_image(grid, g, p); /* -1: there are no nodes */
     } else if (g->d < (GS4I_STICKY_REACH + GS4I_IMAGE_NODES) * h)
         /* farther away it sees next to nothing of nodes that would be held */
         g->image = GS4I_HOLDS_NODES;
@@ -11828,7 +11960,7 @@ static void gs4i_find_near_particles(int index, void *context)
     *count = 0;
     if (!g) return;
     for (k = 0; k < (int)(end - i); k++) {
-        g[k].d = g[k].room = GS4I_IMAGE_REACH * grid->h;
+        g[k].d = GS4I_IMAGE_REACH * grid->h;
         g[k].body = g[k].base = -1;
     }
     for (k = 0; k < sim->boundary.collider_count; k++)
@@ -11842,8 +11974,6 @@ static void gs4i_find_near_particles(int index, void *context)
         gs4i_predict_positions(&q, sim->integrator.prediction, x);
         for (b = 0; b < n; b++, g++) {
             const gs4_vec3 at = gs4i_vec3(GS4I_NTH(x[0], b), GS4I_NTH(x[1], b), GS4I_NTH(x[2], b));
-            g->room -= gs4i_length(gs4i_sub(
-                at, gs4i_vec3(GS4I_NTH(q.x[0], b), GS4I_NTH(q.x[1], b), GS4I_NTH(q.x[2], b))));
             gs4i_seek_image(grid, at, g);
             *count += g->image >= 0;
         }
@@ -11886,7 +12016,7 @@ static void gs4i_place_image_particle(const gs4_sim *sim, gs4_vec3 p,
     g->share = gs4i_max(gs4i_min(GS4I_IMAGE_NODES - d * sim->grid.inv_h, 1), 0);
     g->part = gs4i_image_part(near);
     g->whole = 0;
-    g->slot = gs4i_slot_of_image(&sim->grid, near, p);
+    g->slot = near->image;
 }
 
 /* Columns of spin x (I - n n), how the body's velocity changes along its surface. */
@@ -11943,9 +12073,9 @@ static void gs4i_place_image_particles(int index, void *context)
         gs4i_predict_positions(&q, sim->integrator.prediction, x);
         for (b = 0; b < n; b++, near++) {
             if (near->image < 0) continue;
-            near->image = number++;
             gs4i_place_image_particle(
                 sim, gs4i_vec3(GS4I_NTH(x[0], b), GS4I_NTH(x[1], b), GS4I_NTH(x[2], b)), near, g);
+            near->image = number++;
             g->x[3] = g->part * GS4I_NTH(q.x[3], b);
             memset(g->carried, 0, sizeof g->carried);
             for (c = 0; c < 3; c++)
@@ -11991,25 +12121,25 @@ static int gs4i_sort_image_particles(gs4_sim *sim)
     return GS4_OK;
 }
 
-/* Count the particles of blocks near sticky bodies. */
+/* Count the particles of blocks near sticky bodies, if any in the scene may have images. */
 static int gs4i_count_near_particles(gs4_sim *sim)
 {
     const gs4i_grid *grid = &sim->grid;
     gs4i_image_particles *g = &sim->image_particles;
-    gs4i_face face;
     int32_t *of = (int32_t *)gs4i_scratch_reserve(&sim->memory, &g->of,
                                                   (size_t)grid->occupied * sizeof *of, 0);
-    int i, o;
+    int i, o, has_images = 0;
     if (!of) return gs4i_fail_memory(&sim->error);
     for (o = 0; o < grid->occupied; o++) {
         of[o] = -1;
-        for (i = 0; i < sim->boundary.collider_count && of[o] < 0; i++)
-            if (gs4i_is_sticky(&sim->boundary.colliders[i])
-                && gs4i_find_face(grid, &sim->boundary.colliders[i], grid->occupied_block[o], &face)
-                       != GS4I_SURFACE_FAR)
-                of[o] = g->near;
+        for (i = 0; i < sim->boundary.collider_count; i++) {
+            if (!gs4i_is_sticky(&sim->boundary.colliders[i])) continue;
+            has_images |= gs4i_surface_of(sim, i, o)->has_images;
+            if (gs4i_surface_of(sim, i, o)->kind != GS4I_SURFACE_FAR) of[o] = g->near;
+        }
         if (of[o] >= 0) g->near += grid->first[o + 1] - grid->first[o];
     }
+    if (!has_images) g->near = 0;
     return GS4_OK;
 }
 
@@ -12420,12 +12550,12 @@ static void gs4i_reflect_affine(const gs4i_near_particles *near, int n, const gs
 static void gs4i_free_image_particles(gs4i_memory *m, gs4i_image_particles *g)
 {
     gs4i_patches *p = &g->patches;
-    gs4i_scratch *const parts[13] = { &g->of_particles, &g->first_of, &g->all,   &g->of,
+    gs4i_scratch *const parts[14] = { &g->of_particles, &g->first_of, &g->all,   &g->of,
                                       &g->order,        &g->first,    &g->slots, &p->of,
                                       &p->all,          &p->distance, &p->nodes, &p->colliders,
-                                      &p->blocks };
+                                      &p->blocks,       &p->surfaces };
     int i;
-    for (i = 0; i < 13; i++) gs4i_free(m, parts[i]->data, parts[i]->bytes, 1);
+    for (i = 0; i < 14; i++) gs4i_free(m, parts[i]->data, parts[i]->bytes, 1);
     memset(g, 0, sizeof *g);
 }
 
@@ -12677,7 +12807,7 @@ static int gs4i_set_velocities(gs4_sim *sim, gs4i_node_pass *nodes)
     if (gs4i_place_jumps(&sim->memory, &sim->boundary, &sim->grid) != GS4_OK)
         return gs4i_fail_memory(&sim->error);
     gs4i_parallel_for(&sim->tasks, groups, gs4i_clear_jumps, nodes);
-    if (sim->image_particles.near) gs4i_scatter(sim, gs4i_mark_lacking_images);
+    if (sim->image_particles.count) gs4i_scatter(sim, gs4i_mark_lacking_images);
     gs4i_scatter_image_particles(sim, sim->particles.with_rates && !sim->particles.deformation_reals
                                           ? gs4i_scatter_image_momentum
                                           : gs4i_scatter_image_affine);
@@ -13157,30 +13287,20 @@ static int gs4i_may_touch(const gs4i_boundary *b, const gs4_real *x, int n, gs4_
     return 0;
 }
 
-/* May a particle that was at `from` be in a sticky body at x? */
-GS4I_INLINE int gs4i_may_stick(const gs4i_near_particle *g, const gs4_real *from, const gs4_real *x)
-{
-    const gs4_vec3 moved = gs4i_vec3(x[0] - from[0], x[1] - from[1], x[2] - from[2]);
-    return !(g->room > 0 && gs4i_dot(moved, moved) < g->room * g->room);
-}
-
 /* Walls, colliders and emitters on each particle after the step. */
-static void gs4i_correct_contact(gs4_sim *sim, size_t i, int n, const gs4i_near_particle *near,
-                                 gs4i_stored *o, gs4i_gathered *L, gs4i_report *report)
+static void gs4i_correct_contact(gs4_sim *sim, int block, size_t i, int n, gs4i_stored *o,
+                                 gs4i_gathered *L, gs4i_report *report)
 {
     gs4_real *elastic = sim->particles.elastic_reals
                             ? sim->particles.elastic + (size_t)sim->particles.elastic_reals * i
                             : NULL;
-    const int touches =
-        gs4i_may_touch(&sim->boundary, o->x, n, sim->grid.h, sim->desc.scheme != GS4_EXPLICIT);
+    const int sampled = sim->desc.scheme == GS4_EXPLICIT,
+              touches = gs4i_may_touch(&sim->boundary, o->x, n, sim->grid.h, !sampled);
+    const unsigned inside = sampled ? gs4i_ended_inside(sim, block, o->x, n) : 0;
     int b;
     for (b = 0; b < n; b++) {
         const gs4i_collider *emitter;
-        if (!touches && gs4i_is_in_domain(&sim->grid, o->x + 4 * b)
-            && !(near
-                 && gs4i_may_stick(near + b, sim->particles.position + 4 * (i + (size_t)b),
-                                   o->x + 4 * b)))
-            continue;
+        if (!touches && !(inside >> b & 1) && gs4i_is_in_domain(&sim->grid, o->x + 4 * b)) continue;
         gs4i_put_back(&sim->boundary, &sim->grid, o->x + 4 * b, o->v + 4 * b);
         emitter = gs4i_hold_in_emitter(&sim->boundary, o->x + 4 * b, o->v + 4 * b);
         if (emitter) {
@@ -13399,7 +13519,7 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_heat
         }
         if (heat) gs4i_gather_heat(&r, &s, k.L, heat);
         gs4i_pack_batch(&q, 1, &out);
-        if (edge) gs4i_correct_contact(sim, i, n, near.particle, &out, &u, report);
+        if (edge) gs4i_correct_contact(sim, o, i, n, &out, &u, report);
         if (near.particle) near.particle += n;
         gs4i_see_motion(&r.seen, q.v, k.L);
         gs4i_store_batch(&p, i, n, &out);
@@ -13634,7 +13754,7 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, gs4i
         }
         if (heat) gs4i_gather_heat(&r, &s, C, heat);
         gs4i_pack_batch(&q, 0, &out);
-        if (edge) gs4i_correct_contact(sim, i, n, near.particle, &out, &u, report);
+        if (edge) gs4i_correct_contact(sim, o, i, n, &out, &u, report);
         if (near.particle) near.particle += n;
         gs4i_see_motion(&r.seen, q.v, C);
         gs4i_store_batch(&p, i, n, &out);
@@ -15368,7 +15488,7 @@ static void gs4i_correct_from_faces(const gs4i_pass *pass, int index, int commit
         }
         if (heat) gs4i_gather_heat(&r, &s[0], k.L, heat);
         gs4i_pack_batch(&q, 1, &out);
-        gs4i_correct_contact(sim, i, n, NULL, &out, &slope, report);
+        gs4i_correct_contact(sim, o, i, n, &out, &slope, report);
         gs4i_see_motion(&r.seen, q.v, k.L);
         gs4i_store_batch(&p, i, n, &out);
         gs4i_store_affine(&p, i, n, &slope, integrator.restart);

@@ -288,8 +288,11 @@
  * COLLIDERS. Sticky ones act by image particles, second order in space where particles fill the
  * space up to the surface. A filling that leaves out half a row puts the wall up to 0.8 cells
  * behind it (tests: couette). Where they are thinner than 3 cells or as crooked as that, they hold
- * nodes up to 3/4 of a cell before the surface, to first order. Where another sticky body or wall
- * is within 3 cells they hold only nodes inside, so that liquid between can get out of the way.
+ * nodes up to 3/4 of a cell before the surface, to first order: liquid spins down in such a pipe as
+ * in one narrower by 3/4 to 1 cell (tests: sticky_pipe). A layer at the surface that is much
+ * thinner than a cell takes half a cell to a cell more, whatever holds it. Where another sticky
+ * body or wall is within 3 cells they hold only nodes inside, so that liquid between can get out of
+ * the way.
  * Of slip and separate ones nodes inside lose the inward relative normal part (separate with
  * Coulomb friction, which brings what it can hold to rest in one to two steps). What a collider
  * takes from a node at once is a jump: it goes to the velocities of particles, not into their

@@ -1179,7 +1179,7 @@ static void test_phase_melting(void)
             printf("mean height %.3f solid, %.3f molten, %.3f and %.3f frozen\n", height[0],
                    height[1], height[2], height[3]);
         CHECK_CLOSE(height[0], 0.25, 0.03);
-        CHECK(height[1] < 0.15);
+        CHECK_BETWEEN(height[1], 0.0385, 0.07); /* all over the floor: 0.04 */
         CHECK(fabs(height[3] - height[2]) < 0.03);
         F = gs4_particles(sim, GS4_FIELD_DEFORMATION);
         CHECK(F.components == 9);
@@ -1275,7 +1275,7 @@ static void test_phase_forgets(void)
             printf("largest stress %.4g, frozen %.4g, molten %.4g\n", most[0], most[1], most[2]);
         CHECK(most[0] > 0);
         CHECK(most[1] == 0);
-        CHECK(most[2] < 0.15 * most[0]); /* of one step, not of 20 */
+        CHECK_BETWEEN(most[2] / most[0], 0.03, 0.1); /* of one step, not of 20 */
         gs4_destroy(sim);
     }
 }

@@ -16147,7 +16147,7 @@ static gs4_real gs4i_lone_waves(const gs4_sim *sim, const gs4_material *m)
                  h = (double)sim->grid.h;
     const double cell = h * h * h, mass = fmin((double)sim->max_mass, (double)m->density * cell),
                  node = gs4i_extreme_density(sim, -1) * cell;
-    if (!sim->particles.with_rates || !(mass > 0)) return 1;
+    if (sim->desc.scheme != GS4_EXPLICIT || !sim->particles.with_rates || !(mass > 0)) return 1;
     return GS4I_C(fmax(1, most / (1 + (most - 1) * node / mass)));
 }
 
@@ -16159,9 +16159,8 @@ static void gs4i_set_constants(gs4_sim *sim)
         const double c0 =
             gs4i_sound_speed_of(&sim->desc, &l->is, sim->top_speed, gs4i_extreme_density(sim, 1));
         l->sound_speed = l->tait = l->compliance = 0;
-        l->lone = 1;
+        l->lone = gs4i_lone_waves(sim, &l->is);
         if (sim->desc.scheme == GS4_EXPLICIT) {
-            l->lone = gs4i_lone_waves(sim, &l->is);
             l->sound_speed = GS4I_C(c0);
             l->tait = gs4i_tait_of(&l->is, c0);
         } else if (!l->is.incompressible)
@@ -16434,11 +16433,13 @@ static void gs4i_fill_one(gs4_sim *sim, const gs4_real at[3], gs4_vec3 centre, c
     const gs4_real C[3][4] = { { 0, w.z, -w.y, 0 }, { -w.z, 0, w.x, 0 }, { w.y, -w.x, 0, 0 } };
     const size_t i = (size_t)sim->particles.count;
     const gs4_vec3 v = gs4i_add(f->velocity, gs4i_cross(w, gs4i_sub(x, centre)));
+    /* the next step finds C from 0: see gs4i_find_affine */
+    const int is_found = sim->needs_spin && sim->particles.with_affine_before;
     int k;
     if (!gs4i_add_particle(sim, x, v, mass, f)) return;
-    for (k = 0; k < 3 && sim->particles.affine[k]; k++)
+    for (k = 0; k < 3 && sim->particles.affine[k] && !is_found; k++)
         memcpy(sim->particles.affine[k] + 4 * i, C[k], sizeof C[k]);
-    for (k = 0; k < 3 && sim->particles.affine_before[k]; k++)
+    for (k = 0; k < 3 && sim->particles.affine_before[k] && !is_found; k++)
         memcpy(sim->particles.affine_before[k] + 4 * i, C[k], sizeof C[k]);
     if (sim->particles.deformation_reals && !sim->needs_spin)
         gs4i_set_spin(&sim->particles, i,
@@ -17811,14 +17812,16 @@ static void gs4i_finish(gs4_sim *sim)
  * forgets it again. */
 static void gs4i_forget_spin(gs4_sim *sim)
 {
-    const size_t bytes = 4 * (size_t)sim->particles.count * sizeof(gs4_real);
-    int i;
-    for (i = 0; i < 3 && sim->particles.with_affine_before && sim->particles.count; i++) {
-        memset(sim->particles.affine[i], 0, bytes);
-        memset(sim->particles.affine_before[i], 0, bytes);
-    }
-    for (i = 0; i < sim->particles.count && sim->particles.deformation_reals; i++)
-        gs4i_set_spin(&sim->particles, (size_t)i, gs4i_vec3(0, 0, 0));
+    const gs4i_particles *p = &sim->particles;
+    size_t i;
+    int k;
+    for (i = 0; i < (size_t)p->count && p->with_affine_before; i++)
+        for (k = 0; k < 3; k++) { /* the fourth of them is the pressure */
+            memset(p->affine[k] + 4 * i, 0, 3 * sizeof(gs4_real));
+            memset(p->affine_before[k] + 4 * i, 0, 3 * sizeof(gs4_real));
+        }
+    for (i = 0; i < (size_t)p->count && p->deformation_reals; i++)
+        gs4i_set_spin(&sim->particles, i, gs4i_vec3(0, 0, 0));
 }
 
 static int gs4i_find_spin(gs4_sim *sim, gs4i_node_pass *nodes)
@@ -18637,6 +18640,16 @@ static int gs4i_motions_are_sound(const gs4i_head *h, const gs4i_pieces *p)
     return 1;
 }
 
+/* Is F that of a particle whose volume ratio is J? det F = J, but for the rounding of F, which F
+ * that stretches by 512 and presses by as much makes 2e-2 of it in float. */
+static int gs4i_deformation_is_sound(const gs4_real *F, double J)
+{
+    double one[3][3];
+    int i;
+    for (i = 0; i < 9; i++) one[i / 3][i % 3] = (double)F[i];
+    return fabs(gs4i_determinant(one) - J) <= 0.1 * J;
+}
+
 /* Of particle i. */
 static int gs4i_particle_is_sound(const gs4_sim *sim, const gs4i_head *h, size_t i)
 {
@@ -18661,7 +18674,9 @@ static int gs4i_particle_is_sound(const gs4_sim *sim, const gs4i_head *h, size_t
         sound &= gs4i_are_sane(p->elastic + (size_t)p->elastic_reals * i, 6)
                  && gs4i_are_rates(p->elastic + (size_t)p->elastic_reals * i, p->elastic_reals);
     if (p->deformation_reals)
-        sound &= gs4i_are_sane(p->deformation + (size_t)p->deformation_reals * i, 9)
+        sound &= gs4i_deformation_is_sound(p->deformation + (size_t)p->deformation_reals * i,
+                                           (double)v[3])
+                 && gs4i_are_sane(p->deformation + (size_t)p->deformation_reals * i, 9)
                  && gs4i_are_rates(p->deformation + (size_t)p->deformation_reals * i,
                                    p->deformation_reals);
     if (p->with_heat)

@@ -1137,7 +1137,7 @@ static void files_sign(gs4_sim *sim, unsigned char *data)
 static void files_forge(gs4_sim *to, unsigned char *data, size_t whole, size_t where,
                         const void *with, size_t bytes, const char *what)
 {
-    unsigned char before[8], checksum[8];
+    unsigned char before[24], checksum[8];
     memcpy(before, data + where, bytes);
     memcpy(checksum, data + whole - 8, 8);
     memcpy(data + where, with, bytes);
@@ -1154,6 +1154,7 @@ static void test_files_forged(void)
     const gs4_real bad[] = { (gs4_real)ERR_NAN, (gs4_real)ERR_INFINITY, (gs4_real)-ERR_INFINITY };
     const double wrong[] = { ERR_NAN, ERR_INFINITY, -1e200 };
     const gs4_real far_away = (gs4_real)1e9;
+    gs4_real flat[3];
     const uint8_t seven = 7;
     int euler;
     for (euler = 0; euler < 2; euler++) {
@@ -1197,6 +1198,11 @@ static void test_files_forged(void)
                     "mass");
         files_forge(to, data, bytes, at[3 + 4] + 3 * sizeof far_away, &far_away, sizeof far_away,
                     "J");
+        memset(flat, 0, sizeof flat); /* det F = 0, and -J */
+        files_forge(to, data, bytes, at[3 + 14], flat, sizeof flat, "flat");
+        memcpy(flat, data + at[3 + 14], sizeof flat);
+        for (i = 0; i < 3; i++) flat[i] = -flat[i];
+        files_forge(to, data, bytes, at[3 + 14], flat, sizeof flat, "mirrored");
         files_forge(to, data, bytes, at[3 + 8], &seven, 1, "material");
         files_forge(to, data, bytes, at[3 + 13], &seven, 1, "liquid");
         for (v = 0; v < 6 && !euler; v++) /* and in the lane of mass */

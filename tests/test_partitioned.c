@@ -847,6 +847,63 @@ static void test_partitioned_refusals(void)
     gs4_destroy(sim);
 }
 
+/* After an edit of velocities, a filling that spins and a step that is refused, all is as it was:
+ * pressures of particles, too. */
+static void test_partitioned_refused_step(void)
+{
+    const gs4_sim_desc d = partitioned_cube(12);
+    const gs4_material m = partitioned_liquid(1);
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    double before[8 * 12 * 12 * 12], after[8 * 12 * 12 * 12];
+    gs4_sim *sim;
+    uint64_t hash;
+    int i, count;
+    f.angular_velocity = at(0, 0, 1);
+    CHECK_RESULT(NULL, gs4_create(&d, &sim), GS4_OK);
+    CHECK_RESULT(sim, gs4_add_material(sim, &m), 0);
+    CHECK_RESULT(sim, gs4_set_gravity(sim, at(0, -10, 0)), GS4_OK);
+    CHECK(gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(0.5, 0.5, 1)), &f) > 0);
+    partitioned_steps(sim, 0.02, 10);
+    CHECK(gs4_edit_particles(sim, GS4_FIELD_VELOCITY).count > 0);
+    CHECK(gs4_add_particles(sim, gs4_box(at(0.75, 0.5, 0.25), at(1, 1, 0.75)), &f) > 0);
+    hash = gs4_state_hash(sim);
+    scene_by_id(sim, GS4_FIELD_PRESSURE, before);
+    CHECK(gs4_step(sim, 1000 * gs4_stable_dt(sim)) < 0);
+    CHECK(gs4_state_hash(sim) == hash);
+    /* found unstable within the step */
+    sim->desc.solver_tolerance = (gs4_real)1e-12;
+    sim->desc.solver_max_iterations = 1;
+    CHECK(gs4_step(sim, gs4_stable_dt(sim)) < 0);
+    CHECK(gs4_state_hash(sim) == hash);
+    scene_by_id(sim, GS4_FIELD_PRESSURE, after);
+    count = gs4_particles(sim, GS4_FIELD_PRESSURE).count;
+    for (i = 0; i < count; i++) CHECK(before[i] == after[i]);
+    CHECK(before[0] > 1000);
+    gs4_destroy(sim);
+}
+
+/* The steps of a heavy solid are h/(2 c), c^2 = G/rho, also among light liquid: there is no sound
+ * for which single heavy particles would swing faster. */
+static void test_partitioned_heavy(void)
+{
+    const gs4_sim_desc d = partitioned_cube(16);
+    const double limit = 0.5 / 16 / 10;
+    gs4_material light = scene_liquid(1, 0, 0), heavy = partitioned_liquid(0);
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    gs4_sim *sim;
+    light.incompressible = 1;
+    heavy.solid = GS4_NEO_HOOKEAN;
+    heavy.shear_modulus = 100000;
+    CHECK_RESULT(NULL, gs4_create(&d, &sim), GS4_OK);
+    CHECK_RESULT(sim, gs4_add_material(sim, &light), 0);
+    CHECK_RESULT(sim, gs4_add_material(sim, &heavy), 1);
+    CHECK(gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(0.5, 0.5, 0.5)), &f) > 0);
+    f.material = 1;
+    CHECK(gs4_add_particles(sim, gs4_box(at(0, 0.75, 0), at(0.5, 1, 0.5)), &f) > 0);
+    CHECK_CLOSE(gs4_stable_dt(sim), limit, 1e-5 * limit);
+    gs4_destroy(sim);
+}
+
 /* A solve that does not converge is said, and the state stays: also what a first step finds. */
 static void test_partitioned_not_converged(void)
 {
@@ -890,4 +947,6 @@ static void run_partitioned(void)
     RUN(test_partitioned_bits);
     RUN(test_partitioned_not_converged);
     RUN(test_partitioned_refusals);
+    RUN(test_partitioned_refused_step);
+    RUN(test_partitioned_heavy);
 }

@@ -31,7 +31,7 @@
  *     }
  *
  * WHAT IT DOES NOT DO, YET. The semi-implicit scheme is declared and refused with a sentence; so
- * are, with the partitioned scheme, separating and periodic walls, and separating colliders.
+ * are, with the partitioned scheme, periodic walls and separating colliders.
  * It has no surface tension, no two-way coupling to colliders, no domain beyond
  * 3992^3 cells.
  *
@@ -254,7 +254,10 @@
  * alone. At last positions move by dt u_c, div u_c = e U/h, e how much too full a cell is (at a
  * surface what is above a tenth), at most h/10: that keeps particles apart and gives no energy.
  * Sticky colliders hold the faces whose centres are inside, to first order; slippery ones close the
- * share of a face that is inside.
+ * share of a face that is inside. A separating wall holds what moves into it or pressed on it in
+ * the last step; where the solve finds that it would have to pull, it lets go, p is 0 on it, and
+ * what moves into it is held, at most three times a step, each a scatter and a solve more. What is
+ * held by its impact alone has theta = 1/2, with finite K too.
  *
  * Symplectic Euler, the fast tier: one affine scatter with stress and one gather (MLS-MPM, APIC),
  * first order.
@@ -10925,7 +10928,8 @@ typedef struct gs4i_staggered {
     gs4_real *open[3], *body[3];
     uint8_t *held[3]; /* faces that a sticky body or an emitter holds */
     uint8_t *known[3];
-    gs4_real *cell;                        /* quads, GS4I_CELL_FILL ... */
+    uint8_t *contact; /* of a cell, where something separates: a bit for each side; NULL else */
+    gs4_real *cell;   /* quads, GS4I_CELL_FILL ... */
     gs4_real *diagonal, *rhs, *pressure;   /* of [[poisson]] */
     int compressible;                      /* some K is finite */
     int is_safe;                           /* no particle needs a trial */
@@ -13833,6 +13837,7 @@ enum {
     GS4I_FACE_STAGE = 0,
     GS4I_FACE_ACCELERATION,
     GS4I_FACE_FEEDBACK,
+    GS4I_FACE_GUESS = GS4I_FACE_FEEDBACK, /* first u~ of what is held */
     GS4I_FACE_SEEN = GS4I_FACE_FEEDBACK,
     GS4I_FACE_CORRECTION
 };
@@ -13966,7 +13971,7 @@ static void gs4i_fit_staggered(gs4i_staggered *f, const gs4i_grid *g)
 }
 
 /* Its fields, the largest first; those of bodies and of stress only where there is some. */
-static void gs4i_take_staggered(gs4i_staggered *f, int bodies, int stress)
+static void gs4i_take_staggered(gs4i_staggered *f, int bodies, int stress, int separates)
 {
     gs4i_box *box = &f->box;
     const size_t real = sizeof(gs4_real);
@@ -13991,6 +13996,15 @@ static void gs4i_take_staggered(gs4i_staggered *f, int bodies, int stress)
         f->held[a] = bodies ? (uint8_t *)gs4i_box_take(box, 1) : NULL;
     }
     f->kind = (uint8_t *)gs4i_box_take(box, 1);
+    f->contact = separates ? (uint8_t *)gs4i_box_take(box, 1) : NULL;
+}
+
+/* Is there anything that material can leave? */
+static int gs4i_has_separating(const gs4_sim *sim)
+{
+    int i, any = 0;
+    for (i = 0; i < 6; i++) any |= sim->desc.walls[i] == GS4_WALL_SEPARATE;
+    return any;
 }
 
 /* What is scattered to, of a plane. */
@@ -14013,16 +14027,17 @@ static void gs4i_clear_staggered(int z, void *context)
 static int gs4i_begin_staggered(gs4_sim *sim)
 {
     gs4i_staggered *f = &sim->staggered;
-    const int bodies = sim->boundary.collider_count > 0, stress = gs4i_has_stress(sim);
+    const int bodies = sim->boundary.collider_count > 0, stress = gs4i_has_stress(sim),
+              separates = gs4i_has_separating(sim);
     /* per face of each axis: given, taken, seen, reach and force; per cell: 4 and 3 */
     const size_t bytes =
         (size_t)(3 * (4 + 4 + 2 + stress) + 4 + 3 + (bodies ? 9 : 0)) * sizeof(gs4_real)
-        + (bodies ? 7 : 4);
+        + (size_t)((bodies ? 7 : 4) + separates);
     int a;
     gs4i_fit_staggered(f, &sim->grid);
     if (gs4i_box_reserve(&sim->memory, &f->box, bytes) != GS4_OK)
         return gs4i_fail_memory(&sim->error);
-    gs4i_take_staggered(f, bodies, stress);
+    gs4i_take_staggered(f, bodies, stress, separates);
     gs4i_parallel_for(&sim->tasks, f->box.size[2] + 1, gs4i_clear_staggered, f);
     f->solver.memory = &sim->memory;
     f->solver.tasks = &sim->tasks;
@@ -14077,11 +14092,41 @@ static int gs4i_has_wall(const gs4_sim *sim, int side)
            && (side & 1 ? f->to[a] < f->box.size[a] : f->from[a] > 0);
 }
 
+/* The wall cell on a side, of the column where an entry `at` of a place is, or of that half a cell
+ * lower along `low` of the other axes; columns behind other walls are those that they mirror. */
+static size_t gs4i_wall_cell(const gs4_sim *sim, int side, const int at[3], int low)
+{
+    const gs4i_staggered *f = &sim->staggered;
+    int p[3], t;
+    for (t = 0; t < 3; t++) {
+        p[t] = at[t] - (low >> t & 1);
+        if (p[t] < f->from[t] && gs4i_has_wall(sim, 2 * t)) p[t] = 2 * f->from[t] - 1 - p[t];
+        if (p[t] >= f->to[t] && gs4i_has_wall(sim, 2 * t + 1)) p[t] = 2 * f->to[t] - 1 - p[t];
+        if (t == side / 2) p[t] = side & 1 ? f->to[t] - 1 : f->from[t];
+        p[t] = p[t] < 0 ? 0 : p[t] < f->box.size[t] ? p[t] : f->box.size[t] - 1;
+    }
+    return gs4i_box_index(&f->box, GS4I_AT_CELL, p[0], p[1], p[2]);
+}
+
+/* Does the wall on a side act on what is at an entry of a place? One that separates does where it
+ * is in contact. */
+static int gs4i_wall_holds(const gs4_sim *sim, int side, int place, const int at[3])
+{
+    const uint8_t *contact = sim->staggered.contact;
+    const int low = place & ~(1 << side / 2);
+    if (sim->desc.walls[side] != GS4_WALL_SEPARATE) return 1;
+    return ((contact[gs4i_wall_cell(sim, side, at, 0)]
+             | contact[gs4i_wall_cell(sim, side, at, low)])
+            >> side)
+           & 1;
+}
+
 /* One entry behind a wall: its index, that of its image and of the wall's own face. */
 typedef struct gs4i_face_mirror {
     size_t behind, image, wall;
     gs4_real parity;
     int is_normal; /* the component across the wall */
+    int holds;     /* 0: a wall that material has left */
 } gs4i_face_mirror;
 typedef void (*gs4i_mirror_fn)(gs4_real *field, const gs4i_face_mirror *m);
 
@@ -14113,6 +14158,7 @@ static void gs4i_mirror_plane(int index, void *context)
             one.image = gs4i_box_index(box, place, at[0], at[1], at[2]);
             at[a] = side & 1 ? f->to[a] : f->from[a];
             one.wall = one.is_normal ? gs4i_box_index(box, place, at[0], at[1], at[2]) : 0;
+            one.holds = gs4i_wall_holds(pass->sim, side, place, at);
             pass->fn(pass->field, &one);
         }
 }
@@ -14132,15 +14178,17 @@ static void gs4i_each_mirror(gs4_sim *sim, int place, gs4_real *field, gs4i_mirr
                               gs4i_mirror_plane, &pass);
 }
 
+/* What was scattered stays where a wall does not hold. */
 static void gs4i_fold_number(gs4_real *field, const gs4i_face_mirror *m)
 {
+    if (!m->holds) return;
     field[m->image] += m->parity * field[m->behind];
     field[m->behind] = 0;
 }
 static void gs4i_fold_given(gs4_real *field, const gs4i_face_mirror *m)
 {
     size_t k;
-    for (k = 0; k < 4; k++) {
+    for (k = 0; k < 4 && m->holds; k++) {
         field[4 * m->image + k] += (k <= GS4I_FACE_RATE ? m->parity : 1) * field[4 * m->behind + k];
         field[4 * m->behind + k] = 0;
     }
@@ -14149,18 +14197,24 @@ static void gs4i_fill_number(gs4_real *field, const gs4i_face_mirror *m)
 {
     field[m->behind] = m->parity * field[m->image];
 }
+static void gs4i_fill_given(gs4_real *field, const gs4i_face_mirror *m)
+{
+    if (m->holds) field[4 * m->behind] = m->parity * field[4 * m->image];
+}
 static void gs4i_fill_first(gs4_real *field, const gs4i_face_mirror *m)
 {
     field[4 * m->behind] = m->parity * field[4 * m->image];
+    if (m->is_normal && !m->holds) field[4 * m->behind] += 2 * field[4 * m->wall];
 }
-/* By their parity; but the feedback across a wall is not 0 on it, see gs4i_split_acceleration. */
+/* By their parity; but the feedback across a wall is not 0 on it, see gs4i_split_acceleration, and
+ * nothing is where material has left it: there they go on straight. */
 static void gs4i_fill_taken(gs4_real *field, const gs4i_face_mirror *m)
 {
     size_t k;
     for (k = 0; k < 4; k++) field[4 * m->behind + k] = m->parity * field[4 * m->image + k];
-    if (m->is_normal)
-        field[4 * m->behind + GS4I_FACE_ACCELERATION] +=
-            2 * field[4 * m->wall + GS4I_FACE_ACCELERATION];
+    for (k = 0; k < 4 && m->is_normal; k++)
+        if (k == GS4I_FACE_ACCELERATION || !m->holds)
+            field[4 * m->behind + k] += 2 * field[4 * m->wall + k];
 }
 
 /* The same for the faces of all axes. */
@@ -14532,6 +14586,15 @@ static gs4_real gs4i_surface_weight(gs4_real liquid, gs4_real air)
     return in / (in - out);
 }
 
+/* What a cell behind a side of the domain is that would be `kind`: solid where a wall holds, air
+ * where one has let go. */
+static uint8_t gs4i_kind_behind(const gs4_sim *sim, int side, const int at[3], uint8_t kind)
+{
+    if (sim->desc.walls[side] == GS4_WALL_OPEN) return kind;
+    if (gs4i_wall_holds(sim, side, GS4I_AT_CELL, at)) return GS4_CELL_SOLID;
+    return (uint8_t)(kind == GS4_CELL_SOLID ? GS4_CELL_SOLID : GS4_CELL_AIR);
+}
+
 /* Liquid where material fills more than half of the kernel. */
 static void gs4i_classify_cells(int z, void *context)
 {
@@ -14555,9 +14618,9 @@ static void gs4i_classify_cells(int z, void *context)
         f->diagonal[i] = q[GS4I_CELL_COMPLIANCE] / pass->sim->integrator.s;
         f->pressure[i] = 0;
         for (a = 0; a < 3; a++)
-            if ((at[a] < f->from[a] && pass->sim->desc.walls[2 * a] != GS4_WALL_OPEN)
-                || (at[a] >= f->to[a] && pass->sim->desc.walls[2 * a + 1] != GS4_WALL_OPEN))
-                f->kind[i] = GS4_CELL_SOLID;
+            if (at[a] < f->from[a] || at[a] >= f->to[a])
+                f->kind[i] =
+                    gs4i_kind_behind(pass->sim, 2 * a + (at[a] >= f->to[a]), at, f->kind[i]);
     }
 }
 
@@ -14575,6 +14638,7 @@ GS4I_INLINE void gs4i_hold_face(gs4i_staggered *f, int c, size_t face, gs4_real 
                                 gs4_real acceleration)
 {
     f->known[c][face] = GS4I_FACE_AT_WALL;
+    f->taken[c][4 * face + GS4I_FACE_GUESS] = f->taken[c][4 * face + GS4I_FACE_STAGE];
     f->taken[c][4 * face + GS4I_FACE_STAGE] = velocity;
     f->taken[c][4 * face + GS4I_FACE_ACCELERATION] = acceleration;
 }
@@ -14590,8 +14654,10 @@ static void gs4i_classify_face(const gs4_sim *sim, gs4i_staggered *f, int c, con
     int kind, kind_before;
     f->reach[c][i] = 0;
     if (at[c] == 0 || at[c] == box->size[c]) return;
-    if ((at[c] == f->from[c] && gs4i_has_wall(sim, 2 * c))
-        || (at[c] == f->to[c] && gs4i_has_wall(sim, 2 * c + 1))) {
+    if ((at[c] == f->from[c] && gs4i_has_wall(sim, 2 * c)
+         && gs4i_wall_holds(sim, 2 * c, 1 << c, at))
+        || (at[c] == f->to[c] && gs4i_has_wall(sim, 2 * c + 1)
+            && gs4i_wall_holds(sim, 2 * c + 1, 1 << c, at))) {
         gs4i_hold_face(f, c, i, 0, 0);
         return;
     }
@@ -14825,8 +14891,149 @@ static int gs4i_project(gs4_sim *sim, int what)
     pass.sim = sim;
     pass.what = what;
     gs4i_parallel_for(&sim->tasks, f->box.size[2], gs4i_pressure_rhs, &pass);
-    if (what == GS4I_FACE_STAGE) GS4I_TRY(gs4i_check_inflow(sim));
+    /* what can let go is looked at when it has */
+    if (what == GS4I_FACE_STAGE && !f->contact) GS4I_TRY(gs4i_check_inflow(sim));
     return gs4i_solve_pressure(sim, &pass);
+}
+
+/* --- what separates --------------------------------------------------------------------------- */
+
+/* A column of cells at a wall that separates: its last cell, the wall's face there, the node
+ * behind. */
+typedef struct gs4i_wall_column {
+    size_t cell, face;
+    int node[3];
+} gs4i_wall_column;
+
+static gs4i_wall_column gs4i_column_at(const gs4i_staggered *f, int side, int at[3])
+{
+    const int a = side / 2, high = side & 1;
+    gs4i_wall_column w;
+    int t;
+    at[a] = high ? f->to[a] - 1 : f->from[a];
+    w.cell = gs4i_box_index(&f->box, GS4I_AT_CELL, at[0], at[1], at[2]);
+    at[a] += high;
+    w.face = gs4i_box_index(&f->box, 1 << a, at[0], at[1], at[2]);
+    for (t = 0; t < 3; t++) w.node[t] = at[t] + f->box.low[t] - (t == a && !high);
+    return w;
+}
+
+/* All columns w, at at[], of a side. */
+#define GS4I_EACH_COLUMN(f, side, at, b, c, w)                                           \
+    for ((b) = (side) / 2 == 0, (c) = 3 - (side) / 2 - (b), (at)[c] = 0;                 \
+         (at)[c] < (f)->box.size[c]; (at)[c]++)                                          \
+        for ((at)[b] = 0;                                                                \
+             (at)[b] < (f)->box.size[b] && ((w) = gs4i_column_at((f), (side), (at)), 1); \
+             (at)[b]++)
+
+/* Did material press on the wall before this node in the last step? */
+static int gs4i_was_pressed(const gs4i_grid *g, const int x[3])
+{
+    const int64_t node = gs4i_node_at(g, x[0], x[1], x[2]);
+    return node >= 0 && (g->flags[node] & GS4I_WAS_PRESSED) != 0;
+}
+
+/* What is likely in contact: where material moves into a wall or pressed on it; at first all. */
+static void gs4i_guess_contact(gs4_sim *sim)
+{
+    gs4i_staggered *f = &sim->staggered;
+    gs4i_wall_column w;
+    int side, at[3], b, c;
+    if (!f->contact) return;
+    memset(f->contact, 0, gs4i_box_count(&f->box, GS4I_AT_CELL));
+    for (side = 0; side < 6; side++)
+        if (sim->desc.walls[side] == GS4_WALL_SEPARATE && gs4i_has_wall(sim, side))
+            GS4I_EACH_COLUMN(f, side, at, b, c, w) {
+                const gs4_real into =
+                    GS4I_C(side & 1 ? 1 : -1) * f->given[side / 2][4 * w.face + GS4I_FACE_VELOCITY];
+                if ((sim->integrator.restart && into >= 0) || into > 0
+                    || gs4i_was_pressed(&sim->grid, w.node))
+                    f->contact[w.cell] |= (uint8_t)(1 << side);
+            }
+}
+
+/* How fast (m/s) the face would move into the wall if no pressure were on the wall: of a face that
+ * is held by what it was to have, and the pressure of the cell, half a cell before it. More than 0:
+ * the wall pushes, viscous stress included. */
+static gs4_real gs4i_speed_into_wall(const gs4_sim *sim, int side, const gs4i_wall_column *w)
+{
+    const gs4i_staggered *f = &sim->staggered;
+    const gs4_real outward = GS4I_C(side & 1 ? 1 : -1), *t = f->taken[side / 2] + 4 * w->face,
+                   density = f->given[side / 2][4 * w->face + GS4I_FACE_DENSITY];
+    if (!(f->contact[w->cell] >> side & 1)) return outward * t[GS4I_FACE_STAGE];
+    if (!(density > 0)) return 0;
+    return outward * t[GS4I_FACE_GUESS]
+           + 2 * sim->integrator.s * sim->grid.inv_h * f->pressure[w->cell] / density;
+}
+
+/* Should the wall hold what flies by itself in a column? Where it moves into the wall, and beside
+ * liquid that the wall holds, so that a surface sees the same wall on both sides of it. */
+static int gs4i_should_hold(const gs4i_staggered *f, int side, const gs4i_wall_column *w,
+                            const int at[3])
+{
+    const gs4_real outward = GS4I_C(side & 1 ? 1 : -1);
+    int t, k, p[3], any = outward * f->seen[side / 2][w->face] > 0;
+    for (t = 0; t < 3; t++)
+        for (k = -1; k <= 1 && t != side / 2; k += 2) {
+            gs4i_wall_column beside;
+            memcpy(p, at, sizeof p);
+            p[t] += k;
+            if (p[t] < 0 || p[t] >= f->box.size[t]) continue;
+            beside = gs4i_column_at(f, side, p);
+            any |= f->kind[beside.cell] == GS4_CELL_LIQUID && (f->contact[beside.cell] >> side & 1);
+        }
+    return any;
+}
+
+/* By what the solve found walls let go of cells that they would have to pull, and hold those that
+ * move into them; at `last` they only hold. First cells of liquid, then the others. How many
+ * changed. What the solver leaves undone is no reason. */
+static int gs4i_revise_contact(gs4_sim *sim, int last)
+{
+    gs4i_staggered *f = &sim->staggered;
+    const gs4_real least =
+        10 * gs4i_max(sim->desc.solver_tolerance, GS4I_EPSILON) * gs4i_fastest_face(f);
+    gs4i_wall_column w;
+    int n, at[3], b, c, changed = 0;
+    for (n = 0; n < 12; n++) {
+        const int side = n % 6, liquid = n < 6;
+        if (sim->desc.walls[side] != GS4_WALL_SEPARATE || !gs4i_has_wall(sim, side)) continue;
+        GS4I_EACH_COLUMN(f, side, at, b, c, w) {
+            const int holds = f->contact[w.cell] >> side & 1;
+            int should;
+            if ((f->kind[w.cell] == GS4_CELL_LIQUID) != liquid) continue;
+            should = liquid ? gs4i_speed_into_wall(sim, side, &w) > (holds ? -least : least)
+                            : gs4i_should_hold(f, side, &w, at);
+            if (holds == should || (last && holds)) continue;
+            f->contact[w.cell] ^= (uint8_t)(1 << side);
+            changed++;
+        }
+    }
+    return changed;
+}
+
+/* Is anything held by its impact alone, not by what accelerates it? With `pressure` what the split
+ * found beside that of u~. */
+static int gs4i_is_impact(const gs4_sim *sim)
+{
+    const gs4i_staggered *f = &sim->staggered;
+    gs4i_wall_column w;
+    int side, at[3], b, c, any = 0;
+    for (side = 0; side < 6 && f->contact; side++)
+        if (sim->desc.walls[side] == GS4_WALL_SEPARATE && gs4i_has_wall(sim, side))
+            GS4I_EACH_COLUMN(f, side, at, b, c, w) {
+                const gs4_real *q = f->given[side / 2] + 4 * w.face,
+                               outward = GS4I_C(side & 1 ? 1 : -1);
+                gs4_real acc = gs4i_axis_of(sim->desc.gravity, side / 2), p;
+                if (f->kind[w.cell] != GS4_CELL_LIQUID || !(f->contact[w.cell] >> side & 1)
+                    || !(q[GS4I_FACE_MASS] > 0))
+                    continue;
+                if (f->force[side / 2]) acc += f->force[side / 2][w.face] / q[GS4I_FACE_MASS];
+                p = f->cell[4 * w.cell + GS4I_CELL_PRESSURE]
+                    + sim->integrator.s * f->pressure[w.cell];
+                any |= outward * acc + 2 * sim->grid.inv_h * p / q[GS4I_FACE_DENSITY] < 0;
+            }
+    return any;
 }
 
 /* --- extrapolation ---------------------------------------------------------------------------- */
@@ -15223,7 +15430,7 @@ static int gs4i_clear_faces(gs4_sim *sim, gs4i_node_pass *nodes)
 }
 
 /* v_i on faces and volumes in cells, walls included. */
-static int gs4i_finish_faces(gs4_sim *sim, gs4i_node_pass *nodes)
+static void gs4i_fold_faces(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     gs4i_staggered *f = &sim->staggered;
     gs4i_staggered_pass pass;
@@ -15233,7 +15440,24 @@ static int gs4i_finish_faces(gs4_sim *sim, gs4i_node_pass *nodes)
     gs4i_mirror_faces(sim, f->given, gs4i_fold_given);
     gs4i_each_mirror(sim, GS4I_AT_CELL, f->cell, gs4i_fold_given);
     gs4i_parallel_for(&sim->tasks, f->box.size[2] + 1, gs4i_face_velocities, &pass);
+}
+
+static int gs4i_finish_faces(gs4_sim *sim, gs4i_node_pass *nodes)
+{
+    gs4i_guess_contact(sim);
+    gs4i_fold_faces(sim, nodes);
     return GS4_OK;
+}
+
+/* The same once more, where contact is not what it was. */
+static void gs4i_scatter_again(gs4_sim *sim, gs4i_node_pass *nodes)
+{
+    if (sim->particles.with_heat)
+        gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_clear_nodes, nodes);
+    gs4i_parallel_for(&sim->tasks, sim->staggered.box.size[2] + 1, gs4i_clear_staggered,
+                      &sim->staggered);
+    gs4i_scatter(sim, gs4i_scatter_to_faces);
+    gs4i_fold_faces(sim, nodes);
 }
 
 /* div u~ of liquid cells, for J, where the right-hand side was. The largest. */
@@ -15254,7 +15478,8 @@ static gs4_real gs4i_find_divergence(gs4_sim *sim)
     return most;
 }
 
-/* acc is what pressure leaves of the rate of u~; or, split, (P2). */
+/* acc is what pressure leaves of the rate of u~; or, split, (P2). What is held by its impact alone
+ * takes as much feedback as there may be, or its particles would press on for long. */
 static int gs4i_finish_acceleration(gs4_sim *sim, gs4_real fastest)
 {
     gs4i_staggered *f = &sim->staggered;
@@ -15268,24 +15493,23 @@ static int gs4i_finish_acceleration(gs4_sim *sim, gs4_real fastest)
         GS4I_TRY(gs4i_project(sim, GS4I_FACE_ACCELERATION));
         pass.scale = gs4i_min(GS4I_C(0.5), sim->integrator.s * fastest * sim->grid.inv_h);
     }
+    if (f->contact && (f->compressible || gs4i_is_impact(sim))) pass.scale = GS4I_C(0.5);
     gs4i_parallel_for(&sim->tasks, f->box.size[2] + 1, gs4i_split_acceleration, &pass);
     return GS4_OK;
 }
 
-/* S4 to S6. */
-static int gs4i_accelerate_by_projection(gs4_sim *sim, gs4i_node_pass *nodes)
+/* S4, S5 and u~. */
+static int gs4i_find_stage_velocity(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     gs4i_staggered *f = &sim->staggered;
     const int planes = f->box.size[2], with_heat = sim->particles.with_heat;
-    const double start = gs4i_now(sim);
     gs4i_staggered_pass pass;
-    gs4_real fastest, most = 0;
     memset(&pass, 0, sizeof pass);
     pass.sim = sim;
     pass.lightest = nodes->lightest;
     gs4i_place_bodies(sim, nodes);
     if (f->is_viscous || with_heat) {
-        gs4i_mirror_faces(sim, f->given, gs4i_fill_first);
+        gs4i_mirror_faces(sim, f->given, gs4i_fill_given);
         gs4i_scatter(sim, with_heat ? gs4i_scatter_stress_and_heat_task : gs4i_scatter_stress_task);
         if (f->is_viscous) gs4i_mirror_faces(sim, f->force, gs4i_fold_number);
     }
@@ -15293,7 +15517,30 @@ static int gs4i_accelerate_by_projection(gs4_sim *sim, gs4i_node_pass *nodes)
     gs4i_parallel_for(&sim->tasks, planes, gs4i_classify_cells, &pass);
     gs4i_parallel_for(&sim->tasks, planes + 1, gs4i_classify_faces, &pass);
     GS4I_TRY(gs4i_setup_pressure(sim));
-    GS4I_TRY(gs4i_project(sim, GS4I_FACE_STAGE));
+    return gs4i_project(sim, GS4I_FACE_STAGE);
+}
+
+/* How often contact is revised in a step. */
+#define GS4I_REVISIONS 3
+
+/* S4 to S6. */
+static int gs4i_accelerate_by_projection(gs4_sim *sim, gs4i_node_pass *nodes)
+{
+    gs4i_staggered *f = &sim->staggered;
+    const int planes = f->box.size[2];
+    const double start = gs4i_now(sim);
+    gs4i_staggered_pass pass;
+    gs4_real fastest, most = 0;
+    int n;
+    memset(&pass, 0, sizeof pass);
+    pass.sim = sim;
+    GS4I_TRY(gs4i_find_stage_velocity(sim, nodes));
+    for (n = 1; f->contact && n <= GS4I_REVISIONS && gs4i_revise_contact(sim, n == GS4I_REVISIONS);
+         n++) {
+        gs4i_scatter_again(sim, nodes);
+        GS4I_TRY(gs4i_find_stage_velocity(sim, nodes));
+    }
+    if (f->contact) GS4I_TRY(gs4i_check_inflow(sim));
     gs4i_take_pressure(sim);
     fastest = gs4i_fastest_face(f);
     GS4I_TRY(gs4i_finish_acceleration(sim, fastest));
@@ -15518,6 +15765,19 @@ static void gs4i_trial_from_faces_with_heat_task(int index, void *context)
     gs4i_correct_from_faces((const gs4i_pass *)context, index, 0, &heat);
 }
 
+/* Does material press on a wall that separates, before a node behind it? */
+static int gs4i_presses(const gs4_sim *sim, const int at[3])
+{
+    const gs4i_staggered *f = &sim->staggered;
+    int side, any = 0;
+    for (side = 0; side < 6 && f->contact; side++) {
+        const int a = side / 2, there = side & 1 ? f->to[a] : f->from[a] - 1;
+        if (at[a] != there || sim->desc.walls[side] != GS4_WALL_SEPARATE) continue;
+        any |= f->contact[gs4i_wall_cell(sim, side, at, 0)] >> side & 1;
+    }
+    return any;
+}
+
 /* ag of the faces before a node, where they know theirs. */
 static void gs4i_remember_faces(int index, void *context)
 {
@@ -15542,7 +15802,8 @@ static void gs4i_remember_faces(int index, void *context)
                 known |= 1 << c;
             }
             ag[3] = 0;
-            g->flags[node] = (uint8_t)(known | (known ? GS4I_REMEMBERS : 0));
+            g->flags[node] = (uint8_t)(known | (known ? GS4I_REMEMBERS : 0)
+                                       | (gs4i_presses(pass->sim, at) ? GS4I_WAS_PRESSED : 0));
         }
     }
 }
@@ -17849,7 +18110,7 @@ static int gs4i_find_affine(gs4_sim *sim, gs4i_node_pass *nodes)
     for (pass = 0; pass < 16 && result == GS4_OK; pass++) {
         result = gs4i_scatter_momenta(sim, nodes);
         if (result != GS4_OK) break;
-        gs4i_mirror_faces(sim, f->given, gs4i_fill_first);
+        gs4i_mirror_faces(sim, f->given, gs4i_fill_given);
         gs4i_gather(sim, gs4i_find_affine_task);
     }
     sim->integrator.prediction = prediction;
@@ -19189,10 +19450,10 @@ static int gs4i_check_partitioned(gs4i_error *e, const gs4_sim_desc *d)
         GS4I_TRY(gs4i_check_absent(e, "rho_inf", d->rho_inf,
                                    "backward Euler has no such parameter, leave it 0"));
     for (w = 0; w < 6; w++)
-        GS4I_TRY(gs4i_require(
-            e, d->walls[w] != GS4_WALL_SEPARATE && d->walls[w] != GS4_WALL_PERIODIC,
-            "walls: the partitioned scheme of this version has neither separating nor periodic "
-            "ones; use GS4_WALL_STICK, GS4_WALL_SLIP or GS4_WALL_OPEN"));
+        GS4I_TRY(gs4i_require(e, d->walls[w] != GS4_WALL_PERIODIC,
+                              "walls: the partitioned scheme of this version has no periodic ones; "
+                              "use GS4_WALL_STICK, GS4_WALL_SLIP, GS4_WALL_SEPARATE or "
+                              "GS4_WALL_OPEN"));
     return GS4_OK;
 }
 
@@ -21029,6 +21290,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_DIVERGENCE_BOUND
 #undef GS4I_EACH
 #undef GS4I_EACH_FACE
+#undef GS4I_EACH_COLUMN
 #undef GS4I_EPSILON
 #undef GS4I_EULER_SOUND_EIGENVALUE
 #undef GS4I_EULER_VISCOUS_EIGENVALUE
@@ -21083,6 +21345,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_PAIRS
 #undef GS4I_PREFETCH
 #undef GS4I_RESTRICT
+#undef GS4I_REVISIONS
 #undef GS4I_ROOT_BITS
 #undef GS4I_ROW_DIFFERENCE
 #undef GS4I_ROW_LOAD
@@ -21177,4 +21440,4 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  * flip_decay_time 0, the default: noise of velocities and J after impacts decays as fast as it
  * crosses cells (NOISE); other values mean what they did. gs4_get_desc gives 0 for it, before
  * 0.5. GS4_FIELD_PRESSURE, of the partitioned scheme, in frames too; that has heat now, and steps
- * no longer than ripples of its surfaces bear. */
+ * no longer than ripples of its surfaces bear; and separating walls. */

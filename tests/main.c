@@ -21,6 +21,7 @@
 #include "test_symmetry.c"
 #include "test_contact.c"
 #include "test_partitioned.c"
+#include "test_partitioned_walls.c"
 #include "test_mesh.c"
 #include "test_reference.c"
 
@@ -96,6 +97,7 @@ int main(int count, char **values)
     run_symmetry();
     run_contact();
     run_partitioned();
+    run_partitioned_walls();
     run_mesh();
     RUN_ONCE(test_reference);
     RUN_ONCE(test_stability);

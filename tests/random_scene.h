@@ -316,8 +316,8 @@ static void make_partitioned(gs4_sim_desc *d)
     if (d->integrator != GS4_INTEGRATOR_GS4) d->rho_inf = d->rho_inf_spurious = 0;
     d->sharp_gradients = 0;
     for (a = 0; a < 6; a++)
-        if (d->walls[a] == GS4_WALL_SEPARATE || d->walls[a] == GS4_WALL_PERIODIC)
-            d->walls[a] = one_in(2) ? GS4_WALL_SLIP : GS4_WALL_STICK;
+        if (d->walls[a] == GS4_WALL_PERIODIC)
+            d->walls[a] = one_in(2) ? GS4_WALL_SLIP : GS4_WALL_SEPARATE;
 }
 
 static void make_incompressible(gs4_material *m)

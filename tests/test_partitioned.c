@@ -820,9 +820,6 @@ static void test_partitioned_refusals(void)
     d.sharp_gradients = 1;
     partitioned_refuses(d, "sharp_gradients");
     d = fine;
-    d.walls[2] = GS4_WALL_SEPARATE;
-    partitioned_refuses(d, "walls");
-    d = fine;
     d.walls[4] = d.walls[5] = GS4_WALL_PERIODIC;
     partitioned_refuses(d, "walls");
     d = fine;

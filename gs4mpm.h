@@ -204,13 +204,11 @@
  * The last term leaves alone what weight makes of J. Neither decays so in scenes with solids, whose
  * bounces would lose by it, nor where flip_decay_time is given; nor does J with sharp_gradients or
  * a material of more than twice, or less than half, the density or stiffness (rho0 c0^2) of the
- * first. A cylinder 8 cells across,
- * 0.3 s after it fell flat at 1.7 m/s: rms and fastest of its particles over that; a ball of 12
- * cells that spins by a radian; a drop of 20 cells on a floor, widths at four times over reference:
+ * first. A cylinder 8 cells across, 0.3 s after it fell flat at 1.7 m/s: rms and fastest of its
+ * particles over that; a ball of 12 cells that spins by a radian:
  *     flip_decay_time       default       0.5 s         0.05 s        0.005 s       INFINITY
  *     noise                 0.023, 0.09   0.11, 0.52    0.05, 0.17    0.013, 0.04   0.13, 0.65
  *     spin kept             0.935         0.936         0.552         0.008         0.996
- *     width                 1.007-1.018   1.002-1.019   1.001-1.018                 1.002-1.019
  *     order of v in time    1.97-2.01     1.97-2.00 (0.2 s)                         1.96-2.01
  *
  * In detail, as tests/reference_step.h has it in plain loops:
@@ -236,7 +234,7 @@
  *
  * The spin is there because nodes at a surface see particles on one side of them alone, so too slow
  * a velocity where a solid turns. What is missing strains it: without spin a stiff cube lost 20 %
- * of its kinetic energy in a quarter of a turn, with it 0.01 %.
+ * of its kinetic energy in a quarter of a turn, with it 0.02 %.
  *
  * THE PARTITIONED SCHEME has pressure from a solve, so that no step follows sound: for liquids of
  * any bulk modulus, `incompressible` too. Velocities are on faces of cells, one component each, and

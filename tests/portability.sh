@@ -279,7 +279,7 @@ threads_and_checkpoint() {
 
 few_hashes() {
     threaded="$CC -O0 -DGS4_PTHREADS -pthread"
-    reference "" 10
+    reference "" 6
     same "GS4_NO_VECTORS" "$CC -O0 -DGS4_NO_VECTORS" ""
     threads_and_checkpoint
 }
@@ -400,7 +400,7 @@ fuzz() {
     check "in float" fuzzed "$build" 1 80
     check "in double" fuzzed "$build -DGS4_DOUBLE" 1101 50
 }
-few_fuzz() { check "a few scenes" fuzzed "$CC -O0 -w" 1 10; }
+few_fuzz() { check "a few scenes" fuzzed "$CC -O0 -w" 1 6; }
 
 tsan() {
     have gcc || return

@@ -540,7 +540,7 @@ static void test_density_soft(void)
 
 static void run_density(void)
 {
-    RUN_ONCE(test_density_stability);
+    RUN_FULL(test_density_stability);
     RUN(test_density_limit);
     RUN(test_density_saved);
     RUN(test_density_soft);

@@ -517,7 +517,7 @@ static void test_errors_emitter(void)
     e.shape = err_shape(0);
     err_try_all(ERR_EMITTER, &e, sizeof e, fields, ERR_COUNT(fields));
     if (err_emitter_calls() >= 20000) return; /* huge shapes would take for ever */
-    for (kind = 0; kind < 4; kind++) {
+    for (kind = 0; kind < 4; kind += test_full ? 1 : 3) {
         e.shape = err_shape(kind);
         err_try_all(ERR_EMITTER, &e, sizeof e, shapes, ERR_COUNT(shapes));
     }
@@ -2484,7 +2484,7 @@ static void run_errors(void)
     RUN_ONCE(test_errors_callback_calls_outside);
     RUN_ONCE(test_errors_poisson_callback_calls);
     RUN_ONCE(test_errors_refused_emitter);
-    RUN(test_errors_traps);
+    RUN_ONCE(test_errors_traps);
     RUN(test_errors_limits);
     RUN(test_errors_stats);
     RUN(test_errors_growth);
@@ -2494,10 +2494,10 @@ static void run_errors(void)
     RUN(test_errors_distances);
     RUN(test_errors_flat_shapes);
     RUN(test_errors_pool);
-    RUN(test_errors_flight);
+    RUN_ONCE(test_errors_flight);
     RUN(test_errors_desc);
     RUN(test_errors_material);
-    RUN(test_errors_fill);
+    RUN_ONCE(test_errors_fill);
     RUN_ONCE(test_errors_collider);
     RUN(test_errors_large_emitter);
     RUN_ONCE(test_errors_emitter);
@@ -2522,7 +2522,7 @@ static void run_errors(void)
     RUN(test_errors_point);
     RUN(test_errors_refused_step);
     RUN_ONCE(test_errors_viscosity_callback);
-    RUN_ONCE(test_errors_viscosity_that_turns);
+    RUN_FULL(test_errors_viscosity_that_turns);
     RUN(test_errors_no_end);
     RUN(test_errors_short_durations);
     RUN(test_errors_leaps);

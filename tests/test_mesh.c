@@ -590,7 +590,7 @@ static void run_mesh(void)
 {
     RUN(test_mesh_box);
     RUN_ONCE(test_mesh_ball);
-    RUN(test_mesh_parts);
+    RUN_ONCE(test_mesh_parts);
     RUN(test_mesh_table);
     RUN_ONCE(test_mesh_table_moves);
     RUN(test_mesh_stray);
@@ -600,5 +600,5 @@ static void run_mesh(void)
     RUN(test_mesh_needles);
     RUN(test_mesh_refused);
     RUN_FULL(test_mesh_memory);
-    RUN(test_mesh_too_much);
+    RUN_ONCE(test_mesh_too_much);
 }

@@ -927,9 +927,9 @@ static void test_partitioned_not_converged(void)
 
 static void run_partitioned(void)
 {
-    RUN(test_partitioned_flight);
-    RUN(test_partitioned_rest);
-    RUN(test_partitioned_pressure);
+    RUN_ONCE(test_partitioned_flight);
+    RUN_ONCE(test_partitioned_rest);
+    RUN_ONCE(test_partitioned_pressure);
     RUN_FULL(test_partitioned_bodies_at_rest);
     RUN_ONCE(test_partitioned_slope);
     RUN_FULL(test_partitioned_ripples);
@@ -941,7 +941,7 @@ static void run_partitioned(void)
     RUN_FULL(test_partitioned_symmetry);
     RUN_FULL(test_partitioned_stirs);
     RUN(test_partitioned_piston);
-    RUN(test_partitioned_bits);
+    RUN_ONCE(test_partitioned_bits);
     RUN(test_partitioned_not_converged);
     RUN(test_partitioned_refusals);
     RUN(test_partitioned_refused_step);

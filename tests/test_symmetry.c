@@ -542,7 +542,7 @@ static void symmetry_all(symmetry_world *w, int n)
 static void test_symmetry_all(void)
 {
     int n;
-    for (n = 0; n < 2; n++) symmetry_check("all", symmetry_all, n, 12);
+    for (n = 0; n < (test_full ? 2 : 1); n++) symmetry_check("all", symmetry_all, n, 12);
 }
 
 /* --- without a simulation --------------------------------------------------------------------- */

@@ -673,5 +673,5 @@ static void run_yield(void)
     RUN_FULL(test_yield_regularised);
     RUN_FULL(test_yield_channel);
     RUN_FULL(test_yield_slump);
-    RUN(test_yield_presets);
+    RUN_ONCE(test_yield_presets);
 }

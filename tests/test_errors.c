@@ -2510,7 +2510,7 @@ static void run_errors(void)
     RUN(test_errors_log_of_retries);
     RUN(test_errors_log_of_emitters);
     RUN(test_errors_shapes);
-    RUN_ONCE(test_errors_sdf);
+    RUN_FULL(test_errors_sdf);
     RUN(test_errors_mesh);
     RUN(test_errors_large_mesh);
     RUN(test_errors_edit);

@@ -1510,6 +1510,7 @@ static void test_files_padding(void)
     }
     CHECK_RESULT(sim[0], gs4_save(sim[0], files_path("s.sav")), 0);
     CHECK_RESULT(sim[1], gs4_load(sim[1], files_path("s.sav")), 0);
+    remove(files_path("s.sav"));
     gs4_destroy(sim[0]);
     gs4_destroy(sim[1]);
 }

@@ -144,7 +144,7 @@ static void test_heat_order_in_time(void)
     int c, k, i;
     if (sizeof(gs4_real) != 8) return;
     for (c = 0; c < 6; c++)
-        for (k = 0; k < 3; k++) {
+        for (k = 0; k < 3 && (test_full || (c != 1 && c != 4)); k++) {
             heat_bar bar = { 16,
                              kinds[k][0],
                              kinds[k][1],

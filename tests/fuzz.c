@@ -372,6 +372,7 @@ static void check_stats(const gs4_stats *s)
                               s->kinetic_energy,
                               s->thermal_energy,
                               s->volume,
+                              s->occupied_volume,
                               s->max_speed,
                               s->time_left,
                               s->min_temperature,

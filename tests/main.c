@@ -14,6 +14,7 @@
 #include "test_files.c"
 #include "test_stability.c"
 #include "test_density.c"
+#include "test_volume.c"
 #include "test_solid.c"
 #include "test_stress.c"
 #include "test_yield.c"
@@ -112,6 +113,7 @@ int main(int count, char **values)
     RUN(test_thickening_within_a_step);
     RUN(test_nozzle_from_outside);
     run_density();
+    run_volume();
     RUN(test_order_as_printed);
     RUN(test_order_in_time);
     return test_finish();

@@ -298,9 +298,9 @@
  * Coulomb friction, which brings what it can hold to rest in one to two steps). What a collider
  * takes from a node at once is a jump: it goes to the velocities of particles, not into their
  * rates. Near sticky ones, without solids and with a finite flip_decay_time, it takes none farther
- * than to V. A particle that ends inside a collider or behind a wall is put back on the surface. Where the
- * grid sees little of a particle its sub-grid velocity decays at the rate c0/h: at a wall by the
- * weight of mirror nodes, at a sticky collider by that of nodes inside or held, and in spray
+ * than to V. A particle that ends inside a collider or behind a wall is put back on the surface.
+ * Where the grid sees little of a particle its sub-grid velocity decays at the rate c0/h: at a wall
+ * by the weight of mirror nodes, at a sticky collider by that of nodes inside or held, and in spray
  * that fills nodes by less than 20 %.
  *
  * ACCURACY (tests/test_order.c and tests/test_physics.c hold these)
@@ -13211,11 +13211,11 @@ GS4I_INLINE void gs4i_volume_decay(const gs4i_integrator *r, const gs4i_correcti
     }
 }
 
-/* What contact with sticky bodies gives a particle takes it no farther than to what the grid sees, V: of the jump j it
- * takes max(0, min(1, j.r/r.r)) r, r = V - v~, which is j where there was no sub-grid velocity. Held
- * nodes have what liquid before them lacks as jump again and again, and particles beside a body that
- * have its velocity took that too: 1.5 times the speed of the rim of a paddle (sub-grid 0.7), now
- * 0.96. */
+/* What contact with sticky bodies gives a particle takes it no farther than to what the grid sees,
+ * V: of the jump j it takes max(0, min(1, j.r/r.r)) r, r = V - v~, which is j where there was no
+ * sub-grid velocity. Held nodes have what liquid before them lacks as jump again and again, and
+ * particles beside a body that have its velocity took that too: 1.5 times the speed of the rim of a
+ * paddle (sub-grid 0.7), now 0.96. */
 GS4I_INLINE void gs4i_limit_jumps(gs4i_corrections *k)
 {
     int b, c;

@@ -13524,14 +13524,13 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_heat
     gs4i_correction_tiles tiles;
     gs4i_corrections k;
     gs4i_gathered u;
-    int row = 0, edge, sticks;
+    int row = 0, edge;
     size_t i = (size_t)g->first[o], end = (size_t)g->first[o + 1];
     if (!commit && gs4i_is_safe(pass, index)) return;
     tiles.with_jumps = gs4i_load_jumps(g, o, report->rows, tiles.jumps);
     gs4i_tile_load(g, o, report->rows, gs4i_gradient_velocity(g), tiles.velocity);
     gs4i_tile_load(g, o, report->rows, gs4i_acceleration(g), tiles.acceleration);
     edge = tiles.with_jumps || gs4i_at_edge(g, o);
-    sticks = tiles.with_jumps && gs4i_sticks_near(sim, o);
     gs4i_begin_response(&r, sim, &p, &integrator, report, heat);
     memset(&k, 0, sizeof k);
     if (heat) gs4i_load_heat_tiles(sim, o, heat);
@@ -13552,7 +13551,7 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_heat
         if (p.with_subgrid) {
             gs4i_prefetch_subgrid(&p, i + 4 * GS4I_BATCH);
             gs4i_to_lanes(p.subgrid + 4 * i, n, k.subgrid);
-            if (sticks) gs4i_limit_jumps(&k);
+            if (tiles.with_jumps && gs4i_sticks_near(sim, o)) gs4i_limit_jumps(&k);
         }
         gs4i_prepare_decay(&r, i, n, solids, &k);
         gs4i_correct_batch(integrator, &k, &q);

@@ -781,9 +781,9 @@ static void test_contact_sweeps(void)
         contact_sweep(n % 2, n / 2 % 2 ? GS4_WALL_SLIP : GS4_WALL_SEPARATE, spins[n / 2]);
 }
 
-/* A paddle, a cell thick and six wide, turns in a pool three cells deep, at a tenth of the speed of
- * sound and at its speed. Liquid that sticks has the paddle's own speed, its rim's at most. The slow
- * one throws some up at the surface, faster. GS4 gave 1.72, the slow one 1.57. */
+/* A paddle, a cell thick and six wide, turns in a pool three cells deep, at a tenth of the speed
+ * of sound and at its speed. Liquid that sticks has the paddle's own speed, its rim's at most. The
+ * slow one throws some up at the surface, faster. GS4 gave 1.72, the slow one 1.57. */
 static void contact_paddle(int integrator, int axis, double w, double time)
 {
     const gs4_material m = scene_liquid(1000, 1, 10);

@@ -806,6 +806,125 @@ static void partitioned_refuses(gs4_sim_desc d, const char *what)
     gs4_destroy(sim);
 }
 
+/* A column `length` long falls along `axis` between two sticky walls across `across`, 1 apart, with
+ * both ends free: it flows as under a pressure gradient. The steady maximum is 1/4. At the time
+ * t. */
+static gs4_sim *partitioned_channel(int n, gs4_integrator integrator, int axis, int across,
+                                    int length, const gs4_material *m, double t)
+{
+    gs4_sim_desc d = partitioned_cube(n);
+    const gs4_fill f = scene_fill(at(0, 0, 0));
+    double low[3] = { 0, 0, 0 }, high[3], g[3] = { 0, 0, 0 };
+    gs4_sim *sim;
+    int c;
+    for (c = 0; c < 3; c++) {
+        d.cells[c] = c == across ? n : c == axis ? (length + 1) * n : 4;
+        d.walls[2 * c] = d.walls[2 * c + 1] = c == across ? GS4_WALL_STICK
+                                              : c == axis ? GS4_WALL_OPEN
+                                                          : GS4_WALL_SLIP;
+        high[c] = (double)d.cells[c] / n;
+    }
+    low[axis] = 0.5;
+    high[axis] = length + 0.5;
+    g[axis] = -2 * (double)m->viscosity / (double)m->density;
+    d.gravity = at(g[0], g[1], g[2]);
+    d.integrator = integrator;
+    CHECK_RESULT(NULL, gs4_create(&d, &sim), GS4_OK);
+    CHECK_RESULT(sim, gs4_add_material(sim, m), 0);
+    CHECK(gs4_add_particles(sim, gs4_box(at(low[0], low[1], low[2]), at(high[0], high[1], high[2])),
+                            &f)
+          > 0);
+    CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)t), GS4_OK);
+    return sim;
+}
+
+/* Start-up: error (2-norm) of the velocity in the middle of the column over the steady maximum,
+ *     u = 4 y (1 - y) - sum 32/(pi k)^3 sin(k pi y) exp(-k^2 pi^2 nu t), k odd, y across. */
+static double partitioned_startup(int n, gs4_integrator integrator, int axis, int across)
+{
+    const double nu = 0.5, t = 0.1, pi = acos(-1.0);
+    const gs4_material m = partitioned_liquid(1000 * nu);
+    gs4_sim *sim = partitioned_channel(n, integrator, axis, across, 3, &m, t);
+    const gs4_view x = gs4_particles(sim, GS4_FIELD_POSITION),
+                   v = gs4_particles(sim, GS4_FIELD_VELOCITY);
+    double sum = 0;
+    int i, k, count = 0;
+    for (i = 0; i < x.count; i++) {
+        const double y = (double)x.data[i * x.stride + across];
+        double u = 4 * y * (1 - y);
+        if (fabs((double)x.data[i * x.stride + axis] - 2) > 0.25) continue;
+        for (k = 1; k < 60; k += 2)
+            u -= 32 / pow(k * pi, 3) * sin(k * pi * y) * exp(-k * k * pi * pi * nu * t);
+        u += 4 * (double)v.data[i * v.stride + axis];
+        sum += u * u;
+        count++;
+    }
+    gs4_destroy(sim);
+    return sqrt(sum / count);
+}
+
+/* The same of an Oldroyd-B liquid with El = lambda mu/(rho (H/2)^2) = 1 and half of its viscosity
+ * local, when it is fastest in the middle: over the steady speed 1.257863, at t mu/(rho (H/2)^2) =
+ * 1.336052 (Waters & King; as in test_channel_overshoot). Over the exact one. */
+static double partitioned_overshoot(int n, int axis, int across, int length)
+{
+    gs4_material m = partitioned_liquid(500);
+    double s[5] = { 0, 0, 0, 0, 0 };
+    gs4_view x, v;
+    gs4_sim *sim;
+    int i;
+    m.liquid = GS4_OLDROYD_B;
+    m.local_fraction = (gs4_real)0.5;
+    m.relaxation_time = (gs4_real)0.5;
+    sim = partitioned_channel(n, GS4_INTEGRATOR_GS4, axis, across, length, &m, 1.336052 * 0.5);
+    x = gs4_particles(sim, GS4_FIELD_POSITION);
+    v = gs4_particles(sim, GS4_FIELD_VELOCITY);
+    for (i = 0; i < x.count; i++) { /* u = u0 + c (y - 1/2)^2 */
+        const double y = (double)x.data[i * x.stride + across] - 0.5,
+                     u = -4 * (double)v.data[i * v.stride + axis];
+        if (fabs(y) > 0.07 || fabs((double)x.data[i * x.stride + axis] - (length + 1) * 0.5) > 0.25)
+            continue;
+        s[0] += 1;
+        s[1] += y * y;
+        s[2] += y * y * y * y;
+        s[3] += u;
+        s[4] += u * y * y;
+    }
+    gs4_destroy(sim);
+    return (s[3] * s[2] - s[4] * s[1]) / (s[0] * s[2] - s[1] * s[1]) / 1.257863;
+}
+
+/* Ends drag less, and flow is the same everywhere: what they add goes by 1/length, and is taken off
+ * by two lengths. */
+static void test_partitioned_channel(void)
+{
+    int axis, side, be;
+    double first = 0, two[2];
+    for (be = 0; be < 2; be++)
+        for (axis = 0; axis < 3; axis++)
+            for (side = 1; side < 3; side++) {
+                const gs4_integrator how = be ? GS4_INTEGRATOR_BACKWARD_EULER : GS4_INTEGRATOR_GS4;
+                const int across = (axis + side) % 3;
+                const double error = partitioned_startup(8, how, axis, across);
+                double order;
+                if (axis == 0 && side == 1) {
+                    order = log2(error / partitioned_startup(16, how, axis, across));
+                    first = error;
+                    if (test_filter[0])
+                        printf("channel, 8 cells: error %.4f, order %.2f\n", error, order);
+                    CHECK_CLOSE(error, 0, 0.025);
+                    CHECK_BETWEEN(order, 1.75, 2.1);
+                }
+                CHECK_CLOSE(error / first, 1, 1e-3);
+            }
+    for (axis = 0; axis < (test_slow ? 3 : 1); axis++) {
+        for (side = 0; side < 2; side++)
+            two[side] = partitioned_overshoot(16, axis, (axis + 1) % 3, 3 + 4 * side);
+        if (test_filter[0]) printf("    Oldroyd-B, lengths 3 and 7: %.4f %.4f\n", two[0], two[1]);
+        CHECK_CLOSE((7 * two[1] - 3 * two[0]) / 4, 1, 0.006);
+    }
+}
+
 /* What it has not is refused with a sentence. */
 static void test_partitioned_refusals(void)
 {
@@ -943,6 +1062,7 @@ static void run_partitioned(void)
     RUN(test_partitioned_piston);
     RUN_ONCE(test_partitioned_bits);
     RUN(test_partitioned_not_converged);
+    RUN_FULL(test_partitioned_channel);
     RUN(test_partitioned_refusals);
     RUN(test_partitioned_refused_step);
     RUN(test_partitioned_heavy);

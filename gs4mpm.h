@@ -388,8 +388,8 @@
  * 24). With a solid: 96 more (Euler 36). With heat: 17 more a particle, 32 more with a
  * flux_relaxation_time, 16 (or 32) a cell near material, and about 100 a cell of the box around all
  * material, where the solver works; 150 where an axis is periodic.
- * Partitioned: 161 a particle, and about 270 a cell of the box around all material (double 313 and
- * 480), solver included.
+ * Partitioned: 161 a particle, and about 320 a cell of the box around all material (double 313 and
+ * 530), blocks and solver included; measured where it fills 64^3 cells.
  * A mesh: about 400 (double 800) per cell face of its surface in the domain or within 10 cells of
  * it; where that is more than 1 GB it is refused. Its distance is sampled twice a cell within three
  * cells of the surface. A mesh that moves is sampled anew now and then, but for one that takes less

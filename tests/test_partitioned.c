@@ -970,7 +970,7 @@ static void test_partitioned_refused_step(void)
     const gs4_sim_desc d = partitioned_cube(12);
     const gs4_material m = partitioned_liquid(1);
     gs4_fill f = scene_fill(at(0, 0, 0));
-    double before[8 * 12 * 12 * 12], after[8 * 12 * 12 * 12];
+    static double before[8 * 12 * 12 * 12], after[8 * 12 * 12 * 12];
     gs4_sim *sim;
     uint64_t hash;
     int i, count;

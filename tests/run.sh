@@ -1,5 +1,5 @@
 #!/bin/sh
-# The tests: sh tests/run.sh            quick ones in float and in double, and the cheap part of portability.sh: less than a minute
+# The tests: sh tests/run.sh            quick ones in float and in double, and the cheap part of portability.sh: about a minute
 #                                      of processor time, half of it to compile (user + sys of `bash -c 'time sh tests/run.sh'`)
 #            sh tests/run.sh --full     all but the slow tests, and all compilers, machines and sanitizers that are installed
 #            sh tests/run.sh --nightly  the slow tests, too, and whether the tests catch mutants.sh

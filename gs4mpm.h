@@ -13524,13 +13524,14 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_heat
     gs4i_correction_tiles tiles;
     gs4i_corrections k;
     gs4i_gathered u;
-    int row = 0, edge;
+    int row = 0, edge, sticks;
     size_t i = (size_t)g->first[o], end = (size_t)g->first[o + 1];
     if (!commit && gs4i_is_safe(pass, index)) return;
     tiles.with_jumps = gs4i_load_jumps(g, o, report->rows, tiles.jumps);
     gs4i_tile_load(g, o, report->rows, gs4i_gradient_velocity(g), tiles.velocity);
     gs4i_tile_load(g, o, report->rows, gs4i_acceleration(g), tiles.acceleration);
     edge = tiles.with_jumps || gs4i_at_edge(g, o);
+    sticks = tiles.with_jumps && gs4i_sticks_near(sim, o);
     gs4i_begin_response(&r, sim, &p, &integrator, report, heat);
     memset(&k, 0, sizeof k);
     if (heat) gs4i_load_heat_tiles(sim, o, heat);
@@ -13548,23 +13549,22 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_heat
         }
         gs4i_stage_batch(&p, i, n, integrator.prediction, &frame, &q, &s);
         gs4i_gather_corrections(&tiles, &s, n, solids, &near, &u, &k);
+        if (near.particle) near.particle += n;
         if (p.with_subgrid) {
             gs4i_prefetch_subgrid(&p, i + 4 * GS4I_BATCH);
             gs4i_to_lanes(p.subgrid + 4 * i, n, k.subgrid);
-            if (tiles.with_jumps && gs4i_sticks_near(sim, o)) gs4i_limit_jumps(&k);
+            if (sticks) gs4i_limit_jumps(&k);
         }
         gs4i_prepare_decay(&r, i, n, solids, &k);
         gs4i_correct_batch(integrator, &k, &q);
         gs4i_advance_response(&r, i, n, k.L, &k.rates, q.v[3], commit);
         if (!commit) {
             gs4i_validate_batch(&q, k.L, p.position + 4 * i, n, g->h, p.id + i, report);
-            if (near.particle) near.particle += n;
             continue;
         }
         if (heat) gs4i_gather_heat(&r, &s, k.L, heat);
         gs4i_pack_batch(&q, 1, &out);
         if (edge) gs4i_correct_contact(sim, o, i, n, &out, &u, report);
-        if (near.particle) near.particle += n;
         gs4i_see_motion(&r.seen, q.v, k.L);
         gs4i_store_batch(&p, i, n, &out);
     }
@@ -20834,10 +20834,8 @@ typedef struct gs4i_occupied_cell {
 GS4I_INLINE int gs4i_inside_walls(const gs4_sim *sim, int axis, int x)
 {
     const int n = sim->grid.cells[axis];
-    if (x >= 0 && x < n) return x;
-    if (sim->grid.periodic[axis]) return x < 0 ? x + n : x - n;
-    if (sim->desc.walls[2 * axis + (x >= n)] == GS4_WALL_OPEN) return x;
-    return x < 0 ? -1 - x : 2 * n - 1 - x;
+    const gs4_wall wall = sim->desc.walls[2 * axis + (x >= n)];
+    return (x >= 0 && x < n) || wall == GS4_WALL_OPEN ? x : gs4i_mirrored(wall, x, n);
 }
 
 GS4I_INLINE gs4i_occupied_cell gs4i_occupied_cell_of(const gs4i_occupied *o, int axis, int x)

@@ -11084,6 +11084,7 @@ typedef struct gs4i_pass {
     gs4_sim *sim;
     const int32_t *blocks;
     int count;
+    int commit; /* of S7; 0: a trial, which writes nothing to particles */
 } gs4i_pass;
 
 /* S2: a batch and its weights at the predicted positions. */
@@ -11104,6 +11105,7 @@ static void gs4i_scatter_by_colour(gs4_sim *sim, const int32_t *blocks, const in
     gs4i_pass pass;
     int colour;
     pass.sim = sim;
+    pass.commit = 1;
     for (colour = 0; colour < 8; colour++) {
         pass.blocks = blocks + first[colour];
         pass.count = first[colour + 1] - first[colour];
@@ -11118,12 +11120,13 @@ static void gs4i_scatter(gs4_sim *sim, gs4_task_fn kernel)
 }
 
 /* Run a gathering kernel over all occupied blocks. */
-static void gs4i_gather(gs4_sim *sim, gs4_task_fn kernel)
+static void gs4i_gather(gs4_sim *sim, gs4_task_fn kernel, int commit)
 {
     gs4i_pass pass;
     pass.sim = sim;
     pass.blocks = sim->grid.by_colour;
     pass.count = sim->grid.occupied;
+    pass.commit = commit;
     gs4i_parallel_for(&sim->tasks, pass.count, kernel, &pass);
 }
 
@@ -12588,8 +12591,8 @@ static void gs4i_free_image_particles(gs4i_memory *m, gs4i_image_particles *g)
  * forces; S6 nodes; S7 gather and correct. Symplectic Euler has one kernel each way. */
 
 typedef struct gs4i_scheme {
-    gs4_task_fn scatter[2], trial[2], correct[2]; /* [1] with heat */
-    gs4_task_fn remember;                         /* what nodes keep of accelerations */
+    gs4_task_fn scatter, correct; /* kernels of S3 and S7 */
+    gs4_task_fn remember;         /* what nodes keep of accelerations */
     /* before S3: room, and nothing on the nodes; after it: their velocities, with walls */
     int (*clear)(gs4_sim *sim, gs4i_node_pass *nodes);
     int (*set_velocities)(gs4_sim *sim, gs4i_node_pass *nodes);
@@ -13091,11 +13094,13 @@ GS4I_INLINE void gs4i_stage_forces(gs4i_response *r, const gs4i_batch *q, gs4i_g
 
 /* S4 and S5: L~ = sum v_i (x) grad w, J~ and stress there, and f_i = - sum V sigma grad w + sum
  * w m g. With deconvolution nodes weigh what is on them: gs4i_deconvolve_forces. */
-static void gs4i_scatter_stage(const gs4i_pass *pass, int index, gs4i_heat_pass *heat)
+static void gs4i_scatter_stage(int index, void *context)
 {
+    const gs4i_pass *pass = (const gs4i_pass *)context;
     gs4_sim *sim = pass->sim;
     const gs4i_grid *g = &sim->grid;
     const gs4i_particles p = sim->particles;
+    gs4i_heat_pass heat_pass, *heat = p.with_heat ? &heat_pass : NULL;
     const gs4i_integrator integrator = sim->integrator;
     const int o = pass->blocks[index], next = gs4i_next_block(pass, index);
     const gs4i_frame frame = gs4i_tile_frame(g, g->occupied_block[o]);
@@ -13150,17 +13155,6 @@ static void gs4i_scatter_stage(const gs4i_pass *pass, int index, gs4i_heat_pass 
     gs4i_report_liquids(report, &r.seen);
     gs4i_tile_add(g, o, report->rows, tile, g->force);
     if (heat) gs4i_add_heat(sim, o, heat);
-}
-
-static void gs4i_scatter_forces(int index, void *context)
-{
-    gs4i_scatter_stage((const gs4i_pass *)context, index, NULL);
-}
-
-static void gs4i_scatter_forces_and_heat(int index, void *context)
-{
-    gs4i_heat_pass heat;
-    gs4i_scatter_stage((const gs4i_pass *)context, index, &heat);
 }
 
 /* --- S7 --------------------------------------------------------------------------------------- */
@@ -13510,11 +13504,13 @@ GS4I_INLINE void gs4i_prepare_decay(gs4i_response *r, size_t i, int n, int solid
 
 /* S7: load, gather, correct, then validate or store. With `commit` 0 nothing is written: a trial
  * that only reports, of blocks that are not safe. */
-static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_heat_pass *heat)
+static void gs4i_correct(int index, void *context)
 {
+    const gs4i_pass *pass = (const gs4i_pass *)context;
     gs4_sim *sim = pass->sim;
     const gs4i_grid *g = &sim->grid;
     const gs4i_particles p = sim->particles;
+    gs4i_heat_pass heat_pass, *heat = p.with_heat ? &heat_pass : NULL;
     const gs4i_integrator integrator = sim->integrator;
     const int o = pass->blocks[index], next = gs4i_next_block(pass, index);
     const gs4i_frame frame = gs4i_tile_frame(g, g->occupied_block[o]);
@@ -13526,7 +13522,7 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_heat
     gs4i_gathered u;
     int row = 0, edge, sticks;
     size_t i = (size_t)g->first[o], end = (size_t)g->first[o + 1];
-    if (!commit && gs4i_is_safe(pass, index)) return;
+    if (!pass->commit && gs4i_is_safe(pass, index)) return;
     tiles.with_jumps = gs4i_load_jumps(g, o, report->rows, tiles.jumps);
     gs4i_tile_load(g, o, report->rows, gs4i_gradient_velocity(g), tiles.velocity);
     gs4i_tile_load(g, o, report->rows, gs4i_acceleration(g), tiles.acceleration);
@@ -13557,8 +13553,8 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_heat
         }
         gs4i_prepare_decay(&r, i, n, solids, &k);
         gs4i_correct_batch(integrator, &k, &q);
-        gs4i_advance_response(&r, i, n, k.L, &k.rates, q.v[3], commit);
-        if (!commit) {
+        gs4i_advance_response(&r, i, n, k.L, &k.rates, q.v[3], pass->commit);
+        if (!pass->commit) {
             gs4i_validate_batch(&q, k.L, p.position + 4 * i, n, g->h, p.id + i, report);
             continue;
         }
@@ -13568,29 +13564,7 @@ static void gs4i_correct(const gs4i_pass *pass, int index, int commit, gs4i_heat
         gs4i_see_motion(&r.seen, q.v, k.L);
         gs4i_store_batch(&p, i, n, &out);
     }
-    if (commit) gs4i_report_motion(report, &r.seen);
-}
-
-static void gs4i_correct_task(int index, void *context)
-{
-    gs4i_correct((const gs4i_pass *)context, index, 1, NULL);
-}
-
-static void gs4i_trial_task(int index, void *context)
-{
-    gs4i_correct((const gs4i_pass *)context, index, 0, NULL);
-}
-
-static void gs4i_correct_with_heat_task(int index, void *context)
-{
-    gs4i_heat_pass heat;
-    gs4i_correct((const gs4i_pass *)context, index, 1, &heat);
-}
-
-static void gs4i_trial_with_heat_task(int index, void *context)
-{
-    gs4i_heat_pass heat;
-    gs4i_correct((const gs4i_pass *)context, index, 0, &heat);
+    if (pass->commit) gs4i_report_motion(report, &r.seen);
 }
 
 /* S4 to S6. */
@@ -13598,8 +13572,7 @@ static int gs4i_accelerate_explicitly(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     const gs4i_boundary *b = &sim->boundary;
     const gs4i_grid *g = &sim->grid;
-    gs4i_scatter(sim,
-                 sim->particles.with_heat ? gs4i_scatter_forces_and_heat : gs4i_scatter_forces);
+    gs4i_scatter(sim, gs4i_scatter_stage);
     gs4i_finish_forces(sim, nodes);
     gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_node_accelerations, nodes);
     gs4i_fill_mirror_nodes(b, g, gs4i_velocity(g));
@@ -13676,12 +13649,14 @@ GS4I_INLINE void gs4i_affine_momentum(gs4i_response *r, const gs4i_batch *q, con
 }
 
 /* Symplectic Euler, there: one affine scatter with stress (MLS-MPM). */
-static void gs4i_scatter_affinely(const gs4i_pass *pass, int index, gs4i_heat_pass *heat)
+static void gs4i_scatter_affinely(int index, void *context)
 {
     const gs4i_prediction now = { 0, 0, 0 };
+    const gs4i_pass *pass = (const gs4i_pass *)context;
     gs4_sim *sim = pass->sim;
     const gs4i_grid *g = &sim->grid;
     const gs4i_particles p = sim->particles;
+    gs4i_heat_pass heat_pass, *heat = p.with_heat ? &heat_pass : NULL;
     const int o = pass->blocks[index];
     const gs4i_frame frame = gs4i_tile_frame(g, g->occupied_block[o]);
     gs4i_report *report = &sim->reports[o];
@@ -13726,17 +13701,6 @@ static void gs4i_scatter_affinely(const gs4i_pass *pass, int index, gs4i_heat_pa
     if (heat) gs4i_add_heat(sim, o, heat);
 }
 
-static void gs4i_scatter_euler(int index, void *context)
-{
-    gs4i_scatter_affinely((const gs4i_pass *)context, index, NULL);
-}
-
-static void gs4i_scatter_euler_and_heat(int index, void *context)
-{
-    gs4i_heat_pass heat;
-    gs4i_scatter_affinely((const gs4i_pass *)context, index, &heat);
-}
-
 /* v = sum w v_i, C = sum v_i (x) grad w, J += dt J tr C, x += dt v. */
 GS4I_INLINE void gs4i_advect_batch(gs4_real dt, const gs4i_gathered *u, int n, gs4i_batch *q,
                                    gs4i_gradient C)
@@ -13754,12 +13718,14 @@ GS4I_INLINE void gs4i_advect_batch(gs4_real dt, const gs4i_gathered *u, int n, g
 }
 
 /* Symplectic Euler, and back. */
-static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, gs4i_heat_pass *heat)
+static void gs4i_gather_euler(int index, void *context)
 {
     const gs4i_prediction now = { 0, 0, 0 };
+    const gs4i_pass *pass = (const gs4i_pass *)context;
     gs4_sim *sim = pass->sim;
     const gs4i_grid *g = &sim->grid;
     const gs4i_particles p = sim->particles;
+    gs4i_heat_pass heat_pass, *heat = p.with_heat ? &heat_pass : NULL;
     const int o = pass->blocks[index], next = gs4i_next_block(pass, index);
     const int edge = gs4i_at_edge(g, o) || gs4i_jumps_are_near(g, o);
     const gs4i_frame frame = gs4i_tile_frame(g, g->occupied_block[o]);
@@ -13769,7 +13735,7 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, gs4i
     gs4_real nodes[GS4I_TILE_REALS];
     int row = 0;
     size_t i = (size_t)g->first[o], end = (size_t)g->first[o + 1];
-    if (!commit && gs4i_is_safe(pass, index)) return;
+    if (!pass->commit && gs4i_is_safe(pass, index)) return;
     gs4i_tile_load(g, o, report->rows, gs4i_velocity(g), nodes);
     gs4i_begin_response(&r, sim, &p, &sim->integrator, report, heat);
     if (heat) gs4i_load_heat_tiles(sim, o, heat);
@@ -13790,8 +13756,8 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, gs4i
         }
         if (near.particle) gs4i_make_odd(&near, n, &u);
         gs4i_advect_batch(sim->integrator.dt, &u, n, &q, C);
-        gs4i_advance_response(&r, i, n, C, NULL, q.v[3], commit);
-        if (!commit) {
+        gs4i_advance_response(&r, i, n, C, NULL, q.v[3], pass->commit);
+        if (!pass->commit) {
             gs4i_validate_batch(&q, C, p.position + 4 * i, n, g->h, p.id + i, report);
             if (near.particle) near.particle += n;
             continue;
@@ -13806,29 +13772,7 @@ static void gs4i_gather_euler(const gs4i_pass *pass, int index, int commit, gs4i
         memcpy(p.affine[1] + 4 * i, u.dy, 4 * (size_t)n * sizeof *u.dy);
         memcpy(p.affine[2] + 4 * i, u.dz, 4 * (size_t)n * sizeof *u.dz);
     }
-    if (commit) gs4i_report_motion(report, &r.seen);
-}
-
-static void gs4i_gather_euler_task(int index, void *context)
-{
-    gs4i_gather_euler((const gs4i_pass *)context, index, 1, NULL);
-}
-
-static void gs4i_trial_euler_task(int index, void *context)
-{
-    gs4i_gather_euler((const gs4i_pass *)context, index, 0, NULL);
-}
-
-static void gs4i_gather_euler_with_heat_task(int index, void *context)
-{
-    gs4i_heat_pass heat;
-    gs4i_gather_euler((const gs4i_pass *)context, index, 1, &heat);
-}
-
-static void gs4i_trial_euler_with_heat_task(int index, void *context)
-{
-    gs4i_heat_pass heat;
-    gs4i_gather_euler((const gs4i_pass *)context, index, 0, &heat);
+    if (pass->commit) gs4i_report_motion(report, &r.seen);
 }
 
 /* Stress and weight are in the momentum already. */
@@ -15275,11 +15219,13 @@ GS4I_INLINE void gs4i_scatter_slope(gs4_real *tile, const gs4i_stencils *s, int 
 
 /* Stress of the stage, in grad v_i, to faces: f_c = - sum over particles of V sigma_ca dw/dx_a.
  * Heat to nodes, which are the centres of cells. */
-static void gs4i_scatter_stress(const gs4i_pass *pass, int index, gs4i_heat_pass *heat)
+static void gs4i_scatter_stress(int index, void *context)
 {
+    const gs4i_pass *pass = (const gs4i_pass *)context;
     gs4_sim *sim = pass->sim;
     gs4i_staggered *f = &sim->staggered;
     const gs4i_particles p = sim->particles;
+    gs4i_heat_pass heat_pass, *heat = p.with_heat ? &heat_pass : NULL;
     const int o = pass->blocks[index];
     const gs4i_frame frame = gs4i_tile_frame(&sim->grid, sim->grid.occupied_block[o]);
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
@@ -15324,16 +15270,6 @@ static void gs4i_scatter_stress(const gs4i_pass *pass, int index, gs4i_heat_pass
         if (f->is_viscous) gs4i_add_face_tile(sim, o, 1 << c, 1, force[c], f->force[c]);
     gs4i_report_liquids(r.report, &r.seen);
     if (heat) gs4i_add_heat(sim, o, heat);
-}
-
-static void gs4i_scatter_stress_task(int index, void *context)
-{
-    gs4i_scatter_stress((const gs4i_pass *)context, index, NULL);
-}
-static void gs4i_scatter_stress_and_heat_task(int index, void *context)
-{
-    gs4i_heat_pass heat;
-    gs4i_scatter_stress((const gs4i_pass *)context, index, &heat);
 }
 
 /* C as the faces see it now: where velocities were set by hand. */
@@ -15547,7 +15483,7 @@ static int gs4i_find_stage_velocity(gs4_sim *sim, gs4i_node_pass *nodes)
     gs4i_place_bodies(sim, nodes);
     if (f->is_viscous || with_heat) {
         gs4i_mirror_faces(sim, f->given, gs4i_fill_given);
-        gs4i_scatter(sim, with_heat ? gs4i_scatter_stress_and_heat_task : gs4i_scatter_stress_task);
+        gs4i_scatter(sim, gs4i_scatter_stress);
         if (f->is_viscous) gs4i_mirror_faces(sim, f->force, gs4i_fold_number);
     }
     gs4i_parallel_for(&sim->tasks, planes + 1, gs4i_predict_faces, &pass);
@@ -15741,12 +15677,13 @@ static void gs4i_correct_by_faces(gs4i_integrator r, const gs4i_face_corrections
     }
 }
 
-static void gs4i_correct_from_faces(const gs4i_pass *pass, int index, int commit,
-                                    gs4i_heat_pass *heat)
+static void gs4i_correct_from_faces(int index, void *context)
 {
+    const gs4i_pass *pass = (const gs4i_pass *)context;
     gs4_sim *sim = pass->sim;
     const gs4i_grid *g = &sim->grid;
     const gs4i_particles p = sim->particles;
+    gs4i_heat_pass heat_pass, *heat = p.with_heat ? &heat_pass : NULL;
     const gs4i_integrator integrator = sim->integrator;
     const int o = pass->blocks[index];
     gs4i_report *report = &sim->reports[o];
@@ -15754,7 +15691,7 @@ static void gs4i_correct_from_faces(const gs4i_pass *pass, int index, int commit
     gs4i_taken_tiles tiles;
     gs4i_response r;
     size_t i = (size_t)g->first[o], end = (size_t)g->first[o + 1];
-    if (!commit && sim->staggered.is_safe) return;
+    if (!pass->commit && sim->staggered.is_safe) return;
     gs4i_load_taken(sim, o, &tiles);
     gs4i_begin_response(&r, sim, &p, &integrator, report, heat);
     if (heat) gs4i_load_heat_tiles(sim, o, heat);
@@ -15768,8 +15705,8 @@ static void gs4i_correct_from_faces(const gs4i_pass *pass, int index, int commit
         gs4i_stage_faces(sim, &frame, i, n, &q, s);
         gs4i_gather_from_faces(sim, &tiles, &q, n, s, &slope, &k);
         gs4i_correct_by_faces(integrator, &k, &q);
-        gs4i_advance_response(&r, i, n, k.L, NULL, q.v[3], commit);
-        if (!commit) {
+        gs4i_advance_response(&r, i, n, k.L, NULL, q.v[3], pass->commit);
+        if (!pass->commit) {
             gs4i_validate_batch(&q, k.L, p.position + 4 * i, n, g->h, p.id + i, report);
             continue;
         }
@@ -15780,26 +15717,7 @@ static void gs4i_correct_from_faces(const gs4i_pass *pass, int index, int commit
         gs4i_store_batch(&p, i, n, &out);
         gs4i_store_affine(&p, i, n, &slope, integrator.restart);
     }
-    if (commit) gs4i_report_motion(report, &r.seen);
-}
-
-static void gs4i_correct_from_faces_task(int index, void *context)
-{
-    gs4i_correct_from_faces((const gs4i_pass *)context, index, 1, NULL);
-}
-static void gs4i_trial_from_faces_task(int index, void *context)
-{
-    gs4i_correct_from_faces((const gs4i_pass *)context, index, 0, NULL);
-}
-static void gs4i_correct_from_faces_with_heat_task(int index, void *context)
-{
-    gs4i_heat_pass heat;
-    gs4i_correct_from_faces((const gs4i_pass *)context, index, 1, &heat);
-}
-static void gs4i_trial_from_faces_with_heat_task(int index, void *context)
-{
-    gs4i_heat_pass heat;
-    gs4i_correct_from_faces((const gs4i_pass *)context, index, 0, &heat);
+    if (pass->commit) gs4i_report_motion(report, &r.seen);
 }
 
 /* Does material press on a wall that separates, before a node behind it? */
@@ -15865,30 +15783,18 @@ static double gs4i_stable_partitioned_dt(const gs4_sim *sim, double c, double nu
 /* The scheme of a simulation. Nothing else asks which it is. */
 static const gs4i_scheme *gs4i_scheme_of(const gs4_sim *sim)
 {
-    static const gs4i_scheme gs4 = { { gs4i_scatter_momentum, gs4i_scatter_momentum },
-                                     { gs4i_trial_task, gs4i_trial_with_heat_task },
-                                     { gs4i_correct_task, gs4i_correct_with_heat_task },
-                                     gs4i_remember_accelerations,
-                                     gs4i_clear_all_nodes,
-                                     gs4i_set_velocities,
-                                     gs4i_accelerate_explicitly,
+    static const gs4i_scheme gs4 = { gs4i_scatter_momentum,       gs4i_correct,
+                                     gs4i_remember_accelerations, gs4i_clear_all_nodes,
+                                     gs4i_set_velocities,         gs4i_accelerate_explicitly,
                                      gs4i_stable_explicit_dt };
-    static const gs4i_scheme euler = { { gs4i_scatter_euler, gs4i_scatter_euler_and_heat },
-                                       { gs4i_trial_euler_task, gs4i_trial_euler_with_heat_task },
-                                       { gs4i_gather_euler_task, gs4i_gather_euler_with_heat_task },
-                                       NULL,
-                                       gs4i_clear_all_nodes,
-                                       gs4i_set_velocities,
-                                       gs4i_accelerate_nothing,
-                                       gs4i_stable_euler_dt };
+    static const gs4i_scheme euler = {
+        gs4i_scatter_affinely, gs4i_gather_euler,   NULL,
+        gs4i_clear_all_nodes,  gs4i_set_velocities, gs4i_accelerate_nothing,
+        gs4i_stable_euler_dt
+    };
     static const gs4i_scheme partitioned = {
-        { gs4i_scatter_to_faces, gs4i_scatter_to_faces },
-        { gs4i_trial_from_faces_task, gs4i_trial_from_faces_with_heat_task },
-        { gs4i_correct_from_faces_task, gs4i_correct_from_faces_with_heat_task },
-        gs4i_remember_faces,
-        gs4i_clear_faces,
-        gs4i_finish_faces,
-        gs4i_accelerate_by_projection,
+        gs4i_scatter_to_faces,     gs4i_correct_from_faces, gs4i_remember_faces,
+        gs4i_clear_faces,          gs4i_finish_faces,       gs4i_accelerate_by_projection,
         gs4i_stable_partitioned_dt
     };
     if (sim->desc.scheme == GS4_PARTITIONED) return &partitioned;
@@ -18036,7 +17942,7 @@ static int gs4i_rasterise(gs4_sim *sim, gs4i_node_pass *nodes)
     for (tries = 0; tries < 2; tries++) {
         if (sim->needs_sort || tries) GS4I_TRY(gs4i_bin(sim));
         GS4I_TRY(gs4i_scheme_of(sim)->clear(sim, nodes));
-        gs4i_scatter(sim, gs4i_scheme_of(sim)->scatter[sim->particles.with_heat]);
+        gs4i_scatter(sim, gs4i_scheme_of(sim)->scatter);
         if (!gs4i_all_reports(sim).left_tile) return GS4_OK;
     }
     return gs4i_fail(
@@ -18129,7 +18035,7 @@ static int gs4i_find_spin(gs4_sim *sim, gs4i_node_pass *nodes)
     sim->integrator.prediction.ahead = 0; /* as it is now, whatever dt is */
     for (pass = 0; pass < 10 && result == GS4_OK; pass++) {
         result = gs4i_scatter_momenta(sim, nodes);
-        if (result == GS4_OK) gs4i_gather(sim, gs4i_find_spin_task);
+        if (result == GS4_OK) gs4i_gather(sim, gs4i_find_spin_task, 1);
     }
     sim->integrator.prediction.ahead = ahead;
     return result;
@@ -18148,7 +18054,7 @@ static int gs4i_find_affine(gs4_sim *sim, gs4i_node_pass *nodes)
         result = gs4i_scatter_momenta(sim, nodes);
         if (result != GS4_OK) break;
         gs4i_mirror_faces(sim, f->given, gs4i_fill_given);
-        gs4i_gather(sim, gs4i_find_affine_task);
+        gs4i_gather(sim, gs4i_find_affine_task, 1);
     }
     sim->integrator.prediction = prediction;
     return result;
@@ -18197,7 +18103,7 @@ static int gs4i_validate(gs4_sim *sim, gs4i_node_pass *nodes)
     gs4i_report r;
     if (sim->desc.scheme == GS4_EXPLICIT)
         gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_node_spreads, nodes);
-    gs4i_gather(sim, gs4i_scheme_of(sim)->trial[sim->particles.with_heat]);
+    gs4i_gather(sim, gs4i_scheme_of(sim)->correct, 0);
     r = gs4i_all_reports(sim);
     return r.bad ? gs4i_fail_bad(sim, &r) : gs4i_check_distances(sim);
 }
@@ -18207,7 +18113,7 @@ static void gs4i_correct_particles(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     const gs4i_scheme *scheme = gs4i_scheme_of(sim);
     if (scheme->remember) gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), scheme->remember, nodes);
-    gs4i_gather(sim, gs4i_scheme_of(sim)->correct[sim->particles.with_heat]);
+    gs4i_gather(sim, scheme->correct, 1);
 }
 
 /* One step of size dt: the stages of the manual. Before gs4i_correct_particles nothing of the

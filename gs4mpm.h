@@ -13092,6 +13092,19 @@ GS4I_INLINE void gs4i_stage_forces(gs4i_response *r, const gs4i_batch *q, gs4i_g
     gs4i_from_lanes(sigma[4], sigma[5], sigma[2], none, f->z);
 }
 
+/* v and its gradient from nodes; with deconvolution v from plain ones. */
+GS4I_INLINE void gs4i_gather_stage(const gs4_real *nodes, const gs4_real *plain,
+                                   const gs4i_stencils *s, int n, gs4i_gathered *v)
+{
+    int b;
+    for (b = 0; b < n; b++) {
+        gs4i_row w, d;
+        gs4i_x_weights(s, b, &w, &d);
+        gs4i_gather_local(nodes + 4 * s->base[b], s, b, &w, &d, v);
+        if (plain) gs4i_gather_value(plain + 4 * s->base[b], s, b, &w, v->value);
+    }
+}
+
 /* S4 and S5: L~ = sum v_i (x) grad w, J~ and stress there, and f_i = - sum V sigma grad w + sum
  * w m g. With deconvolution nodes weigh what is on them: gs4i_deconvolve_forces. */
 static void gs4i_scatter_stage(int index, void *context)
@@ -13129,12 +13142,7 @@ static void gs4i_scatter_stage(int index, void *context)
         gs4i_tile_prefetch(g, next, row, gs4i_gradient_velocity(g));
         gs4i_tile_prefetch(g, o, row, g->force);
         gs4i_stage_batch(&p, i, n, integrator.prediction, &frame, &q, &s);
-        for (b = 0; b < n; b++) {
-            gs4i_row w, d;
-            gs4i_x_weights(&s, b, &w, &d);
-            gs4i_gather_local(nodes + 4 * s.base[b], &s, b, &w, &d, &v);
-            if (with_plain) gs4i_gather_value(plain + 4 * s.base[b], &s, b, &w, v.value);
-        }
+        gs4i_gather_stage(nodes, with_plain ? plain : NULL, &s, n, &v);
         if (near.particle) gs4i_make_odd(&near, n, &v);
         if (p.with_subgrid)
             gs4i_find_subgrid(&p, i, n, &integrator, &q, v.value, subgrid);
@@ -13502,6 +13510,14 @@ GS4I_INLINE void gs4i_prepare_decay(gs4i_response *r, size_t i, int n, int solid
     GS4I_BATCH_LOOP(b) k->volume[b] = k->A[3][b] / r->constants.tait[b];
 }
 
+GS4I_INLINE void gs4i_load_corrections(const gs4i_grid *g, int o, uint64_t rows,
+                                       gs4i_correction_tiles *tiles)
+{
+    tiles->with_jumps = gs4i_load_jumps(g, o, rows, tiles->jumps);
+    gs4i_tile_load(g, o, rows, gs4i_gradient_velocity(g), tiles->velocity);
+    gs4i_tile_load(g, o, rows, gs4i_acceleration(g), tiles->acceleration);
+}
+
 /* S7: load, gather, correct, then validate or store. With `commit` 0 nothing is written: a trial
  * that only reports, of blocks that are not safe. */
 static void gs4i_correct(int index, void *context)
@@ -13523,9 +13539,7 @@ static void gs4i_correct(int index, void *context)
     int row = 0, edge, sticks;
     size_t i = (size_t)g->first[o], end = (size_t)g->first[o + 1];
     if (!pass->commit && gs4i_is_safe(pass, index)) return;
-    tiles.with_jumps = gs4i_load_jumps(g, o, report->rows, tiles.jumps);
-    gs4i_tile_load(g, o, report->rows, gs4i_gradient_velocity(g), tiles.velocity);
-    gs4i_tile_load(g, o, report->rows, gs4i_acceleration(g), tiles.acceleration);
+    gs4i_load_corrections(g, o, report->rows, &tiles);
     edge = tiles.with_jumps || gs4i_at_edge(g, o);
     sticks = tiles.with_jumps && gs4i_sticks_near(sim, o);
     gs4i_begin_response(&r, sim, &p, &integrator, report, heat);

@@ -9,7 +9,7 @@ set -u
 cd "$(dirname "$0")/.." || exit 1
 CC=${CC:-cc}
 
-quick='few_layout few_snippets few_warnings few_hashes few_fuzz'
+quick='few_layout few_snippets few_warnings few_hashes'
 full='warnings tsan fused scenes hashes asan fuzz arm hashes_double wasm windows tiny musl i386 form layout names units snippets link frames examples'
 
 # A transfer kernel may be longer than 60 lines; nothing else. This one is a transpose, spelled out.
@@ -114,8 +114,8 @@ warnings() {
 }
 
 few_warnings() {
-    check "$CC" $CC -std=c99 $strict_c -DGS4_PTHREADS -I. -S -o /dev/null "$tmp/implementation.c"
-    check "$CC declarations" $CC -std=c99 $strict_c -I. -S -o /dev/null "$tmp/declarations.c"
+    check "$CC" $CC -std=c99 $strict_c -DGS4_PTHREADS -I. -fsyntax-only "$tmp/implementation.c"
+    check "$CC declarations" $CC -std=c99 $strict_c -I. -fsyntax-only "$tmp/declarations.c"
     have clang && check "clang -DGS4_DOUBLE" clang -std=c11 $strict_c -DGS4_DOUBLE -I. -fsyntax-only "$tmp/implementation.c"
     have g++ && check "g++ -DGS4_STATIC -DGS4_NO_VECTORS" g++ -std=c++11 $strict -DGS4_STATIC -DGS4_NO_VECTORS -I. -fsyntax-only "$tmp/implementation.cpp"
 }
@@ -400,7 +400,6 @@ fuzz() {
     check "in float" fuzzed "$build" 1 80
     check "in double" fuzzed "$build -DGS4_DOUBLE" 1101 50
 }
-few_fuzz() { check "a few scenes" fuzzed "$CC -O0 -w" 1 10; }
 
 tsan() {
     have gcc || return

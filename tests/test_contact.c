@@ -1979,7 +1979,7 @@ static void run_contact(void)
     RUN_ONCE(test_contact_sticky_wall);
     RUN_ONCE(test_contact_leaves);
     RUN_FULL(test_contact_carries);
-    RUN(test_contact_paddles);
+    RUN_ONCE(test_contact_paddles);
     RUN_ONCE(test_contact_glides);
     RUN_FULL(test_contact_rides);
     RUN_ONCE(test_contact_sweeps);

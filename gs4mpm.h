@@ -358,7 +358,7 @@
  * that are liquid, air or solid, by itself: multigrid in float preconditions conjugate gradients in
  * double. It needs 6 to 11 iterations for a residual of 1e-8 whatever the size, also where large
  * parts differ by 1000. Small parts that differ so, walls with holes of one cell, spray, porous
- * matter and serpentines take up to 21; single faces that differ by 1000 up to 41; a maze of
+ * matter and serpentines take up to 21; single faces that differ by 1000 up to 130; a maze of
  * corridors one cell wide 80 (tests/test_poisson.c, bench/poisson.c). Pockets are found: there the
  * mean of x is 0, and the mean of rhs is taken off. At 256^3 it takes 45 bytes a cell where one
  * coefficient serves all faces, 58 else, 72 in double, 5 to 9 more with a diagonal; more in small

@@ -151,6 +151,28 @@ static void test_poisson_iterations(void)
     if (test_full) pois_iterations("T4", 132);
 }
 
+/* Faces that differ by 1000 from one to the next, some of them or half. */
+static void test_poisson_faces(void)
+{
+    static const double shares[] = { 0.001, 0.01, 0.1, 0.5, 0.9 };
+    int k, a, n;
+    for (k = 0; k < 5; k++)
+        for (n = 24; n <= (test_full ? 64 : 24); n += 40) {
+            poisson_case p = poisson_make("P1", n);
+            gs4_solve_stats stats;
+            double bound;
+            size_t f;
+            for (a = 0; a < 3; a++) {
+                p.desc.coefficient[a] = p.coefficient[a] = poisson_array(p.faces[a]);
+                for (f = 0; f < p.faces[a]; f++)
+                    p.coefficient[a][f] = poisson_random(&p.random) < shares[k] ? 1000 : 1;
+            }
+            CHECK_RESULT(NULL, pois_solve(&p, &stats), GS4_OK);
+            CHECK(poisson_residual(&p, p.x, &bound) <= 1.001e-8 + bound && stats.iterations <= 130);
+            poisson_free(&p);
+        }
+}
+
 /* A box of corridors one cell wide, all of them one tree: the way between two cells may be as
  * long as all corridors. */
 static void test_poisson_maze(void)
@@ -975,6 +997,7 @@ static void run_poisson(void)
     RUN(test_poisson_krylov);
     RUN_ONCE(test_poisson_agrees_with_oracle);
     RUN_ONCE(test_poisson_iterations);
+    RUN_ONCE(test_poisson_faces);
     RUN(test_poisson_maze);
     RUN_ONCE(test_poisson_shapes);
     RUN(test_poisson_few_unknowns);

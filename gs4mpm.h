@@ -244,9 +244,11 @@
  *     p + s K div u~ = -K (J** - 1);   div u~ = 0 where K is infinite
  * Cells are liquid where material fills more than 51.5 % of their kernel. p is 0 where the surface
  * is: w is its distance from the centre of the liquid cell before it, in cells, found from how full
- * both are. Beyond liquid three layers of faces have u~ and acc by linear extrapolation; particles
- * without liquid around fly by themselves. Where K is infinite acc is split, as (u~ - v**)/s alone
- * has what scattering and gathering do not invert, times 1/s, and does not converge in time:
+ * both are. Beyond liquid three layers of faces have u~ and acc by linear extrapolation, P; forces
+ * of stress there, and masses, act on the faces that those go on from, P^T m P acc = P^T f. So
+ * stress takes no momentum, and its angular momentum is off by some 1e-3. Particles without liquid
+ * around fly by themselves. Where K is infinite acc is split, as (u~ - v**)/s alone has what
+ * scattering and gathering do not invert, times 1/s, and does not converge in time:
  *     (u~ - v**)/s = acc + grad phi/(w rho),  div acc = tr(L L),  L = grad u~
  * acc makes rates and ag. theta = min(1/2, s U/h) of the rest, U the largest speed, moves particles
  * alone. At last positions move by dt u_c, div u_c = e U/h, e how much too full a cell is (at a
@@ -389,7 +391,8 @@
  * flux_relaxation_time, 16 (or 32) a cell near material, and about 100 a cell of the box around all
  * material, where the solver works; 150 where an axis is periodic.
  * Partitioned: 161 a particle, and about 320 a cell of the box around all material (double 313 and
- * 530), blocks and solver included; measured where it fills 64^3 cells.
+ * 530), blocks and solver included; measured where it fills 64^3 cells. With viscosity or
+ * elasticity about 120 more for each face within three cells of a free surface.
  * A mesh: about 400 (double 800) per cell face of its surface in the domain or within 10 cells of
  * it; where that is more than 1 GB it is refused. Its distance is sampled twice a cell within three
  * cells of the surface. A mesh that moves is sampled anew now and then, but for one that takes less
@@ -10939,8 +10942,9 @@ typedef struct gs4i_staggered {
     int without_split, without_correction; /* for tests of what they are for */
     uint8_t *kind;                         /* gs4_cell */
     gs4i_solver solver;
-    int iterations;  /* of this step */
-    double residual; /* the largest of this step */
+    gs4i_scratch fitted, fit; /* faces at surfaces; vectors of them, see [[partitioned]] */
+    int iterations;           /* of this step */
+    double residual;          /* the largest of this step */
 } gs4i_staggered;
 
 typedef enum gs4i_clock {
@@ -14049,6 +14053,8 @@ static void gs4i_free_staggered(gs4i_memory *m, gs4i_staggered *f)
     gs4i_box_free(m, &f->box);
     f->solver.memory = m;
     gs4i_solver_free(&f->solver);
+    gs4i_free(m, f->fitted.data, f->fitted.bytes, 1);
+    gs4i_free(m, f->fit.data, f->fit.bytes, 1);
 }
 
 /* --- walls ------------------------------------------------------------------------------------ */
@@ -15485,6 +15491,227 @@ static int gs4i_finish_acceleration(gs4_sim *sim, gs4_real fastest)
     return GS4_OK;
 }
 
+/* --- stress at surfaces ----------------------------------------------------------------------- *
+ *
+ * Faces beyond liquid do as those that they are extrapolated from, u = E u_in. Forces f there, and
+ * the mass m there, do so through these: with P = (1; E) acceleration by stress has the power of f
+ * and the momentum of what particles take from it where
+ *
+ *     P^T M P a = P^T f                                                                       (P3)
+ *
+ * a is what comes nearest to f/m on all faces, weighed by m. P has rigid motions, so momentum and
+ * angular momentum stay. Sums of columns of P^T M P in place of it are negative at corners. */
+
+/* A face beyond liquid, by numbers of those that it is extrapolated from: 2 one - two of each side
+ * if it is linear, else the mean of one; or, with no sides, one of those that the solve moves.
+ * Number 0 is what nothing moves: walls and bodies. What it depends on has lower numbers. */
+typedef struct gs4i_fitted_face {
+    size_t face;
+    uint32_t one[6], two[6];
+    int axis, sides, linear;
+} gs4i_fitted_face;
+
+typedef struct gs4i_fit {
+    const gs4i_fitted_face *face;
+    double *mass, *value;
+    size_t count;
+} gs4i_fit;
+
+/* Numbers are kept, for as long as they are needed, where the correction of volume will be. */
+static uint32_t gs4i_fitted_number(const gs4i_staggered *f, int c, ptrdiff_t face)
+{
+    uint32_t number;
+    memcpy(&number, f->taken[c] + 4 * face + GS4I_FACE_CORRECTION, sizeof number);
+    return number;
+}
+
+/* The next number, for a face. NULL when memory is refused. */
+static gs4i_fitted_face *gs4i_number_face(gs4_sim *sim, int c, size_t face, uint32_t *count)
+{
+    gs4i_staggered *f = &sim->staggered;
+    const size_t size = sizeof(gs4i_fitted_face), keep = *count * size;
+    gs4i_fitted_face *list =
+        (gs4i_fitted_face *)gs4i_scratch_reserve(&sim->memory, &f->fitted, keep + size, keep);
+    if (!list) return NULL;
+    list += *count;
+    memset(list, 0, size);
+    list->face = face;
+    list->axis = c;
+    memcpy(f->taken[c] + 4 * face + GS4I_FACE_CORRECTION, count, sizeof *count);
+    (*count)++;
+    return list;
+}
+
+/* The number of a face that others are extrapolated from. */
+static int gs4i_number_source(gs4_sim *sim, int c, ptrdiff_t face, uint32_t *count,
+                              uint32_t *number)
+{
+    gs4i_staggered *f = &sim->staggered;
+    if (f->known[c][face] == GS4I_FACE_SOLVED && !gs4i_fitted_number(f, c, face)
+        && !gs4i_number_face(sim, c, (size_t)face, count))
+        return GS4_ERROR_MEMORY;
+    *number = gs4i_fitted_number(f, c, face);
+    return GS4_OK;
+}
+
+/* One face beyond liquid, as gs4i_extrapolate_face has it. */
+static int gs4i_number_beyond(gs4_sim *sim, int c, const int at[3], size_t i, uint32_t *count)
+{
+    const gs4i_staggered *f = &sim->staggered;
+    const uint8_t *known = f->known[c];
+    const ptrdiff_t nx = gs4i_box_length(&f->box, 1 << c, 0),
+                    step[3] = { 1, nx, nx * gs4i_box_length(&f->box, 1 << c, 1) };
+    gs4i_fitted_face q, *to;
+    int side;
+    memset(&q, 0, sizeof q);
+    for (side = 0; side < 6; side++) {
+        const int a = side / 2, last = f->to[a] - (a != c);
+        const int room = side & 1 ? last - at[a] : at[a] - f->from[a];
+        const ptrdiff_t d = side & 1 ? step[a] : -step[a], n1 = (ptrdiff_t)i + d, n2 = n1 + d;
+        int linear;
+        if (room < 1 || !known[n1] || known[n1] >= known[i]) continue;
+        linear = room >= 2 && known[n2] && known[n2] < known[i];
+        if (q.linear && !linear) continue;
+        if (linear && !q.linear) q.sides = 0;
+        q.linear |= linear;
+        GS4I_TRY(gs4i_number_source(sim, c, n1, count, &q.one[q.sides]));
+        q.two[q.sides] = 0;
+        if (linear) GS4I_TRY(gs4i_number_source(sim, c, n2, count, &q.two[q.sides]));
+        q.sides++;
+    }
+    if (!(to = gs4i_number_face(sim, c, i, count))) return GS4_ERROR_MEMORY;
+    q.face = i;
+    q.axis = c;
+    *to = q;
+    return GS4_OK;
+}
+
+/* All faces beyond liquid, layer by layer, and those that they depend on; and vectors for them. */
+static int gs4i_begin_fit(gs4_sim *sim, gs4i_fit *fit, gs4i_krylov *k)
+{
+    gs4i_staggered *f = &sim->staggered;
+    int layer, c, z, at[3];
+    uint32_t count = 1;
+    size_t i;
+    if (!gs4i_scratch_reserve(&sim->memory, &f->fitted, sizeof *fit->face, 0))
+        return GS4_ERROR_MEMORY;
+    gs4i_extrapolate(sim, 0);
+    for (layer = GS4I_FACE_LAYER; layer < GS4I_FACE_LAYER + GS4I_FACE_LAYERS; layer++)
+        for (c = 0; c < 3; c++)
+            for (z = 0; z <= f->box.size[2]; z++)
+                GS4I_EACH_FACE(f, c, z, at, i)
+                    if (f->known[c][i] == layer)
+                        GS4I_TRY(gs4i_number_beyond(sim, c, at, i, &count));
+    fit->count = count;
+    fit->face = (const gs4i_fitted_face *)f->fitted.data;
+    k->n = count;
+    k->x = (double *)gs4i_scratch_reserve(&sim->memory, &f->fit, 6 * count * sizeof *k->x, 0);
+    if (!k->x) return GS4_ERROR_MEMORY;
+    k->r = k->x + count;
+    k->p = k->r + count;
+    k->q = k->p + count;
+    fit->mass = k->q + count;
+    fit->value = fit->mass + count;
+    fit->mass[0] = k->r[0] = 0;
+    for (i = 1; i < count; i++) {
+        const gs4i_fitted_face *q = fit->face + i;
+        fit->mass[i] = (double)f->given[q->axis][4 * q->face + GS4I_FACE_MASS];
+        k->r[i] = (double)f->force[q->axis][q->face];
+    }
+    return GS4_OK;
+}
+
+/* value = P value, from what the solve moves. */
+static void gs4i_fit_extrapolate(const gs4i_fit *fit)
+{
+    double *v = fit->value;
+    size_t i;
+    int n;
+    v[0] = 0;
+    for (i = 1; i < fit->count; i++) {
+        const gs4i_fitted_face *q = fit->face + i;
+        double sum = 0;
+        if (!q->sides) continue;
+        for (n = 0; n < q->sides; n++)
+            sum += q->linear ? 2 * v[q->one[n]] - v[q->two[n]] : v[q->one[n]];
+        v[i] = sum / q->sides;
+    }
+}
+
+/* v = P^T v: to what the solve moves; nothing stays elsewhere. */
+static void gs4i_fit_fold(const gs4i_fit *fit, double *v)
+{
+    size_t i;
+    int n;
+    for (i = fit->count - 1; i; i--) {
+        const gs4i_fitted_face *q = fit->face + i;
+        for (n = 0; n < q->sides; n++) {
+            const double part = v[i] / q->sides;
+            v[q->one[n]] += q->linear ? 2 * part : part;
+            if (q->linear) v[q->two[n]] -= part;
+        }
+        if (q->sides) v[i] = 0;
+    }
+    v[0] = 0;
+}
+
+static void gs4i_fit_apply(void *context, const double *p, double *out)
+{
+    const gs4i_fit *fit = (const gs4i_fit *)context;
+    size_t i;
+    memcpy(fit->value, p, fit->count * sizeof *p);
+    gs4i_fit_extrapolate(fit);
+    for (i = 0; i < fit->count; i++) out[i] = fit->mass[i] * fit->value[i];
+    gs4i_fit_fold(fit, out);
+}
+
+static int gs4i_fit_precondition(void *context, const double *r, double *out)
+{
+    const gs4i_fit *fit = (const gs4i_fit *)context;
+    size_t i;
+    for (i = 0; i < fit->count; i++) out[i] = i && !fit->face[i].sides ? r[i] / fit->mass[i] : 0;
+    return GS4_OK;
+}
+
+/* Of the folded forces, so much may be left over: momentum is conserved within it. About 12
+ * iterations. */
+#define GS4I_FIT_TOLERANCE (sizeof(gs4_real) == 8 ? 1e-12 : 1e-8)
+#define GS4I_FIT_ITERATIONS 200
+
+/* (P3), into the first guess of u~. */
+static int gs4i_fit_stress(gs4_sim *sim)
+{
+    gs4i_staggered *f = &sim->staggered;
+    gs4i_fit fit;
+    gs4i_krylov k;
+    int result = gs4i_begin_fit(sim, &fit, &k);
+    size_t i;
+    if (result != GS4_OK) return gs4i_fail_memory(&sim->error);
+    k.apply = gs4i_fit_apply;
+    k.precondition = gs4i_fit_precondition;
+    k.context = &fit;
+    gs4i_fit_fold(&fit, k.r);
+    result = gs4i_conjugate_gradients(&k, GS4I_FIT_TOLERANCE, GS4I_FIT_ITERATIONS);
+    if (result != GS4_OK)
+        return gs4i_fail_value(&sim->error, GS4_ERROR_UNSTABLE,
+                               "of the forces of stress at surfaces a part of ", k.residual,
+                               " could not be balanced, as they are not finite or absurd; the "
+                               "step was not taken; a smaller dt would do");
+    for (i = 1; i < fit.count; i++) {
+        const gs4i_fitted_face *q = fit.face + i;
+        gs4_real *t = f->taken[q->axis] + 4 * q->face;
+        t[GS4I_FACE_CORRECTION] = 0;
+        if (q->sides) {
+            f->known[q->axis][q->face] = GS4I_FACE_UNKNOWN;
+            continue;
+        }
+        t[GS4I_FACE_ACCELERATION] = GS4I_C(k.x[i]) + gs4i_axis_of(sim->desc.gravity, q->axis);
+        t[GS4I_FACE_STAGE] = f->given[q->axis][4 * q->face + GS4I_FACE_VELOCITY]
+                             + sim->integrator.s * t[GS4I_FACE_ACCELERATION];
+    }
+    return GS4_OK;
+}
+
 /* S4, S5 and u~. */
 static int gs4i_find_stage_velocity(gs4_sim *sim, gs4i_node_pass *nodes)
 {
@@ -15503,6 +15730,7 @@ static int gs4i_find_stage_velocity(gs4_sim *sim, gs4i_node_pass *nodes)
     gs4i_parallel_for(&sim->tasks, planes + 1, gs4i_predict_faces, &pass);
     gs4i_parallel_for(&sim->tasks, planes, gs4i_classify_cells, &pass);
     gs4i_parallel_for(&sim->tasks, planes + 1, gs4i_classify_faces, &pass);
+    if (f->is_viscous) GS4I_TRY(gs4i_fit_stress(sim));
     GS4I_TRY(gs4i_setup_pressure(sim));
     return gs4i_project(sim, GS4I_FACE_STAGE);
 }
@@ -21495,6 +21723,8 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_MIXING
 #undef GS4I_MORE_SWEEPS
 #undef GS4I_MOST_CORRECTION
+#undef GS4I_FIT_TOLERANCE
+#undef GS4I_FIT_ITERATIONS
 #undef GS4I_MOST_STRAIN
 #undef GS4I_MOST_STRETCH
 #undef GS4I_MUL
@@ -21608,4 +21838,5 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  * flip_decay_time 0, the default: noise of velocities and J after impacts decays as fast as it
  * crosses cells (NOISE); other values mean what they did. gs4_get_desc gives 0 for it, before
  * 0.5. GS4_FIELD_PRESSURE, of the partitioned scheme, in frames too; that has heat now, and steps
- * no longer than ripples of its surfaces bear; and separating walls. */
+ * no longer than ripples of its surfaces bear; and separating walls. Forces of stress at its free
+ * surfaces are not lost any more: there elastic bodies gained energy, and viscous ones momentum. */

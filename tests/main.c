@@ -23,6 +23,7 @@
 #include "test_contact.c"
 #include "test_partitioned.c"
 #include "test_partitioned_walls.c"
+#include "test_partitioned_surface.c"
 #include "test_mesh.c"
 #include "test_reference.c"
 
@@ -99,6 +100,7 @@ int main(int count, char **values)
     run_contact();
     run_partitioned();
     run_partitioned_walls();
+    run_partitioned_surface();
     run_mesh();
     RUN_ONCE(test_reference);
     RUN_ONCE(test_stability);

@@ -587,7 +587,8 @@ typedef void (*gs4_parallel_for_fn)(int count, gs4_task_fn task, void *context, 
 /* Level 0: information, 1: warning, 2: error. */
 typedef void (*gs4_log_fn)(int level, const char *message, void *user);
 
-/* A clock in seconds; without one all timings are 0. */
+/* A clock in seconds; without one all timings are 0. Times that it says are negative or no number
+ * count as 0. */
 typedef double (*gs4_now_fn)(void *user);
 
 /* ==== [[materials]] what matter is ============================================================ */
@@ -866,7 +867,10 @@ typedef struct gs4_budget {
  * passed, refused or not; the rest is gs4_stats.time_left. To end early is no error. */
 GS4_API int gs4_advance_within(gs4_sim *sim, gs4_real duration, const gs4_budget *budget,
                                double *done);
-GS4_API gs4_real gs4_stable_dt(const gs4_sim *sim); /* s, see STABILITY; without `cfl` */
+
+/* s, see STABILITY; without `cfl`. 0 where a viscosity is none, and in a viscosity callback that
+ * this asked: gs4_last_error says which. */
+GS4_API gs4_real gs4_stable_dt(gs4_sim *sim);
 
 /* Of each particle; SI. A scene has stress to flux only where a material needs them. */
 typedef enum gs4_field {
@@ -1529,6 +1533,13 @@ static void gs4i_sort(uint32_t *v, int n)
             v[child] = t;
         }
     }
+}
+
+/* Seconds between two times that a clock said; 0 where they run backwards or are no numbers. */
+static double gs4i_elapsed(double start, double end)
+{
+    const double seconds = end - start;
+    return seconds > 0 && seconds < 1e300 ? seconds : 0;
 }
 
 /* splitmix64: hashes and jitter */
@@ -10990,6 +11001,7 @@ struct gs4_sim {
     int bad_distance; /* see gs4i_shape_or_field */
     unsigned warned;  /* gs4i_warning */
     int busy;         /* a callback may be running: no call may change anything */
+    int asks;         /* a callback of viscosity may be, for gs4_stable_dt */
     double time_left; /* s, of gs4_advance */
     gs4i_error error; /* the last one */
 };
@@ -11004,6 +11016,8 @@ static double gs4i_now(gs4_sim *sim)
     sim->busy = busy;
     return now;
 }
+
+static double gs4i_since(gs4_sim *sim, double start) { return gs4i_elapsed(start, gs4i_now(sim)); }
 
 /* What is likely not meant, though it is allowed: said once a simulation, at level 1. */
 typedef enum gs4i_warning {
@@ -15767,7 +15781,7 @@ static int gs4i_accelerate_by_projection(gs4_sim *sim, gs4i_node_pass *nodes)
     f->is_safe = !sim->particles.elastic_reals && !sim->particles.deformation_reals
                  && fastest * sim->integrator.dt < sim->grid.h
                  && most * sim->integrator.dt < GS4I_C(GS4I_SAFE_STRAIN);
-    sim->seconds[GS4I_CLOCK_SOLVE] += gs4i_now(sim) - start;
+    sim->seconds[GS4I_CLOCK_SOLVE] += gs4i_since(sim, start);
     return GS4_OK;
 }
 
@@ -16533,7 +16547,7 @@ static int gs4i_solve_heat(gs4_sim *sim, gs4i_node_pass *nodes)
     gs4i_parallel_for(&sim->tasks, k->box.size[2], gs4i_heat_curvature, nodes);
     gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_heat_from_box, nodes);
     gs4i_fill_heat(sim);
-    sim->seconds[GS4I_CLOCK_SOLVE] += gs4i_now(sim) - start;
+    sim->seconds[GS4I_CLOCK_SOLVE] += gs4i_since(sim, start);
     return GS4_OK;
 }
 
@@ -17895,9 +17909,10 @@ static int gs4i_fail_bad(gs4_sim *sim, const gs4i_report *r)
             : r->bad == GS4I_BAD_DEFORMATION
                 ? " would be stretched, sheared or turned by more than a factor of e^8 in one step"
                 : " has a viscosity that is negative, not finite or absurdly large");
-    gs4i_put(
-        &t,
-        "; the step was not taken; a smaller dt, a higher sound_speed or a slower start would do");
+    gs4i_put(&t, "; the step was not taken; ");
+    gs4i_put(&t, r->bad == GS4I_BAD_VISCOSITY
+                     ? "the viscosity's law must give 0 or a finite number above"
+                     : "a smaller dt, a higher sound_speed or a slower start would do");
     return gs4i_end_error(&sim->error, GS4_ERROR_UNSTABLE);
 }
 
@@ -18002,6 +18017,7 @@ static void gs4i_find_limits(const gs4_sim *sim, gs4_real top_speed, gs4i_report
         gs4i_follow_speed(sim, top_speed, &r.constants);
         if (r.heat) gs4i_load_batch_heat(&r);
         gs4i_stress(&r, L, q.v[3], sigma, mu);
+        gs4i_check_liquids(report, q.v[3], mu, p->id + i, n);
         gs4i_see_motion(&r.seen, q.v, L);
     }
     gs4i_report_liquids(report, &r.seen);
@@ -18172,7 +18188,7 @@ static int gs4i_bin(gs4_sim *sim)
     sim->needs_sort = 1;
     GS4I_TRY(gs4i_after_occupy(sim));
     sim->needs_sort = 0;
-    sim->seconds[GS4I_CLOCK_SORT] += gs4i_now(sim) - start;
+    sim->seconds[GS4I_CLOCK_SORT] += gs4i_since(sim, start);
     return GS4_OK;
 }
 
@@ -18382,7 +18398,7 @@ static int gs4i_step(gs4_sim *sim, gs4_real dt)
     const int result = gs4i_make_step(sim, dt);
     if (result == GS4_OK) {
         sim->needs_spin = 0;
-        sim->seconds[GS4I_CLOCK_TOTAL] += gs4i_now(sim) - start;
+        sim->seconds[GS4I_CLOCK_TOTAL] += gs4i_since(sim, start);
     } else if (sim->needs_spin)
         gs4i_forget_spin(sim);
     return result;
@@ -20694,33 +20710,44 @@ static void gs4i_warn_of_soft(gs4_sim *sim)
     }
 }
 
-/* Largest stable dt of the present state, s. What an edit by hand has brought is seen, but left
- * to the next call that checks it. */
-static gs4_real gs4i_limit_now(const gs4_sim *sim)
+/* Largest stable dt of the present state, s, and the extremes `r` that set it. What an edit by hand
+ * has brought is seen, but left to the next call that checks it. */
+static int gs4i_limit_now(gs4_sim *sim, gs4i_report *r, gs4_real *limit)
 {
-    gs4i_report r = sim->limits;
+    const int busy = sim->busy;
     gs4_real top_speed = sim->top_speed;
+    *limit = 0;
+    GS4I_TRY(gs4i_require(&sim->error, !sim->asks,
+                          "gs4_stable_dt is asked by a viscosity callback that it asks itself"));
+    sim->busy = sim->asks = 1;
+    *r = sim->limits;
     if (sim->needs_check) top_speed = gs4i_max(top_speed, gs4i_top_speed(&sim->particles));
-    if (sim->limits_stale) gs4i_find_limits(sim, top_speed, &r);
-    return gs4i_stable_dt(sim, &r);
+    if (sim->limits_stale) gs4i_find_limits(sim, top_speed, r);
+    if (!r->bad) *limit = gs4i_stable_dt(sim, r);
+    sim->busy = busy;
+    sim->asks = 0;
+    return r->bad ? gs4i_fail_bad(sim, r) : GS4_OK;
 }
 
-GS4_API gs4_real gs4_stable_dt(const gs4_sim *sim) { return sim ? gs4i_limit_now(sim) : GS4I_C(0); }
+GS4_API gs4_real gs4_stable_dt(gs4_sim *sim)
+{
+    gs4i_report r;
+    gs4_real limit = 0;
+    if (sim) gs4i_limit_now(sim, &r, &limit);
+    return limit;
+}
 
 static int gs4i_try_step(gs4_sim *sim, gs4_real dt)
 {
+    gs4i_report r;
     gs4_real limit;
     int result;
     GS4I_TRY(gs4i_check(&sim->error, "dt", dt, GS4I_POSITIVE));
     GS4I_TRY(gs4i_check_edit(sim));
-    sim->busy = 1;
-    if (sim->limits_stale) {
-        gs4i_find_limits(sim, sim->top_speed, &sim->limits);
-        sim->limits_stale = 0;
-        gs4i_warn_of_soft(sim);
-    }
-    limit = gs4i_limit_now(sim);
-    sim->busy = 0;
+    GS4I_TRY(gs4i_limit_now(sim, &r, &limit));
+    sim->limits = r;
+    if (sim->limits_stale) gs4i_warn_of_soft(sim);
+    sim->limits_stale = 0;
     if (limit < GS4I_C(1e-6) && dt <= limit)
         gs4i_warn_value(sim, GS4I_WARN_SHORT_STEPS, "the stable step is ", (double)limit,
                         " s: a second of the scene takes more than a million steps; less "
@@ -20782,8 +20809,7 @@ static int gs4i_advance(gs4_sim *sim, const gs4_budget *budget)
 {
     double *left = &sim->time_left;
     const gs4i_error before = sim->error;
-    const double start = gs4i_now(sim);
-    double now = start;
+    double now = gs4i_now(sim), used = 0;
     int taken = 0;
     while (*left > 0) {
         const double began = now;
@@ -20791,7 +20817,10 @@ static int gs4i_advance(gs4_sim *sim, const gs4_budget *budget)
         int tries, result = GS4_OK;
         /* a refused step is tried again, shorter */
         for (tries = 0; tries < 8; tries++, fraction *= gs4i_less(sim)) {
-            dt = fraction * (double)gs4i_limit_now(sim);
+            gs4i_report r;
+            gs4_real limit;
+            GS4I_TRY(gs4i_limit_now(sim, &r, &limit));
+            dt = fraction * (double)limit;
             if (sim->desc.max_dt > 0 && dt > (double)sim->desc.max_dt)
                 dt = (double)sim->desc.max_dt;
             steps = ceil(*left / dt * (1 - 1e-9));
@@ -20808,9 +20837,11 @@ static int gs4i_advance(gs4_sim *sim, const gs4_budget *budget)
         if (tries) sim->error = before;
         *left = steps <= 1 ? 0 : *left - sim->last_dt;
         now = gs4i_now(sim);
+        used += gs4i_elapsed(began, now);
         taken++;
         if ((budget->steps > 0 && taken >= budget->steps)
-            || (budget->seconds > 0 && now - start + (now - began) > budget->seconds)
+            /* a clock that gives no number ends it */
+            || (budget->seconds > 0 && !(used + (now - began) <= budget->seconds))
             || !gs4i_goes_on(sim, budget))
             break;
     }
@@ -21204,7 +21235,7 @@ GS4_API gs4_stats gs4_get_stats(gs4_sim *sim)
     s.seconds_sort = sim->seconds[GS4I_CLOCK_SORT];
     s.seconds_solve = sim->seconds[GS4I_CLOCK_SOLVE];
     /* stress is evaluated within the transfers */
-    s.seconds_transfer = s.seconds_total - s.seconds_sort - s.seconds_solve;
+    s.seconds_transfer = fmax(0, s.seconds_total - s.seconds_sort - s.seconds_solve);
     return s;
 }
 
@@ -21577,7 +21608,7 @@ static int gs4i_init_poisson(gs4i_error *e, gs4_poisson *p)
         return gs4i_fail(e, GS4_ERROR_MEMORY, "the threads could not be started");
     p->solver.returns_best = 1;
     r = gs4i_solver_setup(&p->solver, d);
-    p->setup_seconds = gs4i_poisson_now(p) - start;
+    p->setup_seconds = gs4i_elapsed(start, gs4i_poisson_now(p));
     p->desc.kind = NULL;
     p->desc.diagonal = p->desc.coefficient[0] = p->desc.coefficient[1] = p->desc.coefficient[2] =
         NULL;
@@ -21630,7 +21661,7 @@ static int gs4i_poisson_solve(gs4i_error *e, gs4_poisson *p, const gs4_real *rhs
     r = gs4i_solver_solve(&p->solver, rhs, x, (double)p->desc.tolerance, p->desc.max_iterations,
                           stats);
     stats->setup_seconds = p->setup_seconds;
-    stats->solve_seconds = gs4i_poisson_now(p) - start;
+    stats->solve_seconds = gs4i_elapsed(start, gs4i_poisson_now(p));
     p->busy = 0;
     stats->memory_bytes = p->memory.bytes;
     if (r == GS4_OK) return GS4_OK;

@@ -2241,6 +2241,102 @@ static void err_check_calls(err_calls_back *c, gs4_sim *sim, const char *sentenc
     c->calls = c->refused = 0;
 }
 
+/* What gs4_stable_dt asks of a viscosity: a number that is none is said, and a law that calls the
+ * library is refused, gs4_stable_dt itself too, or it would ask without end. */
+typedef struct err_asked {
+    gs4_sim *sim;
+    double value;
+    int calls, stable, refused;
+} err_asked;
+
+static gs4_real err_asked_viscosity(gs4_real temperature, gs4_real rate, void *user)
+{
+    err_asked *c = (err_asked *)user;
+    (void)temperature;
+    (void)rate;
+    if (c->sim && c->calls++ < 100) {
+        c->stable += gs4_stable_dt(c->sim) > 0;
+        c->refused += gs4_step(c->sim, (gs4_real)1e-5) == GS4_ERROR_ARGUMENT;
+    }
+    return (gs4_real)c->value;
+}
+
+static void test_errors_stable_dt(void)
+{
+    const double wrong[] = { ERR_NAN, -1, ERR_INFINITY, -ERR_INFINITY, 1e30 };
+    const gs4_sim_desc d = err_desc();
+    gs4_material m = err_material();
+    err_asked c = { NULL, 0.1, 0, 0, 0 };
+    gs4_sim *sim = NULL;
+    uint64_t hash;
+    int v;
+    m.viscosity_law = GS4_VISCOSITY_CALLBACK;
+    m.viscosity_fn = err_asked_viscosity;
+    m.viscosity_user = &c;
+    gs4_create(&d, &sim);
+    CHECK(gs4_add_material(sim, &m) == 0);
+    CHECK(err_add_block(sim) == 64);
+    hash = gs4_state_hash(sim);
+    for (v = 0; v < 5; v++) {
+        c.value = wrong[v];
+        CHECK(gs4_stable_dt(sim) == 0);
+        CHECK(strstr(gs4_last_error(sim), "must give 0 or a finite number") != NULL);
+        ERR_REFUSED(sim, gs4_step(sim, (gs4_real)1e-6), GS4_ERROR_UNSTABLE, "viscosity");
+        ERR_REFUSED(sim, gs4_advance(sim, (gs4_real)1e-3), GS4_ERROR_UNSTABLE, "viscosity");
+    }
+    c.value = 0.1;
+    c.sim = sim;
+    CHECK(gs4_stable_dt(sim) > 0);
+    CHECK(c.calls >= 64 && c.stable == 0 && c.refused == c.calls);
+    c.calls = c.refused = 0;
+    CHECK_RESULT(sim, gs4_step(sim, (gs4_real)1e-5), 0);
+    CHECK(c.calls > 64 && c.refused == 100);
+    c.sim = NULL;
+    CHECK(hash != gs4_state_hash(sim) && gs4_get_stats(sim).steps == 1);
+    gs4_destroy(sim);
+}
+
+/* A clock that says nothing of use: times count as 0, and it ends a budget of seconds. */
+static double err_bad_now(void *user)
+{
+    static const double says[] = { ERR_NAN, 1e5, ERR_INFINITY, -ERR_INFINITY, 3, 7 };
+    int *state = (int *)user; /* which number; from 6 on: backwards */
+    return *state < 5 ? says[*state] : *state == 5 ? says[(*state)--] : -(double)(*state)++;
+}
+
+static void test_errors_clock(void)
+{
+    int first;
+    for (first = 0; first < 7; first++) {
+        gs4_sim_desc d = err_desc();
+        gs4_budget b = { 0, 1, NULL, NULL };
+        const gs4_material m = err_material();
+        gs4_sim *sim = NULL;
+        gs4_stats s;
+        int state = first, i;
+        d.now = err_bad_now;
+        d.now_user = &state;
+        gs4_create(&d, &sim);
+        CHECK(gs4_add_material(sim, &m) == 0);
+        CHECK(err_add_block(sim) == 64);
+        for (i = 0; i < 5; i++) {
+            CHECK_RESULT(sim, gs4_step(sim, (gs4_real)1e-5), 0);
+            if (first < 6) state = (first + i) % 6;
+        }
+        s = gs4_get_stats(sim);
+        CHECK(s.seconds_total >= 0 && s.seconds_total < 1e6);
+        CHECK(s.seconds_sort >= 0 && s.seconds_sort < 1e6);
+        CHECK(s.seconds_solve >= 0 && s.seconds_solve < 1e6);
+        CHECK(s.seconds_transfer >= 0 && s.seconds_transfer < 1e6);
+        if (first == 0 || first == 2) {
+            state = first;
+            CHECK_RESULT(sim, gs4_advance_within(sim, (gs4_real)0.1, &b, NULL), 0);
+            CHECK(gs4_get_stats(sim).steps == s.steps + 1 && gs4_get_stats(sim).time_left > 0);
+        }
+        gs4_destroy(sim);
+    }
+}
+
 /* The same outside of steps: who hears of an error or a warning, a clock, an allocator, a distance.
  * The sentence of the call that failed is there afterwards. */
 static void test_errors_callback_calls_outside(void)
@@ -2481,6 +2577,8 @@ static void run_errors(void)
     RUN(test_errors_too_much);
     RUN_ONCE(test_errors_half_way);
     RUN_ONCE(test_errors_callback_calls);
+    RUN_ONCE(test_errors_stable_dt);
+    RUN_ONCE(test_errors_clock);
     RUN_ONCE(test_errors_callback_calls_outside);
     RUN_ONCE(test_errors_poisson_callback_calls);
     RUN_ONCE(test_errors_refused_emitter);

@@ -21855,8 +21855,9 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  * Refused now: numbers too small for a reciprocal, callbacks that give no number, shapes too far
  * out for gs4_real, changes of a simulation by its own callbacks, checkpoints with numbers that no
  * simulation has or with other pivots, starts or stops. `log` says at level 1, once each, what is
- * allowed but hardly meant. gs4_stats has time_left and
- * occupied_volume. Files follow symbolic links.
+ * allowed but hardly meant. gs4_stats has time_left and occupied_volume. gs4_stable_dt takes a
+ * simulation that is not const, and is 0 where a law gives no viscosity. Files follow symbolic
+ * links.
  * Emitters: the velocity of a filling is relative to the emitter, which travels from its start on.
  * Densities: the stable step of GS4 sees heavy particles among light ones, default speeds of sound
  * the densest material. J may be up to 256, before 16.

@@ -7793,7 +7793,7 @@ static void gs4i_stage_elastic(const gs4i_elastic_constants *l, gs4i_lanes G, co
                 / (GS4I_C(1) + w * relax[b]);
     if (gs4i_resolved(G, l->alpha, L, s, relax, stiff, integrator, ok)) return;
     batch = gs4i_batch_to_split(l, G, L, e, (double)ahead);
-    for (b = 0; b < n; b++)
+    for (b = 0; b < n && !count->failed; b++)
         if (!ok[b]) gs4i_split_one(&batch, b, s, NULL, count);
 }
 
@@ -7840,7 +7840,7 @@ static void gs4i_correct_elastic(const gs4i_elastic_constants *l, gs4i_elastic *
     if (gs4i_resolved(G, l->alpha, L, e->s, relax, stiff, integrator, ok)) return;
     batch = gs4i_batch_to_split(l, G, L, &old, (double)dt);
     batch.gamma = (double)integrator->gamma;
-    for (b = 0; b < n; b++)
+    for (b = 0; b < n && !count->failed; b++)
         if (!ok[b]) gs4i_split_one(&batch, b, e->s, e->rate, count);
 }
 
@@ -9136,6 +9136,7 @@ static void gs4i_add_elastic(gs4i_response *r, gs4i_gradient L, gs4i_symmetric s
     gs4i_symmetric s;
     gs4i_lanes G, stiffness;
     int b, c;
+    if (r->report->bad) return; /* refused anyway: a particle that fails takes some 50 ms */
     gs4i_load_elastic_constants(&r->constants, &r->elastic);
     gs4i_moduli(&r->elastic, L, r->n, G, &count);
     gs4i_load_elastic(gs4i_elastic_of(r), r->p->elastic_reals, r->n, &e);
@@ -9215,6 +9216,7 @@ static void gs4i_advance_elastic(gs4i_response *r, gs4i_gradient L, int commit)
     const gs4i_integrator euler = gs4i_without_rates(r->integrator);
     gs4i_elastic e;
     gs4i_elastic_count count = { 0, 0, 0, 0, 0 };
+    if (r->report->bad && !commit) return;
     gs4i_load_elastic_constants(&r->constants, &r->elastic);
     gs4i_load_elastic(gs4i_elastic_of(r), r->p->elastic_reals, r->n, &e);
     gs4i_correct_elastic(&r->elastic, &e, r->p->with_rates ? r->integrator : &euler, L, r->n,

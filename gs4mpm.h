@@ -20989,8 +20989,13 @@ GS4_API const uint8_t *gs4_particle_materials(const gs4_sim *sim)
 
 #define GS4I_INNER_FILL 0.55f
 
+/* 5^3 nodes, x fastest: those of the block and, until gs4i_occupied_share has shared them out, one
+ * more at the upper end of each axis, so that a particle adds to one block alone. */
+#define GS4I_OCCUPIED_SIDE 5
+#define GS4I_OCCUPIED_NODES (GS4I_OCCUPIED_SIDE * GS4I_OCCUPIED_SIDE * GS4I_OCCUPIED_SIDE)
+
 typedef struct gs4i_occupied_block {
-    float f[GS4I_BLOCK_NODES];
+    float f[GS4I_OCCUPIED_NODES];
     float fill, inner; /* sum of f of the inner nodes, and how many these are */
     uint8_t is_inner[GS4I_BLOCK_NODES];
 } gs4i_occupied_block;
@@ -21021,19 +21026,19 @@ GS4I_INLINE int gs4i_inside_walls(const gs4_sim *sim, int axis, int x)
 
 GS4I_INLINE gs4i_occupied_cell gs4i_occupied_cell_of(const gs4i_occupied *o, int axis, int x)
 {
+    static const int stride[3] = { 1, GS4I_OCCUPIED_SIDE, GS4I_OCCUPIED_SIDE * GS4I_OCCUPIED_SIDE };
     const int at = gs4i_inside_walls(o->sim, axis, x) - o->low[axis];
     gs4i_occupied_cell c;
     c.block =
         at < 0 || at >> 2 >= o->blocks[axis] ? -(int64_t)o->table : (at >> 2) * o->stride[axis];
-    c.node = (at & 3) << 2 * axis;
+    c.node = (at & 3) * stride[axis];
     return c;
 }
 
 /* The lower of the two nodes beside a particle along an axis, and the share of the other. */
-GS4I_INLINE int gs4i_node_below(const gs4_sim *sim, int axis, const gs4_real *x, float *share)
+GS4I_INLINE int gs4i_node_below(gs4_real x, gs4_real origin, gs4_real inv_h, float *share)
 {
-    const gs4_real origin[3] = { sim->grid.origin.x, sim->grid.origin.y, sim->grid.origin.z };
-    const gs4_real at = (x[axis] - origin[axis]) * sim->grid.inv_h + GS4I_C(0.5); /* from -1 on */
+    const gs4_real at = (x - origin) * inv_h + GS4I_C(0.5); /* from -1 on */
     *share = (float)(at - GS4I_C((int)at));
     return (int)at - 1;
 }
@@ -21043,25 +21048,30 @@ static int gs4i_occupied_box(gs4i_memory *memory, gs4i_occupied *o)
 {
     const gs4i_grid *g = &o->sim->grid;
     const gs4i_particles *p = &o->sim->particles;
-    gs4_real low[3], high[3];
+    const gs4_real origin[3] = { g->origin.x, g->origin.y, g->origin.z };
+    gs4_real low[4], high[4], finite[4] = { 0, 0, 0, 0 };
     float share;
     size_t i;
     int a;
-    for (a = 0; a < 3; a++) low[a] = high[a] = p->position[a];
+    memcpy(low, p->position, sizeof low);
+    memcpy(high, p->position, sizeof high);
     for (i = 0; i < (size_t)p->count; i++) {
         const gs4_real *x = p->position + 4 * i;
-        if (!gs4i_is_in_domain(g, x)) return GS4_ERROR_ARGUMENT;
-        for (a = 0; a < 3; a++) {
+        for (a = 0; a < 4; a++) {
             low[a] = gs4i_min(low[a], x[a]);
             high[a] = gs4i_max(high[a], x[a]);
+            finite[a] += x[a] - x[a];
         }
     }
+    if (!gs4i_is_in_domain(g, low) || !gs4i_is_in_domain(g, high)
+        || !(finite[0] + finite[1] + finite[2] == 0))
+        return GS4_ERROR_ARGUMENT;
     for (a = 0, o->table = 1; a < 3; a++) {
-        const int from = gs4i_node_below(o->sim, a, low, &share),
-                  to = gs4i_node_below(o->sim, a, high, &share) + 1;
+        const int from = gs4i_node_below(low[a], origin[a], g->inv_h, &share),
+                  to = gs4i_node_below(high[a], origin[a], g->inv_h, &share) + 1;
         const int wraps = g->periodic[a] && (from < 0 || to >= g->cells[a]);
-        o->low[a] = wraps ? 0 : from;
-        o->blocks[a] = ((wraps ? g->cells[a] - 1 : to - from) >> 2) + 1;
+        o->low[a] = wraps ? -1 : from;
+        o->blocks[a] = ((wraps ? g->cells[a] + 1 : to - from) >> 2) + 1;
         o->stride[a] = (int64_t)o->table;
         o->table *= (size_t)o->blocks[a];
     }
@@ -21069,71 +21079,140 @@ static int gs4i_occupied_box(gs4i_memory *memory, gs4i_occupied *o)
     return o->place ? GS4_OK : GS4_ERROR_MEMORY;
 }
 
-/* Particle i gives to f. */
-static int gs4i_occupied_add(gs4i_memory *memory, gs4i_occupied *o, size_t i)
-{
-    const gs4i_particles *p = &o->sim->particles;
-    const gs4_real *at = p->position + 4 * i, inv_h = o->sim->grid.inv_h;
-    const float volume =
-        (float)(at[3] * o->sim->constants[p->material[i]].inv_density * inv_h * inv_h * inv_h);
-    gs4i_occupied_cell cell[3][2];
-    float share[3][2];
-    int a, c;
-    for (a = 0; a < 3; a++) {
-        const int x = gs4i_node_below(o->sim, a, at, &share[a][1]);
-        share[a][0] = 1 - share[a][1];
-        cell[a][0] = gs4i_occupied_cell_of(o, a, x);
-        cell[a][1] = gs4i_occupied_cell_of(o, a, x + 1);
-    }
-    for (c = 0; c < 8; c++) {
-        const int x = c & 1, y = c >> 1 & 1, z = c >> 2;
-        const int node = cell[0][x].node + cell[1][y].node + cell[2][z].node;
-        uint32_t *place = o->place + (cell[0][x].block + cell[1][y].block + cell[2][z].block);
-        if (!*place) {
-            void *grown = gs4i_grow(memory, o->block, o->count, &o->capacity, sizeof *o->block);
-            if (!grown) return GS4_ERROR_MEMORY;
-            o->block = (gs4i_occupied_block *)grown;
-            *place = (uint32_t)++o->count;
-        }
-        o->block[*place - 1].f[node] += volume * share[0][x] * share[1][y] * share[2][z];
-    }
-    return GS4_OK;
-}
-
 /* The block, NULL: nothing is there. */
-static gs4i_occupied_block *gs4i_occupied_block_at(const gs4i_occupied *o, int64_t number)
+GS4I_INLINE gs4i_occupied_block *gs4i_occupied_block_at(const gs4i_occupied *o, int64_t number)
 {
     return number < 0 || !o->place[number] ? NULL : o->block + o->place[number] - 1;
 }
 
-static int gs4i_is_inner(const gs4i_occupied *o, const int x[3], float f)
+/* The block, which begins empty. NULL: there is no memory. */
+GS4I_INLINE gs4i_occupied_block *gs4i_occupied_block_for(gs4i_memory *memory, gs4i_occupied *o,
+                                                         int64_t number)
 {
-    gs4i_occupied_cell cell[3][3];
-    int i;
-    if (!(f > 0.5f)) return 0; /* a cloud is not a liquid that has swollen */
-    for (i = 0; i < 9; i++)
-        cell[i / 3][i % 3] = gs4i_occupied_cell_of(o, i / 3, x[i / 3] + i % 3 - 1);
-    for (i = 0; i < 27; i++) {
-        const gs4i_occupied_cell *p = &cell[0][i % 3], *q = &cell[1][i / 3 % 3],
-                                 *r = &cell[2][i / 9];
-        const gs4i_occupied_block *b = gs4i_occupied_block_at(o, p->block + q->block + r->block);
-        if (!b || !(b->f[p->node + q->node + r->node] > GS4I_INNER_FILL * f)) return 0;
+    if (!o->place[number]) {
+        void *grown = gs4i_grow(memory, o->block, o->count, &o->capacity, sizeof *o->block);
+        if (!grown) return NULL;
+        o->block = (gs4i_occupied_block *)grown;
+        o->place[number] = (uint32_t)++o->count;
     }
-    return 1;
+    return o->block + o->place[number] - 1;
 }
 
-/* Finds the inner nodes of block b, where anything is. */
+/* All particles give to f. */
+static int gs4i_occupied_add(gs4i_memory *memory, gs4i_occupied *o)
+{
+    const int up_y = GS4I_OCCUPIED_SIDE, up_z = up_y * GS4I_OCCUPIED_SIDE;
+    const gs4i_particles *p = &o->sim->particles;
+    const gs4_vec3 origin = o->sim->grid.origin;
+    const gs4_real inv_h = o->sim->grid.inv_h, cells = inv_h * inv_h * inv_h;
+    size_t i;
+    for (i = 0; i < (size_t)p->count; i++) {
+        const gs4_real *at = p->position + 4 * i;
+        const float volume = (float)(at[3] * o->sim->constants[p->material[i]].inv_density * cells);
+        float sx, sy, sz, low[2], high[2], *f;
+        const int x = gs4i_node_below(at[0], origin.x, inv_h, &sx) - o->low[0],
+                  y = gs4i_node_below(at[1], origin.y, inv_h, &sy) - o->low[1],
+                  z = gs4i_node_below(at[2], origin.z, inv_h, &sz) - o->low[2];
+        gs4i_occupied_block *block = gs4i_occupied_block_for(
+            memory, o, (x >> 2) + (y >> 2) * o->stride[1] + (z >> 2) * o->stride[2]);
+        if (!block) return GS4_ERROR_MEMORY;
+        f = block->f + ((x & 3) + (y & 3) * up_y + (z & 3) * up_z);
+        high[0] = volume * sz;
+        low[0] = volume - high[0];
+        low[1] = low[0] * sy;
+        low[0] -= low[1];
+        high[1] = high[0] * sy;
+        high[0] -= high[1];
+        f[0] += low[0] - low[0] * sx;
+        f[1] += low[0] * sx;
+        f[up_y] += low[1] - low[1] * sx;
+        f[up_y + 1] += low[1] * sx;
+        f[up_z] += high[0] - high[0] * sx;
+        f[up_z + 1] += high[0] * sx;
+        f[up_z + up_y] += high[1] - high[1] * sx;
+        f[up_z + up_y + 1] += high[1] * sx;
+    }
+    return GS4_OK;
+}
+
+/* The cell where block b begins along an axis. */
+GS4I_INLINE int gs4i_occupied_first(const gs4i_occupied *o, size_t b, int axis)
+{
+    return o->low[axis] + 4 * (int)(b / (size_t)o->stride[axis] % (size_t)o->blocks[axis]);
+}
+
+/* What block b has beyond its end or behind a wall goes to where it belongs. */
+static int gs4i_occupied_share(gs4i_memory *memory, gs4i_occupied *o, size_t b)
+{
+    gs4i_occupied_cell cell[3][GS4I_OCCUPIED_SIDE];
+    int i, a;
+    if (!o->place[b]) return GS4_OK;
+    for (a = 0; a < 3; a++)
+        for (i = 0; i < GS4I_OCCUPIED_SIDE; i++)
+            cell[a][i] = gs4i_occupied_cell_of(o, a, gs4i_occupied_first(o, b, a) + i);
+    for (i = 0; i < GS4I_OCCUPIED_NODES; i++) {
+        const gs4i_occupied_cell *x = &cell[0][i % GS4I_OCCUPIED_SIDE],
+                                 *y = &cell[1][i / GS4I_OCCUPIED_SIDE % GS4I_OCCUPIED_SIDE],
+                                 *z = &cell[2][i / (GS4I_OCCUPIED_SIDE * GS4I_OCCUPIED_SIDE)];
+        const int64_t to = x->block + y->block + z->block;
+        const int node = x->node + y->node + z->node;
+        float *f = &o->block[o->place[b] - 1].f[i];
+        const float share = *f;
+        gs4i_occupied_block *block;
+        if (share == 0 || (to == (int64_t)b && node == i)) continue;
+        *f = 0;
+        block = gs4i_occupied_block_for(memory, o, to);
+        if (!block) return GS4_ERROR_MEMORY;
+        block->f[node] += share;
+    }
+    return GS4_OK;
+}
+
+/* least[i + 4 (j + 4 k)]: the least f of node (i, j, k) of block b and of the 26 around it. */
+static void gs4i_occupied_least(const gs4i_occupied *o, size_t b, float *least)
+{
+    gs4i_occupied_cell cell[3][6];
+    float f[6 * 6 * 6];
+    int i, a, stride, n;
+    for (a = 0; a < 3; a++)
+        for (i = 0; i < 6; i++)
+            cell[a][i] = gs4i_occupied_cell_of(o, a, gs4i_occupied_first(o, b, a) + i - 1);
+    for (n = 0; n < 36; n++) {
+        const gs4i_occupied_cell *y = &cell[1][n % 6], *z = &cell[2][n / 6];
+        for (i = 0; i < 6; i++) {
+            const gs4i_occupied_block *block =
+                gs4i_occupied_block_at(o, cell[0][i].block + y->block + z->block);
+            f[6 * n + i] = block ? block->f[cell[0][i].node + y->node + z->node] : 0;
+        }
+    }
+    for (stride = 1; stride <= 36; stride *= 6) /* of a node and the two after it */
+        for (i = 0; i + 2 * stride < 6 * 6 * 6; i++) {
+            const float next = f[i + stride] < f[i] ? f[i + stride] : f[i];
+            f[i] = f[i + 2 * stride] < next ? f[i + 2 * stride] : next;
+        }
+    for (n = 0; n < GS4I_BLOCK_NODES; n++) least[n] = f[n % 4 + 6 * (n / 4 % 4) + 36 * (n / 16)];
+}
+
+/* Node n of a block of 4^3 among the 5^3. */
+GS4I_INLINE int gs4i_occupied_node(int n)
+{
+    return n % 4 + GS4I_OCCUPIED_SIDE * (n / 4 % 4 + GS4I_OCCUPIED_SIDE * (n / 16));
+}
+
+/* Finds the inner nodes of block b, where anything is. What has f below 0.5 is a cloud, not a
+ * liquid that has swollen. */
 static void gs4i_find_inner(const gs4i_occupied *o, size_t b)
 {
     gs4i_occupied_block *block = gs4i_occupied_block_at(o, (int64_t)b);
-    int first[3], x[3], i, a;
-    for (a = 0; a < 3; a++)
-        first[a] = o->low[a] + 4 * (int)(b / (size_t)o->stride[a] % (size_t)o->blocks[a]);
-    for (i = 0; i < GS4I_BLOCK_NODES && block; i++) {
-        gs4i_node_coordinates(first, i, x);
-        block->is_inner[i] = (uint8_t)gs4i_is_inner(o, x, block->f[i]);
+    float least[GS4I_BLOCK_NODES];
+    int i;
+    if (!block) return;
+    gs4i_occupied_least(o, b, least);
+    for (i = 0; i < GS4I_BLOCK_NODES; i++) {
+        const float f = block->f[gs4i_occupied_node(i)];
+        block->is_inner[i] = f > 0.5f && least[i] > GS4I_INNER_FILL * f;
         block->inner += block->is_inner[i];
-        block->fill += block->is_inner[i] ? block->f[i] : 0;
+        block->fill += block->is_inner[i] ? f : 0;
     }
 }
 
@@ -21157,9 +21236,10 @@ static double gs4i_block_occupies(const gs4i_occupied *o, size_t b)
             inner += gs4i_occupied_block_at(o, number)->inner;
         }
     }
-    for (i = 0; i < GS4I_BLOCK_NODES && block; i++)
-        sum +=
-            block->is_inner[i] ? 1 : (double)(inner > 0 ? block->f[i] * inner / fill : block->f[i]);
+    for (i = 0; i < GS4I_BLOCK_NODES && block; i++) {
+        const float f = block->f[gs4i_occupied_node(i)];
+        sum += block->is_inner[i] ? 1 : (double)(inner > 0 ? f * inner / fill : f);
+    }
     return sum;
 }
 
@@ -21169,14 +21249,16 @@ static double gs4i_occupied_volume(gs4_sim *sim)
     const double h = (double)sim->grid.h;
     gs4i_occupied o;
     double cells = 0;
-    size_t i, n = (size_t)sim->particles.count;
+    size_t i;
     int result;
-    if (!n) return 0;
+    if (!sim->particles.count) return 0;
     if (gs4i_is_busy(sim)) return -1;
     memset(&o, 0, sizeof o);
     o.sim = sim;
     result = gs4i_occupied_box(&sim->memory, &o);
-    for (i = 0; i < n && result == GS4_OK; i++) result = gs4i_occupied_add(&sim->memory, &o, i);
+    if (result == GS4_OK) result = gs4i_occupied_add(&sim->memory, &o);
+    for (i = 0; i < o.table && result == GS4_OK; i++)
+        result = gs4i_occupied_share(&sim->memory, &o, i);
     for (i = 0; i < o.table && result == GS4_OK; i++) gs4i_find_inner(&o, i);
     for (i = 0; i < o.table && result == GS4_OK; i++) cells += gs4i_block_occupies(&o, i);
     gs4i_free(&sim->memory, o.place, o.table, sizeof *o.place);
@@ -21187,6 +21269,7 @@ static double gs4i_occupied_volume(gs4_sim *sim)
 GS4_API gs4_stats gs4_get_stats(gs4_sim *sim)
 {
     gs4_stats s;
+    double fastest = 0, least = 1, most = 1; /* J */
     size_t i;
     int c;
     memset(&s, 0, sizeof s);
@@ -21201,22 +21284,21 @@ GS4_API gs4_stats gs4_get_stats(gs4_sim *sim)
     s.stress_bounded = sim->bounded;
     s.active_cells = sim->grid.active * GS4I_BLOCK_NODES;
     s.memory_bytes = sim->memory.bytes;
-    s.min_volume_ratio = s.max_volume_ratio = 1;
     s.heat_iterations = sim->conduction.system.iterations;
     s.solver_residual = fmax(sim->conduction.system.residual, sim->staggered.residual);
     s.pressure_iterations = sim->staggered.iterations;
     for (i = 0; i < (size_t)sim->particles.count; i++) {
-        const gs4_real *x = sim->particles.position + 4 * i, *v = sim->particles.velocity + 4 * i;
-        const double m = (double)x[3], J = (double)v[3],
-                     v2 = (double)v[0] * (double)v[0] + (double)v[1] * (double)v[1]
-                          + (double)v[2] * (double)v[2];
+        const gs4_real *at = sim->particles.position + 4 * i,
+                       *moves = sim->particles.velocity + 4 * i;
+        const double x[3] = { (double)at[0], (double)at[1], (double)at[2] },
+                     v[3] = { (double)moves[0], (double)moves[1], (double)moves[2] },
+                     m = (double)at[3], J = (double)moves[3],
+                     v2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
         s.mass += m;
-        for (c = 0; c < 3; c++) {
-            const int c1 = (c + 1) % 3, c2 = (c + 2) % 3;
-            s.momentum[c] += m * (double)v[c];
-            s.angular_momentum[c] +=
-                m * ((double)x[c1] * (double)v[c2] - (double)x[c2] * (double)v[c1]);
-        }
+        for (c = 0; c < 3; c++) s.momentum[c] += m * v[c];
+        s.angular_momentum[0] += m * (x[1] * v[2] - x[2] * v[1]);
+        s.angular_momentum[1] += m * (x[2] * v[0] - x[0] * v[2]);
+        s.angular_momentum[2] += m * (x[0] * v[1] - x[1] * v[0]);
         s.kinetic_energy += 0.5 * m * v2;
         if (sim->particles.heat) {
             const gs4i_material_constants *mat = &sim->constants[sim->particles.material[i]];
@@ -21228,10 +21310,13 @@ GS4_API gs4_stats gs4_get_stats(gs4_sim *sim)
             if (i == 0 || T > s.max_temperature) s.max_temperature = T;
         }
         s.volume += m * J / (double)sim->constants[sim->particles.material[i]].density;
-        if (sqrt(v2) > s.max_speed) s.max_speed = sqrt(v2);
-        if (i == 0 || J < s.min_volume_ratio) s.min_volume_ratio = J;
-        if (i == 0 || J > s.max_volume_ratio) s.max_volume_ratio = J;
+        if (v2 > fastest) fastest = v2;
+        least = i == 0 || J < least ? J : least;
+        most = i == 0 || J > most ? J : most;
     }
+    s.max_speed = sqrt(fastest);
+    s.min_volume_ratio = least;
+    s.max_volume_ratio = most;
     s.occupied_volume = gs4i_occupied_volume(sim);
     s.seconds_total = sim->seconds[GS4I_CLOCK_TOTAL];
     s.seconds_sort = sim->seconds[GS4I_CLOCK_SORT];
@@ -21771,6 +21856,8 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_NO_UNKNOWN
 #undef GS4I_NTH
 #undef GS4I_NTH_CONST
+#undef GS4I_OCCUPIED_NODES
+#undef GS4I_OCCUPIED_SIDE
 #undef GS4I_PAIRS
 #undef GS4I_PREFETCH
 #undef GS4I_RESTRICT

@@ -870,7 +870,7 @@ GS4_API int gs4_advance_within(gs4_sim *sim, gs4_real duration, const gs4_budget
 
 /* s, see STABILITY; without `cfl`. 0 where a viscosity is none, and in a viscosity callback that
  * this asked: gs4_last_error says which. */
-GS4_API gs4_real gs4_stable_dt(gs4_sim *sim);
+GS4_API gs4_real gs4_stable_dt(const gs4_sim *sim);
 
 /* Of each particle; SI. A scene has stress to flux only where a material needs them. */
 typedef enum gs4_field {
@@ -11004,6 +11004,7 @@ struct gs4_sim {
     unsigned warned;  /* gs4i_warning */
     int busy;         /* a callback may be running: no call may change anything */
     int asks;         /* a callback of viscosity may be, for gs4_stable_dt */
+    gs4_sim *self;    /* its error is noted by gs4_stable_dt too, to which it is const */
     double time_left; /* s, of gs4_advance */
     gs4i_error error; /* the last one */
 };
@@ -20205,6 +20206,7 @@ static int gs4i_create(gs4i_error *e, const gs4_sim_desc *desc, gs4_sim **out)
     memory = gs4i_memory_with(desc->allocator);
     sim = (gs4_sim *)gs4i_alloc(&memory, 1, sizeof *sim);
     if (!sim) return gs4i_fail_memory(e);
+    sim->self = sim;
     sim->desc = *desc;
     gs4i_set_defaults(&sim->desc);
     sim->memory = memory;
@@ -20731,11 +20733,11 @@ static int gs4i_limit_now(gs4_sim *sim, gs4i_report *r, gs4_real *limit)
     return r->bad ? gs4i_fail_bad(sim, r) : GS4_OK;
 }
 
-GS4_API gs4_real gs4_stable_dt(gs4_sim *sim)
+GS4_API gs4_real gs4_stable_dt(const gs4_sim *sim)
 {
     gs4i_report r;
     gs4_real limit = 0;
-    if (sim) gs4i_limit_now(sim, &r, &limit);
+    if (sim) gs4i_limit_now(sim->self, &r, &limit);
     return limit;
 }
 
@@ -21944,8 +21946,8 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  * Refused now: numbers too small for a reciprocal, callbacks that give no number, shapes too far
  * out for gs4_real, changes of a simulation by its own callbacks, checkpoints with numbers that no
  * simulation has or with other pivots, starts or stops. `log` says at level 1, once each, what is
- * allowed but hardly meant. gs4_stats has time_left and occupied_volume. gs4_stable_dt takes a
- * simulation that is not const, and is 0 where a law gives no viscosity. Files follow symbolic
+ * allowed but hardly meant. gs4_stats has time_left and occupied_volume. gs4_stable_dt is 0
+ * where a law gives no viscosity. Files follow symbolic
  * links.
  * Emitters: the velocity of a filling is relative to the emitter, which travels from its start on.
  * Densities: the stable step of GS4 sees heavy particles among light ones, default speeds of sound

@@ -20763,6 +20763,7 @@ static int gs4i_try_step(gs4_sim *sim, gs4_real dt)
         gs4i_put(&t, " s; the largest stable step is now ");
         gs4i_put_real(&t, (double)limit);
         gs4i_put(&t, " s (gs4_stable_dt); the step was not taken");
+        sim->limits_stale = 1; /* a viscosity law may say something else when it is asked again */
         return gs4i_end_error(&sim->error, GS4_ERROR_UNSTABLE);
     }
     sim->busy = 1;

@@ -2309,7 +2309,8 @@ static gs4_real err_asked_viscosity(gs4_real temperature, gs4_real rate, void *u
 
 static void test_errors_stable_dt(void)
 {
-    const double wrong[] = { ERR_NAN, -1, ERR_INFINITY, -ERR_INFINITY, 1e30 };
+    const double wrong[] = { ERR_NAN, -1, ERR_INFINITY, -ERR_INFINITY,
+                             sizeof(gs4_real) == 8 ? 1e120 : 1e30 };
     const gs4_sim_desc d = err_desc();
     gs4_material m = err_material();
     err_asked c = { NULL, 0.1, 0, 0, 0 };

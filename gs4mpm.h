@@ -31,7 +31,7 @@
  *     }
  *
  * WHAT IT DOES NOT DO, YET. The semi-implicit scheme is declared and refused with a sentence; so
- * are, with the partitioned scheme, periodic walls and separating colliders.
+ * are, with the partitioned scheme, separating colliders.
  * It has no surface tension, no two-way coupling to colliders, no domain beyond
  * 3992^3 cells.
  *
@@ -286,7 +286,7 @@
  * walls are second order in space. Mass folds as it is; walls are filled in the reverse order of
  * folding. A separating wall acts as slip while material moves into it or
  * presses on it, and is not there otherwise, nor where material leaves with ten times the impulse
- * of its push in a step. Behind a periodic wall a field goes on a period away.
+ * of its push in a step. Behind a periodic wall a field goes on a period away; colliders do not.
  *
  * COLLIDERS. Sticky ones act by image particles, second order in space where particles fill the
  * space up to the surface. A filling that leaves out half a row puts the wall up to 0.8 cells
@@ -393,6 +393,8 @@
  * Partitioned: 161 a particle, and about 320 a cell of the box around all material (double 313 and
  * 530), blocks and solver included; measured where it fills 64^3 cells. With viscosity or
  * elasticity about 120 more for each face within three cells of a free surface.
+ * With a periodic axis 65 (double 73) more a cell, copies behind its walls included, and three to
+ * six times as many iterations, more in larger boxes.
  * A mesh: about 400 (double 800) per cell face of its surface in the domain or within 10 cells of
  * it; where that is more than 1 GB it is refused. Its distance is sampled twice a cell within three
  * cells of the surface. A mesh that moves is sampled anew now and then, but for one that takes less
@@ -5917,6 +5919,9 @@ typedef struct gs4i_elliptic {
     gs4_real *scratch, *correction;
     double *vectors, *part_capacity, *part_mean;
     size_t *part;
+    int first[3], end[3]; /* the cells that are solved for; around a periodic axis those at its ends
+                           * are neighbours */
+    int cycles;           /* of the preconditioner: 0: as many as it needs, or 1 */
     gs4i_solver solver;
     double tolerance;   /* relative residual */
     int max_iterations; /* of the multigrid, and of what is around it */
@@ -5936,19 +5941,28 @@ static size_t gs4i_elliptic_bytes(const gs4i_box *box)
     return reals * sizeof(gs4_real) + 1
            + (gs4i_box_is_periodic(box) ? 6 * sizeof(double) + sizeof(size_t) : 0);
 }
+/* What only periodic axes ask for. */
+static void gs4i_elliptic_take_periodic(gs4i_elliptic *e, gs4i_box *box)
+{
+    e->vectors = (double *)gs4i_box_take(box, 4 * sizeof(double));
+    e->part_capacity = (double *)gs4i_box_take(box, sizeof(double));
+    e->part_mean = (double *)gs4i_box_take(box, sizeof(double));
+    e->part = (size_t *)gs4i_box_take(box, sizeof(size_t));
+    e->correction = (gs4_real *)gs4i_box_take(box, sizeof(gs4_real));
+}
+
 static void gs4i_elliptic_take(gs4i_elliptic *e, gs4i_box *box)
 {
     int a;
     e->box = box;
     e->vectors = NULL;
     e->correction = NULL;
-    if (gs4i_box_is_periodic(box)) {
-        e->vectors = (double *)gs4i_box_take(box, 4 * sizeof(double));
-        e->part_capacity = (double *)gs4i_box_take(box, sizeof(double));
-        e->part_mean = (double *)gs4i_box_take(box, sizeof(double));
-        e->part = (size_t *)gs4i_box_take(box, sizeof(size_t));
-        e->correction = (gs4_real *)gs4i_box_take(box, sizeof(gs4_real));
+    e->cycles = 0;
+    for (a = 0; a < 3; a++) {
+        e->first[a] = 0;
+        e->end[a] = box->size[a];
     }
+    if (gs4i_box_is_periodic(box)) gs4i_elliptic_take_periodic(e, box);
     e->diagonal = (gs4_real *)gs4i_box_take(box, sizeof(gs4_real));
     e->rhs = (gs4_real *)gs4i_box_take(box, sizeof(gs4_real));
     e->x = (gs4_real *)gs4i_box_take(box, sizeof(gs4_real));
@@ -6059,10 +6073,10 @@ static void gs4i_elliptic_apply_plane(int z, void *context)
             to[1] = at[1];
             to[2] = at[2];
             to[a] += side & 1 ? 1 : -1;
-            if (to[a] < 0)
-                to[a] = box->size[a] - 1;
-            else if (to[a] == box->size[a])
-                to[a] = 0;
+            if (to[a] < e->first[a])
+                to[a] = e->end[a] - 1;
+            else if (to[a] == e->end[a])
+                to[a] = e->first[a];
             flow +=
                 (double)e->face[a][face[side]]
                 * (task->p[gs4i_box_index(box, GS4I_AT_CELL, to[0], to[1], to[2])] - task->p[i]);
@@ -6100,59 +6114,87 @@ static void gs4i_unwrapped_diagonal(const gs4i_elliptic *e, gs4_real *diagonal)
 /* A part is what faces join. Where d is small against c/h^2 its mean hides in a residual: A times
  * a constant is d, and the heat of the part is sum d x. So means are solved for beside the rest
  * (deflation: Nicolaides 1987). With W the indicators of parts W^T A W is diagonal, sums of d:
- *     x = W m + y,   m = sum b / sum d,   W^T A y = sum d y = 0 in each part. */
+ *     x = W m + y,   m = sum b / sum d,   W^T A y = sum d y = 0 in each part.
+ * Where all d of a part are 0 b has no mean there, and x is to have none. A part that joins air
+ * needs nothing of this: x is 0 there. */
 static size_t gs4i_first_of_part(size_t *part, size_t i)
 {
     while (part[i] != i) i = part[i] = part[part[i]];
     return i;
 }
 
-static void gs4i_find_parts(gs4i_elliptic *e)
+static void gs4i_join_parts(gs4i_elliptic *e)
 {
     const gs4i_box *box = e->box;
-    const size_t n = gs4i_box_count(box, GS4I_AT_CELL);
-    size_t face[6], i, k;
+    size_t face[6], i;
     int at[3], a, z;
-    for (k = 0; k < n; k++) e->part[k] = k;
-    for (z = 0; z < box->size[2]; z++)
+    for (i = 0; i < gs4i_box_count(box, GS4I_AT_CELL); i++) e->part[i] = i;
+    for (z = e->first[2]; z < e->end[2]; z++)
         GS4I_BOX_PLANE(box, GS4I_AT_CELL, z, at, i) {
+            if (at[0] < e->first[0] || at[0] >= e->end[0] || at[1] < e->first[1]
+                || at[1] >= e->end[1])
+                continue;
             gs4i_box_faces_of(box, at, face);
             for (a = 0; a < 3; a++) {
                 int before[3];
                 size_t one, other;
                 if (!(e->face[a][face[2 * a]] > 0)) continue;
                 memcpy(before, at, sizeof before);
-                before[a] = (at[a] ? at[a] : box->size[a]) - 1;
+                before[a] = (at[a] > e->first[a] ? at[a] : e->end[a]) - 1;
                 one = gs4i_first_of_part(e->part, i);
                 other = gs4i_first_of_part(
                     e->part, gs4i_box_index(box, GS4I_AT_CELL, before[0], before[1], before[2]));
                 e->part[one < other ? other : one] = one < other ? one : other;
             }
         }
-    memset(e->part_capacity, 0, n * sizeof *e->part_capacity);
-    for (k = 0; k < n; k++) {
-        e->part[k] = gs4i_first_of_part(e->part, k);
-        if (e->kind[k] == GS4_CELL_LIQUID) e->part_capacity[e->part[k]] += (double)e->diagonal[k];
-    }
 }
 
-/* Takes the mean by d off v in each part. */
-static void gs4i_take_off_means(const gs4i_elliptic *e, double *v)
+/* part_capacity: the sum of d; where that is 0 as many times -1 as there are cells; 0 with air. */
+static void gs4i_find_parts(gs4i_elliptic *e)
+{
+    const size_t n = gs4i_box_count(e->box, GS4I_AT_CELL);
+    double *cells = e->part_mean;
+    size_t k;
+    gs4i_join_parts(e);
+    for (k = 0; k < n; k++) e->part_capacity[k] = cells[k] = 0;
+    for (k = 0; k < n; k++) {
+        e->part[k] = gs4i_first_of_part(e->part, k);
+        if (e->kind[k] == GS4_CELL_LIQUID) {
+            e->part_capacity[e->part[k]] += (double)e->diagonal[k];
+            cells[e->part[k]]++;
+        } else if (e->kind[k] == GS4_CELL_AIR)
+            cells[e->part[k]] -= HUGE_VAL;
+    }
+    for (k = 0; k < n; k++)
+        if (cells[k] < 0)
+            e->part_capacity[k] = 0;
+        else if (!(e->part_capacity[k] > 0))
+            e->part_capacity[k] = -cells[k];
+}
+
+/* The weight of a cell in the mean of its part. */
+GS4I_INLINE double gs4i_weight_in_part(const gs4i_elliptic *e, size_t i)
+{
+    return e->part_capacity[e->part[i]] > 0 ? (double)e->diagonal[i] : 1;
+}
+
+/* Means of v in each part, of sums or of values by their weight; 0 where air is. */
+static void gs4i_find_means(const gs4i_elliptic *e, const double *v, int are_sums)
 {
     const size_t n = gs4i_box_count(e->box, GS4I_AT_CELL);
     double *mean = e->part_mean;
     size_t i;
     memset(mean, 0, n * sizeof *mean);
     for (i = 0; i < n; i++)
-        if (e->kind[i] == GS4_CELL_LIQUID) mean[e->part[i]] += (double)e->diagonal[i] * v[i];
+        if (e->kind[i] == GS4_CELL_LIQUID)
+            mean[e->part[i]] += are_sums ? v[i] : gs4i_weight_in_part(e, i) * v[i];
     for (i = 0; i < n; i++)
-        if (e->part_capacity[i] > 0) mean[i] /= e->part_capacity[i];
-    for (i = 0; i < n; i++)
-        if (e->kind[i] == GS4_CELL_LIQUID) v[i] -= mean[e->part[i]];
+        mean[i] = e->part_capacity[i] != 0 ? mean[i] / fabs(e->part_capacity[i]) : 0;
 }
 
 /* One multigrid solve without the faces around: few eigenvalues of what is left differ from 1. It
- * goes to the rounding of its float cycles, so that the preconditioner is linear; 1e-6 will do. */
+ * goes to the rounding of its float cycles, so that the preconditioner is linear; 1e-6 will do. Or
+ * one cycle, whose length does not matter: directions of conjugate gradients have none. */
 static int gs4i_elliptic_precondition(void *context, const double *r, double *out)
 {
     gs4i_elliptic *e = (gs4i_elliptic *)context;
@@ -6165,13 +6207,17 @@ static int gs4i_elliptic_precondition(void *context, const double *r, double *ou
         e->scratch[i] = GS4I_C(r[i]);
         e->correction[i] = 0;
     }
-    result = gs4i_solver_solve(&e->solver, e->scratch, e->correction,
-                               fmax(1e-3 * e->tolerance, 1e-11), e->max_iterations, &stats);
+    result =
+        gs4i_solver_solve(&e->solver, e->scratch, e->correction, fmax(1e-3 * e->tolerance, 1e-11),
+                          e->cycles ? e->cycles : e->max_iterations, &stats);
     e->iterations += stats.iterations;
-    if (result != GS4_OK && (result != GS4_ERROR_NOT_CONVERGED || !(stats.residual < 1e-6)))
+    if (result != GS4_OK
+        && (result != GS4_ERROR_NOT_CONVERGED || !(e->cycles || stats.residual < 1e-6)))
         return result;
     for (i = 0; i < n; i++) out[i] = e->kind[i] == GS4_CELL_LIQUID ? (double)e->correction[i] : 0;
-    gs4i_take_off_means(e, out);
+    gs4i_find_means(e, out, 0);
+    for (i = 0; i < n; i++)
+        if (e->kind[i] == GS4_CELL_LIQUID) out[i] -= e->part_mean[e->part[i]];
     return GS4_OK;
 }
 
@@ -6193,12 +6239,12 @@ static int gs4i_solve_periodic(gs4i_elliptic *e)
     for (i = 0; i < n; i++) k.r[i] = (double)e->rhs[i];
     size = sqrt(gs4i_krylov_dot(k.r, k.r, n));
     gs4i_find_parts(e);
-    for (i = 0; i < n; i++)
-        if (e->kind[i] == GS4_CELL_LIQUID) k.r[i] /= (double)e->diagonal[i];
-    gs4i_take_off_means(e, k.r);
+    gs4i_find_means(e, k.r, 1);
     for (i = 0; i < n; i++) {
-        k.r[i] *= (double)e->diagonal[i];
-        e->x[i] = GS4I_C(e->part_mean[e->part[i]]);
+        e->x[i] = 0;
+        if (e->kind[i] != GS4_CELL_LIQUID) continue;
+        k.r[i] -= gs4i_weight_in_part(e, i) * e->part_mean[e->part[i]];
+        if (e->part_capacity[e->part[i]] > 0) e->x[i] = GS4I_C(e->part_mean[e->part[i]]);
     }
     rest = sqrt(gs4i_krylov_dot(k.r, k.r, n));
     result =
@@ -10939,6 +10985,7 @@ typedef struct gs4i_conduction {
 typedef struct gs4i_staggered {
     gs4i_box box;
     int from[3], to[3];            /* the domain, in cells of the box */
+    int first[3], end[3];          /* what is solved for: without copies behind periodic walls */
     gs4_real *given[3], *taken[3]; /* quads */
     gs4_real *seen[3];             /* v_i */
     gs4_real *force[3], *reach[3]; /* of stress; c of [[poisson]] at faces */
@@ -10954,7 +11001,7 @@ typedef struct gs4i_staggered {
     int is_viscous;                        /* sticky walls take hold of what moves along them */
     int without_split, without_correction; /* for tests of what they are for */
     uint8_t *kind;                         /* gs4_cell */
-    gs4i_solver solver;
+    gs4i_elliptic system;                  /* the solver; all of it where an axis is periodic */
     gs4i_scratch fitted, fit; /* faces at surfaces; vectors of them, see [[partitioned]] */
     int iterations;           /* of this step */
     double residual;          /* the largest of this step */
@@ -13962,14 +14009,16 @@ static int gs4i_has_stress(const gs4_sim *sim)
     return any;
 }
 
-/* The box around all blocks with nodes. */
+/* The box around all blocks with nodes; along a periodic axis all of the domain, and a block of
+ * copies on each side. */
 static void gs4i_fit_staggered(gs4i_staggered *f, const gs4i_grid *g)
 {
     gs4i_box *box = &f->box;
     int s, a, high[3];
     for (a = 0; a < 3; a++) {
-        box->low[a] = g->cells[a] + GS4I_BLOCK_SIDE;
-        high[a] = -GS4I_BLOCK_SIDE;
+        const int whole = box->periodic[a] = g->periodic[a];
+        box->low[a] = whole ? -GS4I_BLOCK_SIDE : g->cells[a] + GS4I_BLOCK_SIDE;
+        high[a] = whole ? g->cells[a] + GS4I_BLOCK_SIDE : -GS4I_BLOCK_SIDE;
     }
     for (s = 0; s < g->active; s++) {
         int first[3];
@@ -13983,6 +14032,8 @@ static void gs4i_fit_staggered(gs4i_staggered *f, const gs4i_grid *g)
         box->size[a] = high[a] - box->low[a];
         f->from[a] = box->low[a] < 0 ? -box->low[a] : 0;
         f->to[a] = high[a] > g->cells[a] ? g->cells[a] - box->low[a] : box->size[a];
+        f->first[a] = g->periodic[a] ? f->from[a] : 0;
+        f->end[a] = g->periodic[a] ? f->to[a] : box->size[a];
     }
 }
 
@@ -13991,7 +14042,9 @@ static void gs4i_take_staggered(gs4i_staggered *f, int bodies, int stress, int s
 {
     gs4i_box *box = &f->box;
     const size_t real = sizeof(gs4_real);
+    const int wraps = gs4i_box_is_periodic(box);
     int a;
+    if (wraps) gs4i_elliptic_take_periodic(&f->system, box);
     for (a = 0; a < 3; a++) {
         f->given[a] = (gs4_real *)gs4i_box_take(box, 4 * real);
         f->taken[a] = (gs4_real *)gs4i_box_take(box, 4 * real);
@@ -14007,11 +14060,13 @@ static void gs4i_take_staggered(gs4i_staggered *f, int bodies, int stress, int s
     f->diagonal = (gs4_real *)gs4i_box_take(box, real);
     f->rhs = (gs4_real *)gs4i_box_take(box, real);
     f->pressure = (gs4_real *)gs4i_box_take(box, real);
+    f->system.scratch = wraps ? (gs4_real *)gs4i_box_take(box, real) : NULL;
     for (a = 0; a < 3; a++) {
         f->known[a] = (uint8_t *)gs4i_box_take(box, 1);
         f->held[a] = bodies ? (uint8_t *)gs4i_box_take(box, 1) : NULL;
     }
     f->kind = (uint8_t *)gs4i_box_take(box, 1);
+    f->system.kind = wraps ? (uint8_t *)gs4i_box_take(box, 1) : f->kind;
     f->contact = separates ? (uint8_t *)gs4i_box_take(box, 1) : NULL;
 }
 
@@ -14046,17 +14101,18 @@ static int gs4i_begin_staggered(gs4_sim *sim)
     const int bodies = sim->boundary.collider_count > 0, stress = gs4i_has_stress(sim),
               separates = gs4i_has_separating(sim);
     /* per face of each axis: given, taken, seen, reach and force; per cell: 4 and 3 */
-    const size_t bytes =
-        (size_t)(3 * (4 + 4 + 2 + stress) + 4 + 3 + (bodies ? 9 : 0)) * sizeof(gs4_real)
-        + (size_t)((bodies ? 7 : 4) + separates);
+    size_t bytes = (size_t)(3 * (4 + 4 + 2 + stress) + 4 + 3 + (bodies ? 9 : 0)) * sizeof(gs4_real)
+                   + (size_t)((bodies ? 7 : 4) + separates);
     int a;
     gs4i_fit_staggered(f, &sim->grid);
+    if (gs4i_box_is_periodic(&f->box))
+        bytes += 6 * sizeof(double) + sizeof(size_t) + 2 * sizeof(gs4_real) + 1;
     if (gs4i_box_reserve(&sim->memory, &f->box, bytes) != GS4_OK)
         return gs4i_fail_memory(&sim->error);
     gs4i_take_staggered(f, bodies, stress, separates);
     gs4i_parallel_for(&sim->tasks, f->box.size[2] + 1, gs4i_clear_staggered, f);
-    f->solver.memory = &sim->memory;
-    f->solver.tasks = &sim->tasks;
+    f->system.solver.memory = &sim->memory;
+    f->system.solver.tasks = &sim->tasks;
     f->iterations = 0;
     f->residual = 0;
     f->is_viscous = stress;
@@ -14068,30 +14124,38 @@ static int gs4i_begin_staggered(gs4_sim *sim)
 static void gs4i_free_staggered(gs4i_memory *m, gs4i_staggered *f)
 {
     gs4i_box_free(m, &f->box);
-    f->solver.memory = m;
-    gs4i_solver_free(&f->solver);
+    f->system.solver.memory = m;
+    gs4i_solver_free(&f->system.solver);
     gs4i_free(m, f->fitted.data, f->fitted.bytes, 1);
     gs4i_free(m, f->fit.data, f->fit.bytes, 1);
 }
 
 /* --- walls ------------------------------------------------------------------------------------ */
 
-/* Parity of component c at a wall of this side: odd along the normal, and along a sticky wall. A
- * liquid without viscosity does not feel that: odd there would be a source of energy. */
+/* Parity of component c at a wall of this side: odd along the normal, and along a sticky wall; even
+ * behind a periodic one. A liquid without viscosity does not feel that: odd there would be a source
+ * of energy. */
 static gs4_real gs4i_wall_parity(const gs4_sim *sim, int c, int side)
 {
-    return c == side / 2 || (sim->desc.walls[side] == GS4_WALL_STICK && sim->staggered.is_viscous)
+    const gs4_wall wall = sim->desc.walls[side];
+    return wall != GS4_WALL_PERIODIC
+                   && (c == side / 2 || (wall == GS4_WALL_STICK && sim->staggered.is_viscous))
                ? GS4I_C(-1)
                : GS4I_C(1);
 }
 
-/* Number of mirror planes of a place behind a wall; index of plane m, 1 ..., and of its image. */
+/* Plane m, 1 ..., of a place behind a wall, and its image: a mirror's, or that a period away. Is it
+ * in the box? */
 static int gs4i_mirror_planes(const gs4i_staggered *f, int place, int side, int m, int *behind,
                               int *image)
 {
     const int a = side / 2, on_face = place >> a & 1, n = gs4i_box_length(&f->box, place, a);
     const int low = f->from[a] - 1 + on_face, high = f->to[a]; /* first inner - 1; last wall */
-    if (side & 1) {
+    const int period = f->to[a] - f->from[a];
+    if (f->box.periodic[a]) { /* the last face of the domain is a copy of the first */
+        *behind = side & 1 ? f->to[a] + m - 1 : f->from[a] - m;
+        *image = f->from[a] + (side & 1 ? (m - 1) % period : (period - 1) - (m - 1) % period);
+    } else if (side & 1) {
         *behind = on_face ? high + m : high - 1 + m;
         *image = on_face ? high - m : high - m;
     } else {
@@ -14101,7 +14165,15 @@ static int gs4i_mirror_planes(const gs4i_staggered *f, int place, int side, int 
     return *behind >= 0 && *behind < n && *image >= 0 && *image < n;
 }
 
-/* Is there a wall that mirrors within the box? */
+/* Is entry `at` of a place a copy, behind a periodic wall? */
+GS4I_INLINE int gs4i_is_copy(const gs4i_staggered *f, const int at[3])
+{
+    int a, outside = 0;
+    for (a = 0; a < 3; a++) outside |= at[a] < f->first[a] || at[a] >= f->end[a];
+    return outside && gs4i_box_is_periodic(&f->box);
+}
+
+/* Is there a wall that mirrors, or a periodic one, within the box? */
 static int gs4i_has_wall(const gs4_sim *sim, int side)
 {
     const gs4i_staggered *f = &sim->staggered;
@@ -14118,6 +14190,10 @@ static size_t gs4i_wall_cell(const gs4_sim *sim, int side, const int at[3], int 
     int p[3], t;
     for (t = 0; t < 3; t++) {
         p[t] = at[t] - (low >> t & 1);
+        if (f->box.periodic[t]) {
+            const int period = f->to[t] - f->from[t];
+            p[t] = f->from[t] + ((p[t] - f->from[t]) % period + period) % period;
+        }
         if (p[t] < f->from[t] && gs4i_has_wall(sim, 2 * t)) p[t] = 2 * f->from[t] - 1 - p[t];
         if (p[t] >= f->to[t] && gs4i_has_wall(sim, 2 * t + 1)) p[t] = 2 * f->to[t] - 1 - p[t];
         if (t == side / 2) p[t] = side & 1 ? f->to[t] - 1 : f->from[t];
@@ -14145,14 +14221,16 @@ typedef struct gs4i_face_mirror {
     gs4_real parity;
     int is_normal; /* the component across the wall */
     int holds;     /* 0: a wall that material has left */
+    size_t bytes;  /* of an entry, where it is copied */
 } gs4i_face_mirror;
-typedef void (*gs4i_mirror_fn)(gs4_real *field, const gs4i_face_mirror *m);
+typedef void (*gs4i_mirror_fn)(void *field, const gs4i_face_mirror *m);
 
 /* One side for gs4i_parallel_for: a task for each plane, or row, across the wall. */
 typedef struct gs4i_mirror_pass {
     const gs4_sim *sim;
-    gs4_real *field;
+    void *field;
     gs4i_mirror_fn fn;
+    size_t bytes;
     int place, side;
 } gs4i_mirror_pass;
 
@@ -14165,7 +14243,8 @@ static void gs4i_mirror_plane(int index, void *context)
     const int a = side / 2, b = a == 0 ? 1 : 0, c = 3 - a - b;
     int m, behind, image, at[3];
     gs4i_face_mirror one;
-    one.is_normal = place == 1 << a;
+    one.is_normal = place == 1 << a && !box->periodic[a];
+    one.bytes = pass->bytes;
     one.parity = place ? gs4i_wall_parity(pass->sim, place >> 1, side) : GS4I_C(1);
     at[c] = index;
     for (m = 1; m <= 4 && gs4i_mirror_planes(f, place, side, m, &behind, &image); m++)
@@ -14181,6 +14260,15 @@ static void gs4i_mirror_plane(int index, void *context)
         }
 }
 
+static void gs4i_mirror_side(gs4i_mirror_pass *pass)
+{
+    const gs4_sim *sim = pass->sim;
+    if (gs4i_has_wall(sim, pass->side))
+        gs4i_parallel_for(&sim->tasks,
+                          gs4i_box_length(&sim->staggered.box, pass->place, pass->side < 4 ? 2 : 1),
+                          gs4i_mirror_plane, pass);
+}
+
 /* Apply `fn` to each entry behind the walls. Axis after axis: corners too. */
 static void gs4i_each_mirror(gs4_sim *sim, int place, gs4_real *field, gs4i_mirror_fn fn)
 {
@@ -14188,46 +14276,88 @@ static void gs4i_each_mirror(gs4_sim *sim, int place, gs4_real *field, gs4i_mirr
     pass.sim = sim;
     pass.field = field;
     pass.fn = fn;
+    pass.bytes = 0;
     pass.place = place;
-    for (pass.side = 0; pass.side < 6; pass.side++)
-        if (gs4i_has_wall(sim, pass.side))
-            gs4i_parallel_for(&sim->tasks,
-                              gs4i_box_length(&sim->staggered.box, place, pass.side < 4 ? 2 : 1),
-                              gs4i_mirror_plane, &pass);
+    for (pass.side = 0; pass.side < 6; pass.side++) gs4i_mirror_side(&pass);
 }
 
-/* What was scattered stays where a wall does not hold. */
-static void gs4i_fold_number(gs4_real *field, const gs4i_face_mirror *m)
+/* --- periodic axes: what is behind their walls is a copy -------------------------------------- */
+
+static void gs4i_copy_entry(void *field, const gs4i_face_mirror *m)
 {
+    memcpy((char *)field + m->bytes * m->behind, (char *)field + m->bytes * m->image, m->bytes);
+}
+
+/* `bytes` an entry; no field, no copies. */
+static void gs4i_wrap(gs4_sim *sim, int place, void *field, size_t bytes)
+{
+    gs4i_mirror_pass pass;
+    pass.sim = sim;
+    pass.field = field;
+    pass.fn = gs4i_copy_entry;
+    pass.bytes = bytes;
+    pass.place = place;
+    for (pass.side = 0; pass.side < 6 && field; pass.side++)
+        if (sim->staggered.box.periodic[pass.side / 2]) gs4i_mirror_side(&pass);
+}
+
+static void gs4i_wrap_faces(gs4_sim *sim, gs4_real *const field[3], int reals)
+{
+    int c;
+    for (c = 0; c < 3; c++) gs4i_wrap(sim, 1 << c, field[c], (size_t)reals * sizeof(gs4_real));
+}
+
+static void gs4i_wrap_bytes(gs4_sim *sim, uint8_t *const field[3])
+{
+    int c;
+    for (c = 0; c < 3; c++) gs4i_wrap(sim, 1 << c, field[c], 1);
+}
+
+static void gs4i_wrap_cells(gs4_sim *sim, gs4_real *field, int reals)
+{
+    gs4i_wrap(sim, GS4I_AT_CELL, field, (size_t)reals * sizeof(gs4_real));
+}
+
+/* --- what mirrors do -------------------------------------------------------------------------- */
+
+/* What was scattered stays where a wall does not hold. */
+static void gs4i_fold_number(void *context, const gs4i_face_mirror *m)
+{
+    gs4_real *field = (gs4_real *)context;
     if (!m->holds) return;
     field[m->image] += m->parity * field[m->behind];
     field[m->behind] = 0;
 }
-static void gs4i_fold_given(gs4_real *field, const gs4i_face_mirror *m)
+static void gs4i_fold_given(void *context, const gs4i_face_mirror *m)
 {
+    gs4_real *field = (gs4_real *)context;
     size_t k;
     for (k = 0; k < 4 && m->holds; k++) {
         field[4 * m->image + k] += (k <= GS4I_FACE_RATE ? m->parity : 1) * field[4 * m->behind + k];
         field[4 * m->behind + k] = 0;
     }
 }
-static void gs4i_fill_number(gs4_real *field, const gs4i_face_mirror *m)
+static void gs4i_fill_number(void *context, const gs4i_face_mirror *m)
 {
+    gs4_real *field = (gs4_real *)context;
     field[m->behind] = m->parity * field[m->image];
 }
-static void gs4i_fill_given(gs4_real *field, const gs4i_face_mirror *m)
+static void gs4i_fill_given(void *context, const gs4i_face_mirror *m)
 {
+    gs4_real *field = (gs4_real *)context;
     if (m->holds) field[4 * m->behind] = m->parity * field[4 * m->image];
 }
-static void gs4i_fill_first(gs4_real *field, const gs4i_face_mirror *m)
+static void gs4i_fill_first(void *context, const gs4i_face_mirror *m)
 {
+    gs4_real *field = (gs4_real *)context;
     field[4 * m->behind] = m->parity * field[4 * m->image];
     if (m->is_normal && !m->holds) field[4 * m->behind] += 2 * field[4 * m->wall];
 }
 /* By their parity; but the feedback across a wall is not 0 on it, see gs4i_split_acceleration, and
  * nothing is where material has left it: there they go on straight. */
-static void gs4i_fill_taken(gs4_real *field, const gs4i_face_mirror *m)
+static void gs4i_fill_taken(void *context, const gs4i_face_mirror *m)
 {
+    gs4_real *field = (gs4_real *)context;
     size_t k;
     for (k = 0; k < 4; k++) field[4 * m->behind + k] = m->parity * field[4 * m->image + k];
     for (k = 0; k < 4 && m->is_normal; k++)
@@ -14567,6 +14697,11 @@ static void gs4i_place_bodies(gs4_sim *sim, gs4i_node_pass *nodes)
     for (c = 0; c < 3; c++)
         for (i = 0; i < gs4i_box_count(&f->box, 1 << c); i++)
             if (f->held[c][i]) f->given[c][4 * i + GS4I_FACE_VELOCITY] = f->body[c][2 * i];
+    gs4i_wrap_faces(sim, f->given, 4);
+    gs4i_wrap_faces(sim, f->open, 1);
+    gs4i_wrap_faces(sim, f->body, 2);
+    gs4i_wrap_bytes(sim, f->held);
+    gs4i_wrap_cells(sim, f->cell, 4);
 }
 
 /* --- where the surface is --------------------------------------------------------------------- */
@@ -14608,7 +14743,8 @@ static gs4_real gs4i_surface_weight(gs4_real liquid, gs4_real air)
  * where one has let go. */
 static uint8_t gs4i_kind_behind(const gs4_sim *sim, int side, const int at[3], uint8_t kind)
 {
-    if (sim->desc.walls[side] == GS4_WALL_OPEN) return kind;
+    const gs4i_staggered *f = &sim->staggered;
+    if (sim->desc.walls[side] == GS4_WALL_OPEN || f->box.periodic[side / 2]) return kind;
     if (gs4i_wall_holds(sim, side, GS4I_AT_CELL, at)) return GS4_CELL_SOLID;
     return (uint8_t)(kind == GS4_CELL_SOLID ? GS4_CELL_SOLID : GS4_CELL_AIR);
 }
@@ -14672,10 +14808,11 @@ static void gs4i_classify_face(const gs4_sim *sim, gs4i_staggered *f, int c, con
     int kind, kind_before;
     f->reach[c][i] = 0;
     if (at[c] == 0 || at[c] == box->size[c]) return;
-    if ((at[c] == f->from[c] && gs4i_has_wall(sim, 2 * c)
-         && gs4i_wall_holds(sim, 2 * c, 1 << c, at))
-        || (at[c] == f->to[c] && gs4i_has_wall(sim, 2 * c + 1)
-            && gs4i_wall_holds(sim, 2 * c + 1, 1 << c, at))) {
+    if (!box->periodic[c]
+        && ((at[c] == f->from[c] && gs4i_has_wall(sim, 2 * c)
+             && gs4i_wall_holds(sim, 2 * c, 1 << c, at))
+            || (at[c] == f->to[c] && gs4i_has_wall(sim, 2 * c + 1)
+                && gs4i_wall_holds(sim, 2 * c + 1, 1 << c, at)))) {
         gs4i_hold_face(f, c, i, 0, 0);
         return;
     }
@@ -14774,7 +14911,7 @@ static void gs4i_pressure_rhs(int z, void *context)
     GS4I_BOX_PLANE(&f->box, GS4I_AT_CELL, z, at, i) {
         f->pressure[i] = 0;
         f->rhs[i] = 0;
-        if (f->kind[i] != GS4_CELL_LIQUID) continue;
+        if (f->kind[i] != GS4_CELL_LIQUID || gs4i_is_copy(f, at)) continue;
         f->rhs[i] = -gs4i_face_divergence(f, pass->what, at, inv_h);
         if (pass->what == GS4I_FACE_ACCELERATION)
             f->rhs[i] += gs4i_trace_of_square(f, at, inv_h);
@@ -14803,6 +14940,33 @@ static void gs4i_apply_pressure(int z, void *context)
         }
 }
 
+/* Copies are air to the preconditioner, and no unknowns. */
+static void gs4i_setup_periodic(gs4_sim *sim)
+{
+    gs4i_staggered *f = &sim->staggered;
+    gs4i_elliptic *e = &f->system;
+    int z, a, at[3];
+    size_t i;
+    e->box = &f->box;
+    e->tasks = &sim->tasks;
+    e->h = sim->grid.h;
+    e->inv_h = sim->grid.inv_h;
+    e->diagonal = f->diagonal;
+    e->rhs = f->rhs;
+    e->x = f->pressure;
+    e->cycles = 1;
+    e->tolerance = (double)sim->desc.solver_tolerance;
+    e->max_iterations = sim->desc.solver_max_iterations;
+    for (a = 0; a < 3; a++) {
+        e->face[a] = f->reach[a];
+        e->first[a] = f->first[a];
+        e->end[a] = f->end[a];
+    }
+    for (z = 0; z < f->box.size[2]; z++)
+        GS4I_BOX_PLANE(&f->box, GS4I_AT_CELL, z, at, i)
+            e->kind[i] = gs4i_is_copy(f, at) ? (uint8_t)GS4_CELL_AIR : f->kind[i];
+}
+
 static int gs4i_setup_pressure(gs4_sim *sim)
 {
     gs4i_staggered *f = &sim->staggered;
@@ -14814,14 +14978,16 @@ static int gs4i_setup_pressure(gs4_sim *sim)
         d.coefficient[a] = f->reach[a];
     }
     d.cell_size = sim->grid.h;
-    d.kind = f->kind;
+    if (gs4i_box_is_periodic(&f->box)) gs4i_setup_periodic(sim);
+    d.kind = f->system.kind;
     if (f->compressible) d.diagonal = f->diagonal;
     d.threads = sim->desc.threads;
     d.parallel_for = sim->desc.parallel_for;
-    result = gs4i_solver_setup(&f->solver, &d);
+    result = gs4i_solver_setup(&f->system.solver, &d);
     if (result == GS4_OK) return result;
     if (result == GS4_ERROR_MEMORY) return gs4i_fail_memory(&sim->error);
-    return gs4i_fail_value(&sim->error, GS4_ERROR_UNSTABLE, f->solver.fault, f->solver.fault_value,
+    return gs4i_fail_value(&sim->error, GS4_ERROR_UNSTABLE, f->system.solver.fault,
+                           f->system.solver.fault_value,
                            " in the pressure of the step, which is not finite or absurd; the step "
                            "was not taken; a smaller dt would do");
 }
@@ -14834,8 +15000,16 @@ static int gs4i_solve_pressure(gs4_sim *sim, gs4i_staggered_pass *pass)
     gs4_solve_stats stats;
     int result;
     memset(&stats, 0, sizeof stats);
-    result = gs4i_solver_solve(&f->solver, f->rhs, f->pressure, (double)sim->desc.solver_tolerance,
-                               sim->desc.solver_max_iterations, &stats);
+    if (gs4i_box_is_periodic(&f->box)) {
+        f->system.iterations = 0;
+        result = gs4i_solve_periodic(&f->system);
+        stats.iterations = f->system.iterations;
+        stats.residual = f->system.residual;
+        gs4i_wrap_cells(sim, f->pressure, 1);
+    } else
+        result = gs4i_solver_solve(&f->system.solver, f->rhs, f->pressure,
+                                   (double)sim->desc.solver_tolerance,
+                                   sim->desc.solver_max_iterations, &stats);
     f->iterations += stats.iterations;
     f->residual = fmax(f->residual, stats.residual);
     if (result == GS4_ERROR_NOT_CONVERGED)
@@ -14845,8 +15019,8 @@ static int gs4i_solve_pressure(gs4_sim *sim, gs4i_staggered_pass *pass)
             " of the divergence (solver_tolerance, solver_max_iterations); the step was not "
             "taken; a larger tolerance, more iterations or a smaller dt would do");
     if (result != GS4_OK)
-        return gs4i_fail_value(&sim->error, GS4_ERROR_UNSTABLE, f->solver.fault,
-                               f->solver.fault_value,
+        return gs4i_fail_value(&sim->error, GS4_ERROR_UNSTABLE, f->system.solver.fault,
+                               f->system.solver.fault_value,
                                " in the pressure of the step, which is not finite or absurd; the "
                                "step was not taken; a smaller dt would do");
     gs4i_parallel_for(&sim->tasks, f->box.size[2] + 1, gs4i_apply_pressure, pass);
@@ -14880,7 +15054,7 @@ static int gs4i_check_inflow(gs4_sim *sim)
     if (f->compressible) return GS4_OK;
     for (i = 0; i < gs4i_box_count(&f->box, GS4I_AT_CELL); i++) {
         if (f->kind[i] == GS4_CELL_AIR) return GS4_OK;
-        if (f->kind[i] == GS4_CELL_LIQUID) {
+        if (f->system.kind[i] == GS4_CELL_LIQUID) {
             inflow += (double)f->rhs[i];
             liquid++;
         }
@@ -14937,12 +15111,11 @@ static gs4i_wall_column gs4i_column_at(const gs4i_staggered *f, int side, int at
 }
 
 /* All columns w, at at[], of a side. */
-#define GS4I_EACH_COLUMN(f, side, at, b, c, w)                                           \
-    for ((b) = (side) / 2 == 0, (c) = 3 - (side) / 2 - (b), (at)[c] = 0;                 \
-         (at)[c] < (f)->box.size[c]; (at)[c]++)                                          \
-        for ((at)[b] = 0;                                                                \
-             (at)[b] < (f)->box.size[b] && ((w) = gs4i_column_at((f), (side), (at)), 1); \
-             (at)[b]++)
+#define GS4I_EACH_COLUMN(f, side, at, b, c, w)                                       \
+    for ((b) = (side) / 2 == 0, (c) = 3 - (side) / 2 - (b), (at)[c] = (f)->first[c]; \
+         (at)[c] < (f)->end[c]; (at)[c]++)                                           \
+        for ((at)[b] = (f)->first[b];                                                \
+             (at)[b] < (f)->end[b] && ((w) = gs4i_column_at((f), (side), (at)), 1); (at)[b]++)
 
 /* Did material press on the wall before this node in the last step? */
 static int gs4i_was_pressed(const gs4i_grid *g, const int x[3])
@@ -14996,6 +15169,8 @@ static int gs4i_should_hold(const gs4i_staggered *f, int side, const gs4i_wall_c
             gs4i_wall_column beside;
             memcpy(p, at, sizeof p);
             p[t] += k;
+            if (f->box.periodic[t] && p[t] < f->first[t]) p[t] = f->end[t] - 1;
+            if (f->box.periodic[t] && p[t] >= f->end[t]) p[t] = f->first[t];
             if (p[t] < 0 || p[t] >= f->box.size[t]) continue;
             beside = gs4i_column_at(f, side, p);
             any |= f->kind[beside.cell] == GS4_CELL_LIQUID && (f->contact[beside.cell] >> side & 1);
@@ -15068,7 +15243,7 @@ GS4I_INLINE void gs4i_extrapolate_face(const gs4i_staggered_pass *pass, int c, c
     int twos = 0, ones = 0, side, k;
     for (side = 0; side < 6; side++) {
         const int a = side / 2, last = f->to[a] - (a != c);
-        const int room = side & 1 ? last - at[a] : at[a] - f->from[a];
+        const int room = f->box.periodic[a] ? 2 : side & 1 ? last - at[a] : at[a] - f->from[a];
         const ptrdiff_t d = side & 1 ? step[a] : -step[a], n1 = (ptrdiff_t)i + d, n2 = n1 + d;
         if (room < 1 || !known[n1] || known[n1] >= pass->layer) continue;
         for (k = 0; k < pass->numbers; k++) one[k] += u[4 * n1 + k];
@@ -15106,9 +15281,12 @@ static void gs4i_extrapolate(gs4_sim *sim, int numbers)
     pass.sim = sim;
     pass.numbers = numbers;
     for (pass.layer = GS4I_FACE_LAYER; pass.layer < GS4I_FACE_LAYER + GS4I_FACE_LAYERS;
-         pass.layer++)
+         pass.layer++) {
         gs4i_parallel_for(&sim->tasks, sim->staggered.box.size[2] + 1, gs4i_extrapolate_layer,
                           &pass);
+        gs4i_wrap_faces(sim, sim->staggered.taken, 4);
+        gs4i_wrap_bytes(sim, sim->staggered.known);
+    }
 }
 
 /* The pressure that the solve found, for particles to take; not that of cells whose centres are in
@@ -15170,6 +15348,7 @@ static void gs4i_take_pressure(gs4_sim *sim)
     for (pass.layer = GS4I_FACE_LAYER; pass.layer < GS4I_FACE_LAYER + GS4I_FACE_LAYERS;
          pass.layer++)
         gs4i_parallel_for(&sim->tasks, planes, gs4i_extrapolate_pressure, &pass);
+    gs4i_wrap_cells(sim, sim->staggered.cell, 4);
 }
 
 /* ==== [[partitioned]] the partitioned scheme: forces, then a projection ======================== *
@@ -15404,7 +15583,7 @@ static void gs4i_excess_of_volume(int z, void *context)
         gs4_real e;
         int air = 0;
         f->pressure[i] = f->rhs[i] = 0;
-        if (f->kind[i] != GS4_CELL_LIQUID) continue;
+        if (f->kind[i] != GS4_CELL_LIQUID || gs4i_is_copy(f, at)) continue;
         for (k = -1; k <= 1; k++)
             for (y = -1; y <= 1; y++)
                 for (x = -1; x <= 1; x++)
@@ -15450,6 +15629,8 @@ static void gs4i_fold_faces(gs4_sim *sim, gs4i_node_pass *nodes)
     gs4i_mirror_faces(sim, f->given, gs4i_fold_given);
     gs4i_each_mirror(sim, GS4I_AT_CELL, f->cell, gs4i_fold_given);
     gs4i_parallel_for(&sim->tasks, f->box.size[2] + 1, gs4i_face_velocities, &pass);
+    gs4i_wrap_faces(sim, f->given, 4);
+    gs4i_wrap_cells(sim, f->cell, 4);
 }
 
 static int gs4i_finish_faces(gs4_sim *sim, gs4i_node_pass *nodes)
@@ -15480,11 +15661,12 @@ static gs4_real gs4i_find_divergence(gs4_sim *sim)
     for (z = 0; z < f->box.size[2]; z++)
         GS4I_BOX_PLANE(&f->box, GS4I_AT_CELL, z, at, i) {
             f->rhs[i] = 0;
-            if (f->kind[i] != GS4_CELL_LIQUID) continue;
+            if (f->kind[i] != GS4_CELL_LIQUID || gs4i_is_copy(f, at)) continue;
             f->rhs[i] = gs4i_face_divergence(f, GS4I_FACE_STAGE, at, sim->grid.inv_h);
             most = gs4i_max(most, gs4i_abs(f->rhs[i]));
         }
     gs4i_each_mirror(sim, GS4I_AT_CELL, f->rhs, gs4i_fill_number);
+    gs4i_wrap_cells(sim, f->rhs, 1);
     return most;
 }
 
@@ -15535,7 +15717,7 @@ typedef struct gs4i_fit {
 } gs4i_fit;
 
 /* Numbers are kept, for as long as they are needed, where the correction of volume will be. */
-static uint32_t gs4i_fitted_number(const gs4i_staggered *f, int c, ptrdiff_t face)
+static uint32_t gs4i_fitted_number(const gs4i_staggered *f, int c, size_t face)
 {
     uint32_t number;
     memcpy(&number, f->taken[c] + 4 * face + GS4I_FACE_CORRECTION, sizeof number);
@@ -15560,15 +15742,26 @@ static gs4i_fitted_face *gs4i_number_face(gs4_sim *sim, int c, size_t face, uint
 }
 
 /* The number of a face that others are extrapolated from. */
-static int gs4i_number_source(gs4_sim *sim, int c, ptrdiff_t face, uint32_t *count,
-                              uint32_t *number)
+static int gs4i_number_source(gs4_sim *sim, int c, size_t face, uint32_t *count, uint32_t *number)
 {
     gs4i_staggered *f = &sim->staggered;
     if (f->known[c][face] == GS4I_FACE_SOLVED && !gs4i_fitted_number(f, c, face)
-        && !gs4i_number_face(sim, c, (size_t)face, count))
+        && !gs4i_number_face(sim, c, face, count))
         return GS4_ERROR_MEMORY;
     *number = gs4i_fitted_number(f, c, face);
     return GS4_OK;
+}
+
+/* The face some steps from another on a side; around a periodic axis, where that is a copy. */
+static size_t gs4i_face_beside(const gs4i_staggered *f, int c, const int at[3], int side, int steps)
+{
+    const int a = side / 2, period = f->end[a] - f->first[a];
+    int p[3];
+    memcpy(p, at, sizeof p);
+    p[a] += side & 1 ? steps : -steps;
+    while (f->box.periodic[a] && p[a] < f->first[a]) p[a] += period;
+    while (f->box.periodic[a] && p[a] >= f->end[a]) p[a] -= period;
+    return gs4i_box_index(&f->box, 1 << c, p[0], p[1], p[2]);
 }
 
 /* One face beyond liquid, as gs4i_extrapolate_face has it. */
@@ -15576,17 +15769,18 @@ static int gs4i_number_beyond(gs4_sim *sim, int c, const int at[3], size_t i, ui
 {
     const gs4i_staggered *f = &sim->staggered;
     const uint8_t *known = f->known[c];
-    const ptrdiff_t nx = gs4i_box_length(&f->box, 1 << c, 0),
-                    step[3] = { 1, nx, nx * gs4i_box_length(&f->box, 1 << c, 1) };
     gs4i_fitted_face q, *to;
     int side;
     memset(&q, 0, sizeof q);
     for (side = 0; side < 6; side++) {
         const int a = side / 2, last = f->to[a] - (a != c);
-        const int room = side & 1 ? last - at[a] : at[a] - f->from[a];
-        const ptrdiff_t d = side & 1 ? step[a] : -step[a], n1 = (ptrdiff_t)i + d, n2 = n1 + d;
+        const int room = f->box.periodic[a] ? 2 : side & 1 ? last - at[a] : at[a] - f->from[a];
+        size_t n1, n2 = 0;
         int linear;
-        if (room < 1 || !known[n1] || known[n1] >= known[i]) continue;
+        if (room < 1) continue;
+        n1 = gs4i_face_beside(f, c, at, side, 1);
+        if (!known[n1] || known[n1] >= known[i]) continue;
+        if (room >= 2) n2 = gs4i_face_beside(f, c, at, side, 2);
         linear = room >= 2 && known[n2] && known[n2] < known[i];
         if (q.linear && !linear) continue;
         if (linear && !q.linear) q.sides = 0;
@@ -15617,7 +15811,7 @@ static int gs4i_begin_fit(gs4_sim *sim, gs4i_fit *fit, gs4i_krylov *k)
         for (c = 0; c < 3; c++)
             for (z = 0; z <= f->box.size[2]; z++)
                 GS4I_EACH_FACE(f, c, z, at, i)
-                    if (f->known[c][i] == layer)
+                    if (f->known[c][i] == layer && !gs4i_is_copy(f, at))
                         GS4I_TRY(gs4i_number_beyond(sim, c, at, i, &count));
     fit->count = count;
     fit->face = (const gs4i_fitted_face *)f->fitted.data;
@@ -15726,6 +15920,8 @@ static int gs4i_fit_stress(gs4_sim *sim)
         t[GS4I_FACE_STAGE] = f->given[q->axis][4 * q->face + GS4I_FACE_VELOCITY]
                              + sim->integrator.s * t[GS4I_FACE_ACCELERATION];
     }
+    gs4i_wrap_faces(sim, f->taken, 4);
+    gs4i_wrap_bytes(sim, f->known);
     return GS4_OK;
 }
 
@@ -15745,6 +15941,9 @@ static int gs4i_find_stage_velocity(gs4_sim *sim, gs4i_node_pass *nodes)
         if (f->is_viscous) gs4i_mirror_faces(sim, f->force, gs4i_fold_number);
     }
     gs4i_parallel_for(&sim->tasks, planes + 1, gs4i_predict_faces, &pass);
+    gs4i_wrap_faces(sim, f->given, 4);
+    gs4i_wrap_faces(sim, f->taken, 4);
+    gs4i_wrap_faces(sim, f->seen, 1);
     gs4i_parallel_for(&sim->tasks, planes, gs4i_classify_cells, &pass);
     gs4i_parallel_for(&sim->tasks, planes + 1, gs4i_classify_faces, &pass);
     if (f->is_viscous) GS4I_TRY(gs4i_fit_stress(sim));
@@ -16011,7 +16210,7 @@ static void gs4i_remember_faces(int index, void *context)
             for (c = 0; c < 3; c++) {
                 const size_t face = gs4i_box_index(&f->box, 1 << c, at[0], at[1], at[2]);
                 ag[c] = 0;
-                if (f->known[c][face] == GS4I_FACE_UNKNOWN) continue;
+                if (f->known[c][face] == GS4I_FACE_UNKNOWN || gs4i_is_copy(f, at)) continue;
                 ag[c] = f->given[c][4 * face + GS4I_FACE_RATE];
                 known |= 1 << c;
             }
@@ -19644,7 +19843,6 @@ static int gs4i_check_euler(gs4i_error *e, const gs4_sim_desc *d)
 /* What the partitioned scheme has no use for, or not yet. */
 static int gs4i_check_partitioned(gs4i_error *e, const gs4_sim_desc *d)
 {
-    int w;
     GS4I_TRY(gs4i_require(e, d->integrator != GS4_INTEGRATOR_SYMPLECTIC_EULER,
                           "integrator: symplectic Euler belongs to the explicit scheme; use "
                           "GS4_INTEGRATOR_GS4 or GS4_INTEGRATOR_BACKWARD_EULER"));
@@ -19653,11 +19851,6 @@ static int gs4i_check_partitioned(gs4i_error *e, const gs4_sim_desc *d)
     if (d->integrator == GS4_INTEGRATOR_BACKWARD_EULER)
         GS4I_TRY(gs4i_check_absent(e, "rho_inf", d->rho_inf,
                                    "backward Euler has no such parameter, leave it 0"));
-    for (w = 0; w < 6; w++)
-        GS4I_TRY(gs4i_require(e, d->walls[w] != GS4_WALL_PERIODIC,
-                              "walls: the partitioned scheme of this version has no periodic ones; "
-                              "use GS4_WALL_STICK, GS4_WALL_SLIP, GS4_WALL_SEPARATE or "
-                              "GS4_WALL_OPEN"));
     return GS4_OK;
 }
 
@@ -21962,5 +22155,6 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  * flip_decay_time 0, the default: noise of velocities and J after impacts decays as fast as it
  * crosses cells (NOISE); other values mean what they did. gs4_get_desc gives 0 for it, before
  * 0.5. GS4_FIELD_PRESSURE, of the partitioned scheme, in frames too; that has heat now, and steps
- * no longer than ripples of its surfaces bear; and separating walls. Forces of stress at its free
- * surfaces are not lost any more: there elastic bodies gained energy, and viscous ones momentum. */
+ * no longer than ripples of its surfaces bear; separating and periodic walls. Forces of stress at
+ * its free surfaces are not lost any more: there elastic bodies gained energy, and viscous ones
+ * momentum. */

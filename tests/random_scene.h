@@ -310,14 +310,10 @@ static void make_emitter(scene *s, gs4_emitter *e)
 /* Scenes of the partitioned scheme, without what that refuses. */
 static void make_partitioned(gs4_sim_desc *d)
 {
-    int a;
     d->scheme = GS4_PARTITIONED;
     d->integrator = one_in(3) ? GS4_INTEGRATOR_BACKWARD_EULER : GS4_INTEGRATOR_GS4;
     if (d->integrator != GS4_INTEGRATOR_GS4) d->rho_inf = d->rho_inf_spurious = 0;
     d->sharp_gradients = 0;
-    for (a = 0; a < 6; a++)
-        if (d->walls[a] == GS4_WALL_PERIODIC)
-            d->walls[a] = one_in(2) ? GS4_WALL_SLIP : GS4_WALL_SEPARATE;
 }
 
 static void make_incompressible(gs4_material *m)

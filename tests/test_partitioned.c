@@ -948,7 +948,7 @@ static void test_partitioned_refusals(void)
     partitioned_refuses(d, "sharp_gradients");
     d = fine;
     d.walls[4] = d.walls[5] = GS4_WALL_PERIODIC;
-    partitioned_refuses(d, "walls");
+
     d = fine;
     d.scheme = GS4_SEMI_IMPLICIT;
     partitioned_refuses(d, "scheme");

@@ -20942,13 +20942,6 @@ static int gs4i_try_step(gs4_sim *sim, gs4_real dt)
     GS4I_TRY(gs4i_check(&sim->error, "dt", dt, GS4I_POSITIVE));
     GS4I_TRY(gs4i_check_edit(sim));
     GS4I_TRY(gs4i_limit_now(sim, &r, &limit));
-    sim->limits = r;
-    if (sim->limits_stale) gs4i_warn_of_soft(sim);
-    sim->limits_stale = 0;
-    if (limit < GS4I_C(1e-6) && dt <= limit)
-        gs4i_warn_value(sim, GS4I_WARN_SHORT_STEPS, "the stable step is ", (double)limit,
-                        " s: a second of the scene takes more than a million steps; less "
-                        "viscosity, stiffness, sound_speed or speed, or larger cells, would do");
     if (dt > limit * (1 + 8 * GS4I_EPSILON)) {
         gs4i_text t = gs4i_begin_error(&sim->error);
         gs4i_put(&t, "dt is ");
@@ -20956,9 +20949,16 @@ static int gs4i_try_step(gs4_sim *sim, gs4_real dt)
         gs4i_put(&t, " s; the largest stable step is now ");
         gs4i_put_real(&t, (double)limit);
         gs4i_put(&t, " s (gs4_stable_dt); the step was not taken");
-        sim->limits_stale = 1; /* a viscosity law may say something else when it is asked again */
         return gs4i_end_error(&sim->error, GS4_ERROR_UNSTABLE);
     }
+    /* not before: a refused call changes nothing, and a law may say something else next time */
+    sim->limits = r;
+    if (sim->limits_stale) gs4i_warn_of_soft(sim);
+    sim->limits_stale = 0;
+    if (limit < GS4I_C(1e-6))
+        gs4i_warn_value(sim, GS4I_WARN_SHORT_STEPS, "the stable step is ", (double)limit,
+                        " s: a second of the scene takes more than a million steps; less "
+                        "viscosity, stiffness, sound_speed or speed, or larger cells, would do");
     sim->busy = 1;
     result = gs4i_step(sim, dt);
     sim->busy = 0;

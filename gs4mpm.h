@@ -400,7 +400,7 @@
  * cells of the surface. A mesh that moves is sampled anew now and then, but for one that takes less
  * than 32 MB as a whole. While it is added, 12 more a triangle and 16 a vertex.
  * Double, GS4: 121 (32 more) and 97. Stepping allocates nothing once the scene has stopped growing;
- * a kernel takes 39 KB of stack, with heat 61; in double 77 and 120.
+ * a kernel takes 61 KB of stack, partitioned 71; in double 120 and 141.
  *
  * THREADS. `parallel_for` or the pool. The same bits for any number of threads: blocks of one
  * colour share no node, sums run in the order of particles within a block. Two simulations on two

@@ -9,7 +9,7 @@ set -u
 cd "$(dirname "$0")/.." || exit 1
 CC=${CC:-cc}
 
-quick='few_layout few_snippets few_warnings few_hashes'
+quick='few_layout few_snippets few_warnings few_hashes few_fuzz'
 full='warnings tsan fused scenes hashes asan fuzz arm hashes_double wasm windows tiny musl i386 form layout names units snippets link frames examples'
 
 # A transfer kernel may be longer than 60 lines; nothing else. This one is a transpose, spelled out.
@@ -400,6 +400,7 @@ fuzz() {
     check "in float" fuzzed "$build" 1 80
     check "in double" fuzzed "$build -DGS4_DOUBLE" 1101 50
 }
+few_fuzz() { check "a few scenes" fuzzed "$CC -O0 -w" 1 5; }
 
 tsan() {
     have gcc || return

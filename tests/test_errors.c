@@ -2346,7 +2346,7 @@ static void test_errors_stable_dt(void)
 /* A clock that says nothing of use: times count as 0, and it ends a budget of seconds. */
 static double err_bad_now(void *user)
 {
-    static const double says[] = { ERR_NAN, 1e5, ERR_INFINITY, -ERR_INFINITY, 3, 7 };
+    const double says[] = { ERR_NAN, 1e5, ERR_INFINITY, -ERR_INFINITY, 3, 7 };
     int *state = (int *)user; /* which number; from 6 on: backwards */
     return *state < 5 ? says[*state] : *state == 5 ? says[(*state)--] : -(double)(*state)++;
 }

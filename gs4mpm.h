@@ -14132,9 +14132,9 @@ static void gs4i_free_staggered(gs4i_memory *m, gs4i_staggered *f)
 
 /* --- walls ------------------------------------------------------------------------------------ */
 
-/* Parity of component c at a wall of this side: odd along the normal, and along a sticky wall; even
- * behind a periodic one. A liquid without viscosity does not feel that: odd there would be a source
- * of energy. */
+/* Parity of component c at a wall of this side: even behind a periodic one; odd along the normal,
+ * and along a sticky wall. A liquid without viscosity does not feel that: odd there would be a
+ * source of energy. */
 static gs4_real gs4i_wall_parity(const gs4_sim *sim, int c, int side)
 {
     const gs4_wall wall = sim->desc.walls[side];
@@ -14173,6 +14173,14 @@ GS4I_INLINE int gs4i_is_copy(const gs4i_staggered *f, const int at[3])
     return outside && gs4i_box_is_periodic(&f->box);
 }
 
+/* Index of a cell along an axis, or of a face before one: around a periodic axis that of which it
+ * is a copy. */
+GS4I_INLINE int gs4i_around(const gs4i_staggered *f, int axis, int at)
+{
+    const int first = f->first[axis], period = f->end[axis] - first;
+    return f->box.periodic[axis] ? first + ((at - first) % period + period) % period : at;
+}
+
 /* Is there a wall that mirrors, or a periodic one, within the box? */
 static int gs4i_has_wall(const gs4_sim *sim, int side)
 {
@@ -14189,11 +14197,7 @@ static size_t gs4i_wall_cell(const gs4_sim *sim, int side, const int at[3], int 
     const gs4i_staggered *f = &sim->staggered;
     int p[3], t;
     for (t = 0; t < 3; t++) {
-        p[t] = at[t] - (low >> t & 1);
-        if (f->box.periodic[t]) {
-            const int period = f->to[t] - f->from[t];
-            p[t] = f->from[t] + ((p[t] - f->from[t]) % period + period) % period;
-        }
+        p[t] = gs4i_around(f, t, at[t] - (low >> t & 1));
         if (p[t] < f->from[t] && gs4i_has_wall(sim, 2 * t)) p[t] = 2 * f->from[t] - 1 - p[t];
         if (p[t] >= f->to[t] && gs4i_has_wall(sim, 2 * t + 1)) p[t] = 2 * f->to[t] - 1 - p[t];
         if (t == side / 2) p[t] = side & 1 ? f->to[t] - 1 : f->from[t];
@@ -15168,9 +15172,7 @@ static int gs4i_should_hold(const gs4i_staggered *f, int side, const gs4i_wall_c
         for (k = -1; k <= 1 && t != side / 2; k += 2) {
             gs4i_wall_column beside;
             memcpy(p, at, sizeof p);
-            p[t] += k;
-            if (f->box.periodic[t] && p[t] < f->first[t]) p[t] = f->end[t] - 1;
-            if (f->box.periodic[t] && p[t] >= f->end[t]) p[t] = f->first[t];
+            p[t] = gs4i_around(f, t, p[t] + k);
             if (p[t] < 0 || p[t] >= f->box.size[t]) continue;
             beside = gs4i_column_at(f, side, p);
             any |= f->kind[beside.cell] == GS4_CELL_LIQUID && (f->contact[beside.cell] >> side & 1);
@@ -15755,12 +15757,10 @@ static int gs4i_number_source(gs4_sim *sim, int c, size_t face, uint32_t *count,
 /* The face some steps from another on a side; around a periodic axis, where that is a copy. */
 static size_t gs4i_face_beside(const gs4i_staggered *f, int c, const int at[3], int side, int steps)
 {
-    const int a = side / 2, period = f->end[a] - f->first[a];
+    const int a = side / 2;
     int p[3];
     memcpy(p, at, sizeof p);
-    p[a] += side & 1 ? steps : -steps;
-    while (f->box.periodic[a] && p[a] < f->first[a]) p[a] += period;
-    while (f->box.periodic[a] && p[a] >= f->end[a]) p[a] -= period;
+    p[a] = gs4i_around(f, a, at[a] + (side & 1 ? steps : -steps));
     return gs4i_box_index(&f->box, 1 << c, p[0], p[1], p[2]);
 }
 

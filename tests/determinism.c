@@ -238,7 +238,7 @@ static gs4_sim *create(gs4_integrator integrator, const options *o, unsigned *ca
     return o->bunnies ? create_bunnies(&d) : create_block(&d, o);
 }
 
-static void write_frames(gs4_sim *sim, const char *name)
+static void write_all_frames(gs4_sim *sim, const char *name)
 {
     const gs4_view x = gs4_particles(sim, GS4_FIELD_POSITION),
                    v = gs4_particles(sim, GS4_FIELD_VELOCITY);
@@ -270,7 +270,7 @@ static void write_frames(gs4_sim *sim, const char *name)
     fclose(text);
 }
 
-static void run(const char *name, gs4_integrator integrator, const options *o)
+static void hash_scene(const char *name, gs4_integrator integrator, const options *o)
 {
     unsigned calls = 0;
     gs4_sim *sim = create(integrator, o, &calls);
@@ -294,7 +294,7 @@ static void run(const char *name, gs4_integrator integrator, const options *o)
     hash = gs4_state_hash(sim);
     printf("%s %d steps %d particles %08lx%08lx\n", name, o->steps, gs4_get_stats(sim).particles,
            (unsigned long)(hash >> 32), (unsigned long)(hash & 0xffffffffu));
-    if (o->frames) write_frames(sim, o->frames);
+    if (o->frames) write_all_frames(sim, o->frames);
     gs4_destroy(sim);
 }
 
@@ -333,7 +333,7 @@ int main(int count, char **values)
             return 2;
         }
     }
-    run("gs4", GS4_INTEGRATOR_GS4, &o);
-    run("symplectic", GS4_INTEGRATOR_SYMPLECTIC_EULER, &o);
+    hash_scene("gs4", GS4_INTEGRATOR_GS4, &o);
+    hash_scene("symplectic", GS4_INTEGRATOR_SYMPLECTIC_EULER, &o);
     return 0;
 }

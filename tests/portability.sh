@@ -9,7 +9,7 @@ set -u
 cd "$(dirname "$0")/.." || exit 1
 CC=${CC:-cc}
 
-quick='few_layout few_snippets few_warnings few_hashes few_fuzz'
+quick='few_layout few_snippets few_warnings few_hashes'
 full='warnings tsan fused scenes hashes asan fuzz arm hashes_double wasm windows tiny musl i386 form layout names units snippets link frames examples'
 
 # A transfer kernel may be longer than 60 lines; nothing else. This one is a transpose, spelled out.
@@ -252,10 +252,11 @@ layout() {
 
 # ==== the same bits ============================================================================================
 
-# det BUILD ARGUMENTS [RUNNER]: builds tests/determinism.c, if that build is not there yet, and runs it
+# det BUILD ARGUMENTS [RUNNER]: builds tests/determinism.c, or what else $hashed is, if that build is not there yet, and runs it
+hashed=determinism
 det() {
     program=./det$(echo "$1 $real" | cksum | tr ' ' _)$suffix
-    [ -x "$tmp/$program" ] || $1 $real -I. tests/determinism.c -o "$tmp/$program" -lm || return 1
+    [ -x "$tmp/$program" ] || $1 $real -I. tests/$hashed.c -o "$tmp/$program" -lm || return 1
     (cd "$tmp" && ${3:-} "$program" $scene steps=$steps ${2:-})
 }
 
@@ -278,9 +279,10 @@ threads_and_checkpoint() {
 }
 
 few_hashes() {
-    threaded="$CC -O0 -DGS4_PTHREADS -pthread"
+    hashed=few threaded="$CC -O0 -w -DGS4_PTHREADS -pthread"
     reference "" 10
     threads_and_checkpoint
+    check "a few scenes of the fuzzer" sh -c 'cd "$1" && "$2" fuzz 1 5' few "$tmp" "$program"
 }
 
 all_hashes() {
@@ -400,7 +402,6 @@ fuzz() {
     check "in float" fuzzed "$build" 1 80
     check "in double" fuzzed "$build -DGS4_DOUBLE" 1101 50
 }
-few_fuzz() { check "a few scenes" fuzzed "$CC -O0 -w" 1 5; }
 
 tsan() {
     have gcc || return

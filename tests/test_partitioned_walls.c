@@ -160,7 +160,7 @@ static void test_partitioned_walls_rest(void)
     const double limit = sizeof(gs4_real) == 8 ? 1e-9 : 1e-5;
     double worst = 0;
     int n, i;
-    for (n = 0; n < 24; n += test_full ? 1 : 11) {
+    for (n = 0; n < 24; n += test_full ? 1 : 13) {
         const int a = n / 8, down = n & 1, cells = 8, big = n % 3 == 2;
         const double H = (5 + rest[n / 2 % 4]) / cells;
         gs4_sim_desc d = partitioned_cube(cells);

@@ -398,7 +398,7 @@
  * A mesh: about 400 (double 800) per cell face of its surface in the domain or within 10 cells of
  * it; where that is more than 1 GB it is refused. Its distance is sampled twice a cell within three
  * cells of the surface. A mesh that moves is sampled anew now and then, but for one that takes less
- * than 32 MB as a whole. While it is added, 12 more a triangle and 16 a vertex.
+ * than 32 MB as a whole. While it is sampled, up to 70 more a triangle.
  * Double, GS4: 121 (32 more) and 97. Stepping allocates nothing once the scene has stopped growing;
  * a kernel takes 61 KB of stack, partitioned 71; in double 120 and 141.
  *
@@ -1601,6 +1601,9 @@ GS4I_INLINE gs4_vec3 gs4i_cross(gs4_vec3 a, gs4_vec3 b)
 GS4I_INLINE gs4_real gs4i_length(gs4_vec3 a) { return GS4I_SQRT(gs4i_dot(a, a)); }
 GS4I_INLINE gs4_real gs4i_min(gs4_real a, gs4_real b) { return a < b ? a : b; }
 GS4I_INLINE gs4_real gs4i_max(gs4_real a, gs4_real b) { return a > b ? a : b; }
+/* fmin and fmax are calls; where many are asked, of numbers */
+GS4I_INLINE double gs4i_lesser(double a, double b) { return a < b ? a : b; }
+GS4I_INLINE double gs4i_greater(double a, double b) { return a > b ? a : b; }
 GS4I_INLINE gs4_real gs4i_abs(gs4_real a) { return a < 0 ? -a : a; }
 static void gs4i_to_double(gs4_vec3 a, double out[3])
 {
@@ -9967,7 +9970,7 @@ static double gs4i_segment_distance2(const double p[3], const double a[3], const
         along += (b[i] - a[i]) * (p[i] - a[i]);
         length2 += (b[i] - a[i]) * (b[i] - a[i]);
     }
-    along = length2 > 0 ? fmax(0, fmin(along / length2, 1)) : 0;
+    along = length2 > 0 ? gs4i_greater(0, gs4i_lesser(along / length2, 1)) : 0;
     for (i = 0; i < 3; i++) {
         const double q = a[i] + along * (b[i] - a[i]) - p[i];
         r += q * q;
@@ -9997,24 +10000,40 @@ static double gs4i_dot_double(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
+static void gs4i_facet_corners(const gs4_shape *s, size_t t, int first, double corner[3][3])
+{
+    int i;
+    for (i = 0; i < 3; i++) gs4i_mesh_corner(s, 3 * t + (size_t)((first + i) % 3), corner[i]);
+}
+
+/* From which corner is it known best: one whose angle is not below 1e-5; 3: a needle. And its
+ * sides from there, the normal of the first and the last, and the square of that. */
+static int gs4i_facet_form(const gs4_shape *s, size_t t, double side[3][3], double n[3], double *n2)
+{
+    double corner[3][3];
+    int i, a, first;
+    for (first = 0; first < 3; first++) {
+        gs4i_facet_corners(s, t, first, corner);
+        for (i = 0; i < 3; i++)
+            for (a = 0; a < 3; a++) side[i][a] = corner[(i + 1) % 3][a] - corner[i][a];
+        gs4i_cross_double(side[0], side[1], 1, n);
+        *n2 = gs4i_dot_double(n, n);
+        if (*n2 > 1e-10 * gs4i_dot_double(side[0], side[0]) * gs4i_dot_double(side[2], side[2]))
+            return first;
+    }
+    return 3;
+}
+
 static void gs4i_make_facet(const gs4_shape *s, int t, double spacing, gs4i_facet *f)
 {
-    double side[3][3], n[3], n2 = 0, size = 0;
-    int i, a, first;
-    /* from a corner whose angle is not below 1e-5 */
-    for (first = 0, f->is_needle = 1; first < 3 && f->is_needle; first++) {
-        for (i = 0; i < 3; i++)
-            gs4i_mesh_corner(s, 3 * (size_t)t + (size_t)((first + i) % 3), f->corner[i]);
-        for (i = 0; i < 3; i++)
-            for (a = 0; a < 3; a++) side[i][a] = f->corner[(i + 1) % 3][a] - f->corner[i][a];
-        gs4i_cross_double(side[0], side[1], 1, n);
-        n2 = gs4i_dot_double(n, n);
-        f->is_needle =
-            !(n2 > 1e-10 * gs4i_dot_double(side[0], side[0]) * gs4i_dot_double(side[2], side[2]));
-    }
+    double side[3][3], n[3], n2, size = 0;
+    const int first = gs4i_facet_form(s, (size_t)t, side, n, &n2);
+    int i, a;
+    f->is_needle = first == 3;
+    gs4i_facet_corners(s, (size_t)t, first, f->corner);
     for (a = 0; a < 3; a++) {
-        f->low[a] = fmin(f->corner[0][a], fmin(f->corner[1][a], f->corner[2][a]));
-        f->high[a] = fmax(f->corner[0][a], fmax(f->corner[1][a], f->corner[2][a]));
+        f->low[a] = gs4i_lesser(f->corner[0][a], gs4i_lesser(f->corner[1][a], f->corner[2][a]));
+        f->high[a] = gs4i_greater(f->corner[0][a], gs4i_greater(f->corner[1][a], f->corner[2][a]));
         size += f->high[a] - f->low[a];
     }
     f->slack = 1e-9 * size + 1e-6 * spacing;
@@ -10026,12 +10045,17 @@ static void gs4i_make_facet(const gs4_shape *s, int t, double spacing, gs4i_face
     f->beyond = gs4i_dot_double(f->plane[2], side[0]);
 }
 
+static double gs4i_corners_distance2(const double c[3][3], int is_needle, const double p[3])
+{
+    if (!is_needle) return gs4i_triangle_distance2(p, c[0], c[1], c[2]);
+    return gs4i_lesser(
+        gs4i_segment_distance2(p, c[0], c[1]),
+        gs4i_lesser(gs4i_segment_distance2(p, c[1], c[2]), gs4i_segment_distance2(p, c[2], c[0])));
+}
+
 static double gs4i_facet_distance2(const gs4i_facet *f, const double p[3])
 {
-    const double(*c)[3] = f->corner;
-    if (!f->is_needle) return gs4i_triangle_distance2(p, c[0], c[1], c[2]);
-    return fmin(gs4i_segment_distance2(p, c[0], c[1]),
-                fmin(gs4i_segment_distance2(p, c[1], c[2]), gs4i_segment_distance2(p, c[2], c[0])));
+    return gs4i_corners_distance2(f->corner, f->is_needle, p);
 }
 
 /* The same or less, quickly: exact where a face or a side is nearest. */
@@ -10056,26 +10080,196 @@ GS4I_INLINE int gs4i_facet_is_near(const gs4i_facet *f, const double p[3], doubl
     return gs4i_facet_bound2(f, p) < reach * reach;
 }
 
-/* May the triangle be nearer to one of 8 points, `spacing` apart along x from p on, than |d|? */
-static int gs4i_facet_is_nearer(const gs4i_facet *f, const double p[3], double spacing,
-                                const gs4_real d[8])
+/* --- which triangle is nearest ---------------------------------------------------------------- */
+
+/* A binary tree: node 1 has all triangles, 2 n and 2 n + 1 have the halves of what n has, on both
+ * sides of a plane. The box around them is turned as they are: a slanted fan of needles would fill
+ * one along the axes, and be near to all in it. */
+typedef struct gs4i_facet_node {
+    double axis[3][3], low[3], high[3]; /* the box along unit axes */
+} gs4i_facet_node;
+
+typedef struct gs4i_facet_tree {
+    const gs4_shape *shape;
+    gs4i_facet_node *node;
+    size_t *facet; /* 4 times a triangle and its form, by place */
+    int levels;    /* at the last one nodes have at most 8 triangles */
+    double spacing;
+} gs4i_facet_tree;
+
+/* Where the triangles of a node begin; those of the next begin where they end. */
+GS4I_INLINE size_t gs4i_facets_of(const gs4i_facet_tree *t, int level, int node)
 {
-    double r[3], at[4];
-    int i, c, nearer = f->is_needle;
-    if (nearer) return 1;
-    for (i = 0; i < 3; i++) r[i] = p[i] - f->corner[0][i];
-    for (i = 0; i < 4; i++) at[i] = gs4i_dot_double(f->plane[i], r);
-    at[2] -= f->beyond;
-    for (c = 0; c < 8; c++) {
-        const double x = c * spacing, face = at[0] + x * f->plane[0][0],
-                     one = at[1] + x * f->plane[1][0], two = at[2] + x * f->plane[2][0],
-                     three = at[3] + x * f->plane[3][0], reach = fabs((double)d[c]) + f->slack;
-        double side = one > two ? one : two;
-        side = side > three ? side : three;
-        side = side > 0 ? side : 0;
-        nearer |= face * face + side * side < reach * reach;
+    const int n = node - (1 << level);
+    return (size_t)(((int64_t)t->shape->triangle_count * n) >> level);
+}
+
+/* Three times the centre of a triangle. */
+static double gs4i_facet_centre(const gs4i_facet_tree *t, size_t i, int axis)
+{
+    const size_t first = 3 * (t->facet[i] / 4);
+    double sum = 0;
+    int k;
+    for (k = 0; k < 3; k++)
+        sum += (double)t->shape
+                   ->vertices[3 * (size_t)t->shape->triangles[first + (size_t)k] + (size_t)axis];
+    return sum;
+}
+
+/* Those of [begin, end) whose centres are lower along an axis come before `middle`: quickselect.
+ * Its pivots are scattered: centres of a fan rise and fall, and its middle is an extreme. */
+static void gs4i_facet_split(gs4i_facet_tree *t, size_t begin, size_t middle, size_t end, int axis)
+{
+    while (end - begin > 1) {
+        const double pivot =
+            gs4i_facet_centre(t, begin + (size_t)gs4i_mix(end) % (end - begin), axis);
+        size_t i = begin, j = end; /* [begin, i) is not above the pivot, [j, end) not below */
+        while (i < j) {
+            while (gs4i_facet_centre(t, i, axis) < pivot) i++;
+            while (gs4i_facet_centre(t, j - 1, axis) > pivot) j--;
+            if (i < j) {
+                const size_t swap = t->facet[i];
+                t->facet[i++] = t->facet[j - 1];
+                t->facet[--j] = swap;
+            }
+        }
+        if (middle < j)
+            end = j;
+        else if (middle >= i)
+            begin = i;
+        else
+            return;
     }
-    return nearer;
+}
+
+/* Along the longest side, the vector area across it, and what is normal to both; any axes do. */
+static void gs4i_facet_axes(const gs4i_facet_tree *t, size_t begin, size_t end, double axis[3][3])
+{
+    double longest = 0, area[3] = { 0, 0, 0 }, side[3][3], n[3], n2, along;
+    size_t i;
+    int k, a, least = 0;
+    for (a = 0; a < 3; a++) axis[0][a] = a == 0;
+    for (i = begin; i < end; i++) {
+        gs4i_facet_form(t->shape, t->facet[i] / 4, side, n, &n2);
+        for (a = 0; a < 3; a++) area[a] += n[a];
+        for (k = 0; k < 3; k++) {
+            n2 = gs4i_dot_double(side[k], side[k]);
+            if (n2 <= longest) continue;
+            for (longest = n2, a = 0; a < 3; a++) axis[0][a] = side[k][a] / sqrt(n2);
+        }
+    }
+    for (a = 1; a < 3; a++)
+        if (fabs(axis[0][a]) < fabs(axis[0][least])) least = a;
+    n2 = gs4i_dot_double(area, area);
+    along = gs4i_dot_double(area, axis[0]);
+    if (n2 - along * along <= 1e-6 * n2) { /* none across it */
+        for (a = 0; a < 3; a++) area[a] = a == least;
+        along = axis[0][least];
+    }
+    for (a = 0; a < 3; a++) area[a] -= along * axis[0][a];
+    n2 = sqrt(gs4i_dot_double(area, area));
+    for (a = 0; a < 3; a++) axis[1][a] = area[a] / n2;
+    gs4i_cross_double(axis[0], axis[1], 1, axis[2]);
+}
+
+static void gs4i_build_node(gs4i_facet_tree *t, int level, int node)
+{
+    const size_t begin = gs4i_facets_of(t, level, node), end = gs4i_facets_of(t, level, node + 1);
+    gs4i_facet_node *q = t->node + node;
+    double c[3][3], low[3], high[3];
+    size_t i;
+    int k, a, longest = 0;
+    gs4i_facet_axes(t, begin, end, q->axis);
+    for (a = 0; a < 3; a++) {
+        q->low[a] = low[a] = DBL_MAX;
+        q->high[a] = high[a] = -DBL_MAX;
+    }
+    for (i = begin; i < end; i++) {
+        gs4i_facet_corners(t->shape, t->facet[i] / 4, 0, c);
+        for (a = 0; a < 3; a++) {
+            const double centre = gs4i_facet_centre(t, i, a);
+            low[a] = gs4i_lesser(low[a], centre);
+            high[a] = gs4i_greater(high[a], centre);
+            for (k = 0; k < 3; k++) {
+                const double x = gs4i_dot_double(q->axis[a], c[k]);
+                q->low[a] = gs4i_lesser(q->low[a], x);
+                q->high[a] = gs4i_greater(q->high[a], x);
+            }
+        }
+    }
+    for (a = 0; a < 3; a++) {
+        const double slack =
+            1e-6 * t->spacing + 1e-12 * gs4i_greater(fabs(q->low[a]), fabs(q->high[a]));
+        q->low[a] -= slack;
+        q->high[a] += slack;
+        if (high[a] - low[a] > high[longest] - low[longest]) longest = a;
+    }
+    if (level == t->levels) return;
+    gs4i_facet_split(t, begin, gs4i_facets_of(t, level + 1, 2 * node + 1), end, longest);
+    gs4i_build_node(t, level + 1, 2 * node);
+    gs4i_build_node(t, level + 1, 2 * node + 1);
+}
+
+static void gs4i_free_facets(gs4i_memory *m, gs4i_facet_tree *t)
+{
+    gs4i_free(m, t->facet, (size_t)t->shape->triangle_count, sizeof *t->facet);
+    gs4i_free(m, t->node, (size_t)2 << t->levels, sizeof *t->node);
+}
+
+static int gs4i_build_facets(gs4i_memory *m, gs4i_facet_tree *t, const gs4_shape *s, double spacing)
+{
+    double side[3][3], n[3], n2;
+    size_t i;
+    t->shape = s;
+    t->spacing = spacing;
+    t->levels = 0;
+    while (s->triangle_count - 1 >= 8 << t->levels) t->levels++;
+    t->facet = (size_t *)gs4i_alloc(m, (size_t)s->triangle_count, sizeof *t->facet);
+    t->node = (gs4i_facet_node *)gs4i_alloc(m, (size_t)2 << t->levels, sizeof *t->node);
+    if (!t->facet || !t->node) return 0;
+    for (i = 0; i < (size_t)s->triangle_count; i++)
+        t->facet[i] = 4 * i + (size_t)gs4i_facet_form(s, i, side, n, &n2);
+    gs4i_build_node(t, 0, 1);
+    return 1;
+}
+
+/* Squared distance to the box of a node. */
+GS4I_INLINE double gs4i_node_distance2(const gs4i_facet_node *q, const double p[3])
+{
+    double r2 = 0;
+    int a;
+    for (a = 0; a < 3; a++) {
+        const double x = gs4i_dot_double(q->axis[a], p), below = q->low[a] - x,
+                     above = x - q->high[a];
+        const double gap = gs4i_greater(gs4i_greater(below, above), 0);
+        r2 += gap * gap;
+    }
+    return r2;
+}
+
+/* The squared distance of p from the triangles of a node, or r2 if that is less. */
+static double gs4i_nearest2(const gs4i_facet_tree *t, int level, int node, const double p[3],
+                            double r2)
+{
+    double child[2];
+    size_t i;
+    int k, first;
+    if (level == t->levels) {
+        const size_t end = gs4i_facets_of(t, level, node + 1);
+        for (i = gs4i_facets_of(t, level, node); i < end; i++) {
+            const int form = (int)(t->facet[i] % 4);
+            double c[3][3], now;
+            gs4i_facet_corners(t->shape, t->facet[i] / 4, form, c);
+            now = gs4i_corners_distance2((const double(*)[3])c, form == 3, p);
+            if (now < r2) r2 = now;
+        }
+        return r2;
+    }
+    for (k = 0; k < 2; k++) child[k] = gs4i_node_distance2(t->node + 2 * node + k, p);
+    first = child[1] < child[0];
+    for (k = 0; k < 2; k++)
+        if (child[first ^ k] < r2) r2 = gs4i_nearest2(t, level + 1, 2 * node + (first ^ k), p, r2);
+    return r2;
 }
 
 /* --- sampled distance of a mesh --------------------------------------------------------------- */
@@ -10086,10 +10280,10 @@ static void gs4i_field_range(const gs4i_field *f, const gs4i_facet *t, int axis,
                              int range[2])
 {
     const double first = 8 * f->first[axis], last = first + 8 * f->blocks[axis] - 1;
-    range[0] =
-        (int)fmin(fmax(ceil((t->low[axis] - margin - f->low[axis]) / f->spacing), first), last + 1);
-    range[1] = (int)fmax(fmin(floor((t->high[axis] + margin - f->low[axis]) / f->spacing), last),
-                         first - 1);
+    range[0] = (int)gs4i_lesser(
+        gs4i_greater(ceil((t->low[axis] - margin - f->low[axis]) / f->spacing), first), last + 1);
+    range[1] = (int)gs4i_greater(
+        gs4i_lesser(floor((t->high[axis] + margin - f->low[axis]) / f->spacing), last), first - 1);
 }
 
 static void gs4i_field_place(const gs4i_field *f, double i, double j, double k, double p[3])
@@ -10121,42 +10315,22 @@ static void gs4i_field_mark(gs4i_field *f, const gs4i_facet *t)
             }
 }
 
-/* Samples of the block that begins at sample `at` learn how far the triangle is, if that is less:
- * those of the rows in `range`. */
-static void gs4i_field_approach_block(const gs4i_field *f, const gs4i_facet *t, int32_t block,
-                                      const int at[3], int range[3][2])
+/* Distances of the samples of the block that begins at sample i, j, k; `band` stays beyond it, and
+ * signs stay. On a path from one to the next: there it is one spacing farther at most. */
+static void gs4i_field_measure(const gs4i_field *f, const gs4i_facet_tree *t, int i, int j, int k)
 {
-    int j, k, c;
-    for (k = at[2]; k < at[2] + 8; k++)
-        for (j = at[1]; j < at[1] + 8; j++) {
-            gs4_real *d = gs4i_field_sample(f, block, at[0], j, k);
-            double p[3], r2;
-            gs4i_field_place(f, at[0], j, k, p);
-            if (k < range[2][0] || k > range[2][1] || j < range[1][0] || j > range[1][1]
-                || !gs4i_facet_is_nearer(t, p, f->spacing, d))
-                continue;
-            for (c = 0; c < 8; c++) {
-                const double now = fabs((double)d[c]);
-                gs4i_field_place(f, at[0] + c, j, k, p);
-                if (!gs4i_facet_is_near(t, p, now)) continue;
-                r2 = gs4i_facet_distance2(t, p);
-                if (r2 < now * now) d[c] = GS4I_C(d[c] < 0 ? -sqrt(r2) : sqrt(r2));
-            }
-        }
-}
-
-static void gs4i_field_approach(const gs4i_field *f, const gs4i_facet *t)
-{
-    int range[3][2], at[3], a;
-    for (a = 0; a < 3; a++) gs4i_field_range(f, t, a, f->band, range[a]);
-    if (range[0][0] > range[0][1]) return;
-    for (at[2] = range[2][0] & ~7; at[2] <= range[2][1]; at[2] += 8)
-        for (at[1] = range[1][0] & ~7; at[1] <= range[1][1]; at[1] += 8)
-            for (at[0] = range[0][0] & ~7; at[0] <= range[0][1]; at[0] += 8) {
-                const int32_t block = f->block[gs4i_field_block_of(f, at[0], at[1], at[2])];
-                if (block >= 0 && gs4i_field_block_is_near(f, t, at[0], at[1], at[2]))
-                    gs4i_field_approach_block(f, t, block, at, range);
-            }
+    const int32_t block = f->block[gs4i_field_block_of(f, i, j, k)];
+    double distance = f->band, p[3];
+    int n;
+    for (n = 0; n < GS4I_FIELD_BLOCK; n++) {
+        const int x = n & 7, y = n >> 3 & 7, z = n >> 6;
+        const int at[3] = { i + (y & 1 ? 7 - x : x), j + (z & 1 ? 7 - y : y), k + z };
+        const double most = gs4i_lesser(f->band, distance + 1.001 * f->spacing);
+        gs4_real *d = gs4i_field_sample(f, block, at[0], at[1], at[2]);
+        gs4i_field_place(f, at[0], at[1], at[2], p);
+        distance = sqrt(gs4i_nearest2(t, 0, 1, p, most * most));
+        if (distance < f->band) *d = GS4I_C(*d < 0 ? -distance : distance);
+    }
 }
 
 /* By how much does the winding number grow along x where the line at (y, z) crosses the triangle,
@@ -10183,7 +10357,8 @@ static int gs4i_facet_crossing(const gs4i_facet *t, double y, double z, double *
     if (winding == 0) return 0;
     *x = at_x[0];
     if (at_y[1] > at_y[0])
-        *x += fmax(0, fmin((y - at_y[0]) / (at_y[1] - at_y[0]), 1)) * (at_x[1] - at_x[0]);
+        *x += gs4i_greater(0, gs4i_lesser((y - at_y[0]) / (at_y[1] - at_y[0]), 1))
+              * (at_x[1] - at_x[0]);
     return -winding;
 }
 
@@ -10271,37 +10446,45 @@ static void gs4i_field_free(gs4i_memory *m, gs4i_field *f)
     f->distance = NULL;
 }
 
+/* Those of all blocks. 0: out of memory. */
+static int gs4i_field_measure_all(gs4i_memory *m, const gs4i_field *f, const gs4_shape *s)
+{
+    gs4i_facet_tree t;
+    const int begun = gs4i_build_facets(m, &t, s, f->spacing);
+    int i, j, k;
+    for (k = f->first[2]; begun && k < f->first[2] + f->blocks[2]; k++)
+        for (j = f->first[1]; j < f->first[1] + f->blocks[1]; j++)
+            for (i = f->first[0]; i < f->first[0] + f->blocks[0]; i++)
+                if (f->block[gs4i_field_block_of(f, 8 * i, 8 * j, 8 * k)] >= 0)
+                    gs4i_field_measure(f, &t, 8 * i, 8 * j, 8 * k);
+    gs4i_free_facets(m, &t);
+    return begun;
+}
+
 /* The samples of a window that is open. */
 static int gs4i_field_sample_mesh(gs4i_error *e, gs4i_memory *m, gs4i_field *f, const gs4_shape *s)
 {
     const int width = 8 * f->blocks[1], depth = 8 * f->blocks[2];
     int32_t *rows = (int32_t *)gs4i_alloc(m, (size_t)width * (size_t)depth, sizeof *rows);
     gs4i_facet facet;
-    int t, i, wrong[3] = { -1, 0, 0 };
+    int t, i, code, wrong[3] = { -1, 0, 0 };
     f->distance =
         (gs4_real *)gs4i_alloc(m, (size_t)f->count * GS4I_FIELD_BLOCK, sizeof *f->distance);
-    for (t = 0; rows && f->distance && t < s->triangle_count; t++) {
+    code = rows && f->distance ? GS4_OK : gs4i_fail_memory(e);
+    for (t = 0; code == GS4_OK && t < s->triangle_count; t++) {
         gs4i_make_facet(s, t, f->spacing, &facet);
         gs4i_field_count_crossings(f, &facet, rows);
     }
-    for (i = 0; rows && f->distance && i < width * depth && wrong[0] < 0; i++) {
+    for (i = 0; code == GS4_OK && i < width * depth; i++) {
         wrong[1] = 8 * f->first[1] + i % width;
         wrong[2] = 8 * f->first[2] + i / width;
         wrong[0] = gs4i_field_sweep(f, wrong[1], wrong[2], rows[i]);
+        if (wrong[0] >= 0) code = gs4i_fail_inverted(e, f, s, wrong);
     }
     gs4i_free(m, rows, (size_t)width * (size_t)depth, sizeof *rows);
-    if (!rows || !f->distance || wrong[0] >= 0) {
-        const int code = wrong[0] >= 0 ? gs4i_fail_inverted(e, f, s, wrong) : gs4i_fail_memory(e);
-        gs4i_field_free(m, f);
-        return code;
-    }
-    /* in an order in which neighbours are far apart: few are nearer than all before */
-    for (t = i = 0; i < s->triangle_count; i++) {
-        gs4i_make_facet(s, t, f->spacing, &facet);
-        gs4i_field_approach(f, &facet);
-        t = (int)((t + (int64_t)2654435761) % s->triangle_count);
-    }
-    return GS4_OK;
+    if (code == GS4_OK && !gs4i_field_measure_all(m, f, s)) code = gs4i_fail_memory(e);
+    if (code < 0) gs4i_field_free(m, f);
+    return code;
 }
 
 /* --- the part of a mesh that the domain meets ------------------------------------------------- */

@@ -372,7 +372,7 @@ static void test_mesh_fan(void)
 {
     mesh_cones(1000, 0.3);
     mesh_cones(2000, 300);
-    if (test_slow) mesh_cones(100000, 0.3);
+    mesh_cones(100000, 0.3);
 }
 
 /* A box whose triangles have vertices of their own, and one with a needle of no area along an
@@ -433,6 +433,62 @@ static void test_mesh_needles(void)
         gs4i_make_facet(&s, 0, 1, &facet);
         CHECK_CLOSE(sqrt(gs4i_facet_distance2(&facet, p)), sqrt(square), 2e-5);
     }
+}
+
+/* What the tree finds is the least of the distances of all triangles, to the bit. */
+static void mesh_nearest(const gs4_shape *s)
+{
+    gs4i_memory memory;
+    gs4i_facet_tree tree;
+    gs4i_facet facet;
+    int i, t, a;
+    memset(&memory, 0, sizeof memory);
+    memory.hook.alloc_fn = gs4i_default_alloc;
+    memory.hook.free_fn = gs4i_default_free;
+    CHECK(gs4i_build_facets(&memory, &tree, s, 1e-3));
+    for (i = 0; i < 300; i++) {
+        double p[3], least = DBL_MAX, within;
+        for (a = 0; a < 3; a++) p[a] = mesh_random();
+        for (t = 0; t < s->triangle_count; t++) {
+            gs4i_make_facet(s, t, 1e-3, &facet);
+            least = fmin(least, gs4i_facet_distance2(&facet, p));
+        }
+        within = least * (0.5 + i % 2);
+        CHECK(gs4i_nearest2(&tree, 0, 1, p, DBL_MAX) == least);
+        CHECK(gs4i_nearest2(&tree, 0, 1, p, within) == fmin(least, within));
+    }
+    gs4i_free_facets(&memory, &tree);
+    CHECK(memory.bytes == 0);
+}
+
+/* Triangles anywhere, a third of them needles, among them twins; a fan that stands slanted. */
+static void test_mesh_nearest(void)
+{
+    const double ring[3][2] = { { 0, 0.5 }, { 0.4, 0 }, { 0, -0.3 } };
+    mesh_parts any = mesh_begin(900, 300), fan = mesh_begin(402, 800);
+    gs4_shape shape;
+    int i, c, n;
+    for (i = 0; i < 300; i++) {
+        int v[3];
+        for (c = 0; c < 3; c++) {
+            const double x = mesh_random(), y = mesh_random();
+            v[c] = mesh_vertex(&any, x, y, mesh_random());
+            if (i % 3 == 1) v[c] = v[c > 0];
+            if (i % 30 == 2) v[c] = any.t[3 * (i - 1) + c];
+        }
+        mesh_triangle(&any, v[0], v[1], v[2]);
+    }
+    mesh_of_rings(&fan, at(0.5, 0.5, 0.5), (const double(*)[2])ring, 1, 400);
+    for (i = 0; i < fan.vertices; i++) fan.v[3 * i] += (gs4_real)0.3 * fan.v[3 * i + 1];
+    for (n = 1; n <= 300; n += 1 + n / 8 * 4) { /* leaves of every size */
+        shape = mesh_shape(&any);
+        shape.triangle_count = n;
+        mesh_nearest(&shape);
+    }
+    shape = mesh_shape(&fan);
+    mesh_nearest(&shape);
+    mesh_end(&any);
+    mesh_end(&fan);
 }
 
 static void mesh_refused(gs4_sim *sim, const mesh_parts *m, const char *a, const char *b)
@@ -598,6 +654,7 @@ static void run_mesh(void)
     RUN_FULL(test_mesh_fan);
     RUN(test_mesh_soup);
     RUN(test_mesh_needles);
+    RUN_ONCE(test_mesh_nearest);
     RUN(test_mesh_refused);
     RUN_FULL(test_mesh_memory);
     RUN_ONCE(test_mesh_too_much);

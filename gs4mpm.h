@@ -9376,19 +9376,19 @@ typedef struct gs4i_near_particle {
 
 /* The image of a particle behind the surface of a sticky collider: gs4i_place_image_particle. */
 typedef struct gs4i_image_particle {
-    /* place and mass; normal of the surface; the body's velocity at its foot and angular
-     * velocity */
-    gs4_real x[4], n[3], v[3], spin[3];
+    gs4_real x[4]; /* place and mass */
     /* of the odd part of what the particle sees: 1 within half a cell of the surface, 0 from one
      * and a half */
     gs4_real share;
-    gs4_real part; /* of the particle's mass and volume, see gs4i_image_part */
+    gs4_real part;   /* of the particle's mass and volume, see gs4i_image_part */
+    int whole, slot; /* all its nodes exist; block of x */
+    /* normal of the surface; the body's velocity at its foot and angular velocity */
+    gs4_real n[3], v[3], spin[3];
     /* to the nodes: momentum at x (Euler: and columns of its affine part); columns of force, and
      * weight */
     gs4_real carried[4][4];
     /* from them: velocity and acceleration, value and columns of the gradient */
     gs4_real seen[2][4][4];
-    int whole, slot; /* all its nodes exist; block of x */
 } gs4i_image_particle;
 
 /* The nodes of a slot near a sticky body where it is not flat, with four numbers each, of which
@@ -9396,6 +9396,7 @@ typedef struct gs4i_image_particle {
 typedef struct gs4i_patch {
     int collider, slot;
     gs4_real nearest, bend[2]; /* least distance, least and greatest bend of its nodes */
+    uint64_t clear;            /* of each node a bit: see gs4i_is_clear */
 } gs4i_patch;
 
 /* What the particles of a block have of the surface of a body. */
@@ -11787,31 +11788,47 @@ static void gs4i_sample_distances(int index, void *context)
  * on as a line. Edges and corners are left out. */
 static void gs4i_load_distances(const gs4_sim *sim, const gs4i_patch *patch, gs4_real d[216])
 {
-    static const int apart[3] = { 1, 6, 36 };
-    const gs4_real *all = (const gs4_real *)sim->image_particles.patches.distance.data;
+    /* of nodes next to each other along an axis: there, and in a block */
+    static const int apart[3] = { 1, 6, 36 }, places[3] = { 1, 4, 16 };
+    const gs4_real *all = (const gs4_real *)sim->image_particles.patches.distance.data, *from;
     gs4i_surroundings t;
-    int x[3], a, i, pass;
+    int i, j, side;
     gs4i_surroundings_of(&sim->grid, patch->slot, &t);
-    for (pass = 0; pass < 2; pass++)
-        for (i = 0; i < 216; i++) {
-            int out = 0, axis = 0, inwards, number;
-            int64_t node;
-            x[0] = i % 6;
-            x[1] = i / 6 % 6;
-            x[2] = i / 36;
-            for (a = 0; a < 3; a++)
-                if (x[a] == 0 || x[a] == 5) {
-                    out++;
-                    axis = a;
-                }
-            if (out != pass) continue;
-            node = gs4i_surrounding_node(&t, x[0] + 1, x[1] + 1, x[2] + 1);
-            number =
-                node < 0 ? -1 : gs4i_patch_of(sim, patch->collider, gs4i_slot_of((uint32_t)node));
-            inwards = (x[axis] ? -1 : 1) * apart[axis];
-            d[i] = number < 0 ? 2 * d[i + inwards] - d[i + 2 * inwards]
-                              : all[(size_t)number * GS4I_BLOCK_NODES + (size_t)(node & 63)];
-        }
+    from = all + (ptrdiff_t)gs4i_patch_of(sim, patch->collider, patch->slot) * GS4I_BLOCK_NODES;
+    for (i = 0; i < 16; i++)
+        memcpy(d + 43 + 6 * (i & 3) + 36 * (i >> 2), from + 4 * i, 4 * sizeof *d);
+    for (side = 0; side < 6; side++) {
+        static const int beside[6] = { 12, 14, 10, 16, 4, 22 };
+        const int axis = side / 2, u = (axis + 1) % 3, v = (axis + 2) % 3,
+                  outwards = side & 1 ? apart[axis] : -apart[axis], slot = t.slot[beside[side]],
+                  number = slot < 0 ? -1 : gs4i_patch_of(sim, patch->collider, slot),
+                  edge = 43 + (side & 1 ? 3 * apart[axis] : 0),
+                  place = side & 1 ? 0 : 3 * places[axis];
+        for (i = 0; i < 4; i++)
+            for (j = 0; j < 4; j++) {
+                gs4_real *at = d + edge + i * apart[u] + j * apart[v];
+                at[outwards] = number < 0 ? 2 * *at - at[-outwards]
+                                          : all[(ptrdiff_t)number * GS4I_BLOCK_NODES + place
+                                                + i * places[u] + j * places[v]];
+            }
+    }
+}
+
+/* Is a particle outside of a body, said by the node nearest to it, which is d from the body, and
+ * `away` from the particle in cells? A distance that grows by the way alone would be known by that;
+ * half as much again (chosen) forgives functions that are no true distances. */
+GS4I_INLINE int gs4i_is_outside(gs4_real d, gs4_real away2, gs4_real h)
+{
+    const gs4_real sure = GS4I_C(1.5) * h;
+    d -= GS4I_C(0.01) * h;
+    return d > 0 && d * d > sure * sure * away2;
+}
+
+/* Does it say so of every particle that it is nearest to? Half the diagonal of a cell is the most
+ * that they are away. */
+GS4I_INLINE int gs4i_is_clear(gs4_real d, gs4_real h)
+{
+    return gs4i_is_outside(d, GS4I_C(0.75), h);
 }
 
 /* Three numbers of each node of a patch. Its distance d, such that sum w d is that of particles:
@@ -11852,8 +11869,10 @@ static void gs4i_sample_patch(int index, void *context)
     patch->nearest = GS4I_HUGE;
     patch->bend[0] = h;
     patch->bend[1] = -h;
+    patch->clear = 0;
     for (i = 0; i < GS4I_BLOCK_NODES; i++) {
         const gs4_real own = d[43 + (i & 3) + 6 * (i >> 2 & 3) + 36 * (i >> 4)];
+        patch->clear |= (uint64_t)gs4i_is_clear(own, h) << i;
         patch->nearest = gs4i_min(patch->nearest, gs4i_min(own, to[4 * i]));
         patch->bend[0] = gs4i_min(patch->bend[0], to[4 * i + 1]);
         patch->bend[1] = gs4i_max(patch->bend[1], to[4 * i + 1]);
@@ -12020,51 +12039,83 @@ static int gs4i_sticks_near(const gs4_sim *sim, int o)
     return 0;
 }
 
-/* Does the node nearest to a particle, `away` from it in cells, say that it is outside of a body?
- * `node` is its number in the tile of occupied block o. A distance that grows by the way alone
- * would be known by that; half as much again (chosen) forgives functions that are no true
- * distances. */
-static int gs4i_is_outside(const gs4_sim *sim, int collider, int o, int node, gs4_real away2)
+/* Nodes of the tile of occupied block o which say of every particle that they are nearest to that
+ * it is outside of all sticky bodies: bit 8 y + x of each z. Returns NULL if there are no sticky
+ * bodies. */
+static const uint64_t *gs4i_find_clear_nodes(const gs4_sim *sim, int o, uint64_t clear[GS4I_TILE])
 {
-    const gs4_real sure = GS4I_C(1.5) * sim->grid.h,
-                   d = gs4i_tile_distance(sim, collider, o, node) - GS4I_C(0.01) * sim->grid.h;
-    return d > 0 && d * d > sure * sure * away2;
+    const gs4i_patch *all = (const gs4i_patch *)sim->image_particles.patches.all.data;
+    int any = 0, k, i, row;
+    memset(clear, 0xff, GS4I_TILE * sizeof *clear);
+    for (k = 0; k < sim->boundary.collider_count; k++) {
+        const gs4i_surface *surface;
+        uint64_t of[27];
+        if (!gs4i_is_sticky(&sim->boundary.colliders[k])) continue;
+        any = 1;
+        surface = gs4i_surface_of(sim, k, o);
+        if (!(surface->nearest < GS4I_C(1.32) * sim->grid.h))
+            continue; /* 1.5 sqrt(3)/2, and more */
+        for (i = 0; i < 27; i++) {
+            const int patch = gs4i_patch_of(sim, k, sim->grid.neighbour[27 * o + i]);
+            of[i] = surface->kind == GS4I_SURFACE_FLAT ? 0
+                    : patch < 0                        ? ~(uint64_t)0
+                                                       : all[patch].clear;
+        }
+        for (row = 0; row < GS4I_TILE * GS4I_TILE; row++) {
+            const int y = (row & 7) + 2, z = (row >> 3) + 2, place = gs4i_place_of(0, y, z);
+            const uint64_t *three = of + 3 * (3 * (z >> 2) + (y >> 2)),
+                           bits = (three[0] >> place & 15) >> 2 | (three[1] >> place & 15) << 2
+                                  | (three[2] >> place & 3) << 6;
+            clear[row >> 3] &= ~((uint64_t)0xff << 8 * (row & 7)) | bits << 8 * (row & 7);
+        }
+    }
+    return any ? clear : NULL;
+}
+
+/* Is a particle of occupied block o inside of a sticky body, where it ended at p? `node` is that of
+ * its tile which is nearest to it, -1: none is. Bodies are asked only where their patches do not
+ * know. */
+static int gs4i_is_in_sticky(const gs4_sim *sim, int o, gs4_vec3 p, int node, gs4_real away2)
+{
+    const gs4_real h = sim->grid.h;
+    int i;
+    for (i = 0; i < sim->boundary.collider_count; i++) {
+        const gs4i_collider *body = &sim->boundary.colliders[i];
+        const gs4i_surface *surface;
+        if (!gs4i_is_sticky(body)) continue;
+        surface = gs4i_surface_of(sim, i, o);
+        if (node >= 0
+            && (!(surface->nearest < GS4I_C(1.32) * h)
+                || (surface->kind == GS4I_SURFACE_FLAT
+                        ? surface->d + gs4i_dot(surface->n, gs4i_sub(p, surface->at))
+                              > GS4I_C(0.01) * h
+                        : gs4i_is_outside(gs4i_tile_distance(sim, i, o, node), away2, h))))
+            continue;
+        if (gs4i_collider_distance(body, p) < 0) return 1;
+    }
+    return 0;
 }
 
 /* Which of n particles of occupied block o are inside of a sticky body where they ended, at x? A
- * bit each. Bodies are asked only where their patches do not know. */
-static unsigned gs4i_ended_inside(const gs4_sim *sim, int o, const gs4_real *x, int n)
+ * bit each. */
+static unsigned gs4i_ended_inside(const gs4_sim *sim, int o, const uint64_t clear[GS4I_TILE],
+                                  const gs4_real *x, int n)
 {
-    const gs4_real h = sim->grid.h;
     const gs4i_frame frame = gs4i_tile_frame(&sim->grid, sim->grid.occupied_block[o]);
     gs4i_lanes at[4], away2;
     gs4i_stencils s;
     unsigned inside = 0;
-    int i, b;
+    int b;
     gs4i_to_lanes(x, n, at);
     gs4i_stencils_at(&s, &frame, at);
     GS4I_BATCH_LOOP(b)
         away2[b] = s.xi[0][b] * s.xi[0][b] + s.xi[1][b] * s.xi[1][b] + s.xi[2][b] * s.xi[2][b];
-    for (i = 0; i < sim->boundary.collider_count; i++) {
-        const gs4i_collider *body = &sim->boundary.colliders[i];
-        const gs4i_surface *surface;
-        int far;
-        if (!gs4i_is_sticky(body)) continue;
-        surface = gs4i_surface_of(sim, i, o);
-        far = !(surface->nearest < GS4I_C(1.32) * h); /* 1.5 sqrt(3)/2, and more */
-        for (b = 0; b < n; b++) {
-            const gs4_vec3 p = gs4i_vec3(x[4 * b], x[4 * b + 1], x[4 * b + 2]);
-            if (s.base[b] >= 0
-                && (far
-                    || (surface->kind == GS4I_SURFACE_FLAT
-                            ? surface->d + gs4i_dot(surface->n, gs4i_sub(p, surface->at))
-                                  > GS4I_C(0.01) * h
-                            : gs4i_is_outside(sim, i, o,
-                                              s.base[b] + 1 + GS4I_TILE + GS4I_TILE * GS4I_TILE,
-                                              GS4I_NTH(away2, b)))))
-                continue;
-            if (gs4i_collider_distance(body, p) < 0) inside |= 1u << b;
-        }
+    for (b = 0; b < n; b++) {
+        const int node = s.base[b] < 0 ? -1 : s.base[b] + 1 + GS4I_TILE + GS4I_TILE * GS4I_TILE;
+        if (node >= 0 && (clear[node >> 6] >> (node & 63) & 1)) continue;
+        if (gs4i_is_in_sticky(sim, o, gs4i_vec3(x[4 * b], x[4 * b + 1], x[4 * b + 2]), node,
+                              GS4I_NTH(away2, b)))
+            inside |= 1u << b;
     }
     return inside;
 }
@@ -12073,23 +12124,24 @@ static unsigned gs4i_ended_inside(const gs4_sim *sim, int o, const gs4_real *x, 
 static void gs4i_load_patches(const gs4_sim *sim, int collider, int o, gs4_real *tile)
 {
     static const int from[3] = { 8, 0, 0 }, to[3] = { 0, 8, 24 }, count[3] = { 8, 16, 8 };
-    const gs4i_grid *g = &sim->grid;
-    const gs4_real *nodes = (const gs4_real *)sim->image_particles.patches.nodes.data;
+    const gs4_real far = (GS4I_IMAGE_REACH + GS4I_NODES_REACH) * sim->grid.h, /* at least as far */
+        *nodes = (const gs4_real *)sim->image_particles.patches.nodes.data, *of[27];
     int row, i, k;
+    for (i = 0; i < 27; i++) {
+        const int patch = gs4i_patch_of(sim, collider, sim->grid.neighbour[27 * o + i]);
+        of[i] = patch < 0 ? NULL : nodes + (ptrdiff_t)patch * GS4I_NODE_REALS;
+    }
     for (row = 0; row < GS4I_TILE * GS4I_TILE; row++, tile += 4 * GS4I_TILE) {
-        ptrdiff_t at[3];
-        gs4i_tile_row(g, o, row & 7, row >> 3, at);
+        const int y = (row & 7) + 2, z = (row >> 3) + 2, place = 4 * gs4i_place_of(0, y, z);
         for (i = 0; i < 3; i++) {
-            const int slot = (int)(at[i] / GS4I_NODE_REALS),
-                      patch = gs4i_patch_of(sim, collider, slot);
+            const gs4_real *four = of[3 * (3 * (z >> 2) + (y >> 2)) + i];
             gs4_real *out = tile + to[i];
-            if (patch >= 0)
-                memcpy(out,
-                       nodes + (ptrdiff_t)patch * GS4I_NODE_REALS + at[i] % GS4I_NODE_REALS
-                           + from[i],
-                       (size_t)count[i] * sizeof *out);
-            for (k = 0; k < count[i] && patch < 0; k++) /* at least as far */
-                out[k] = k % 4 ? 0 : (GS4I_IMAGE_REACH + GS4I_NODES_REACH) * g->h;
+            if (four) {
+                memcpy(out, four + place + from[i], (size_t)count[i] * sizeof *out);
+                continue;
+            }
+            memset(out, 0, (size_t)count[i] * sizeof *out);
+            for (k = 0; k < count[i]; k += 4) out[k] = far;
         }
     }
     memset(tile, 0, 16 * sizeof *tile);
@@ -12105,68 +12157,6 @@ static void gs4i_find_least(const gs4_real *tile, gs4_real *least)
     for (apart = 1; apart < nodes; apart *= GS4I_TILE)
         for (i = 0; i < nodes - 2 * apart; i++)
             least[i] = gs4i_min(least[i], gs4i_min(least[i + apart], least[i + 2 * apart]));
-}
-
-/* A particle is near body number `collider`, by what it has of the numbers of a patch. */
-static void gs4i_meet_particle(int collider, const gs4_real four[4], gs4_vec3 n,
-                               gs4i_near_particle *g)
-{
-    if (!(four[0] < g->d)) return;
-    g->d = four[0];
-    g->bend = four[1];
-    g->curvature = four[2];
-    g->n[0] = n.x;
-    g->n[1] = n.y;
-    g->n[2] = n.z;
-    g->body = collider;
-}
-
-/* How far the particles of occupied block o are from a body. */
-static void gs4i_meet_body(const gs4_sim *sim, int collider, int o, gs4i_near_particle *g)
-{
-    const gs4i_grid *grid = &sim->grid;
-    const gs4i_frame frame = gs4i_tile_frame(grid, grid->occupied_block[o]);
-    const gs4_real deep = GS4I_IMAGE_NODES * grid->h;
-    const gs4i_surface *surface = gs4i_surface_of(sim, collider, o);
-    const gs4_real reach = GS4I_IMAGE_REACH * grid->h;
-    gs4_real tile[GS4I_TILE_REALS], least[GS4I_TILE * GS4I_TILE * GS4I_TILE];
-    size_t i = (size_t)grid->first[o], end = (size_t)grid->first[o + 1];
-    if (surface->kind == GS4I_SURFACE_FAR || !(surface->nearest < reach)) return;
-    if (surface->kind == GS4I_SURFACE_CURVED) {
-        gs4i_load_patches(sim, collider, o, tile);
-        gs4i_find_least(tile, least);
-    }
-    for (; i < end; i += GS4I_BATCH) {
-        const int n = gs4i_batch_size(i, end);
-        gs4i_batch q;
-        gs4i_lanes x[3];
-        gs4i_stencils s;
-        gs4i_gathered u;
-        int b;
-        gs4i_load_batch(&sim->particles, i, n, sim->integrator.prediction, &q);
-        gs4i_predict_positions(&q, sim->integrator.prediction, x);
-        gs4i_stencils_at(&s, &frame, x);
-        for (b = 0; b < n; b++, g++) {
-            gs4i_row w, dw;
-            gs4_vec3 slope;
-            g->base = s.base[b];
-            if (g->base < 0) continue; /* it will be sorted first */
-            if (surface->kind == GS4I_SURFACE_FLAT) {
-                const gs4_vec3 p =
-                    gs4i_vec3(GS4I_NTH(x[0], b), GS4I_NTH(x[1], b), GS4I_NTH(x[2], b));
-                u.value[0] = surface->d + gs4i_dot(surface->n, gs4i_sub(p, surface->at));
-                u.value[1] = u.value[0] > -deep ? GS4I_C(0) : grid->h;
-                u.value[2] = 0;
-                gs4i_meet_particle(collider, u.value, surface->n, g);
-                continue;
-            }
-            if (!(least[g->base] < reach)) continue;
-            gs4i_x_weights(&s, b, &w, &dw);
-            gs4i_gather_local(tile + 4 * s.base[b], &s, b, &w, &dw, &u);
-            slope = gs4i_vec3(u.dx[4 * b], u.dy[4 * b], u.dz[4 * b]);
-            gs4i_meet_particle(collider, u.value + 4 * b, slope, g);
-        }
-    }
 }
 
 /* Where a point at p is reflected to. */
@@ -12196,7 +12186,7 @@ static void gs4i_seek_image(const gs4i_grid *grid, gs4_vec3 p, gs4i_near_particl
     const gs4_real h = grid->h, length = gs4i_length(gs4i_vec3(g->n[0], g->n[1], g->n[2]));
     int c;
     g->image = GS4I_NO_IMAGE;
-    if (g->body < 0 || !(length > 0)) return;
+    if (!(length > 0)) return;
     for (c = 0; c < 3; c++) g->n[c] *= 1 / length;
     if (g->d > -GS4I_C(0.5) * h && gs4i_abs(g->bend) < GS4I_IMAGE_BEND * h) {
         g->image = gs4i_slot_of_image(grid, g, p); /* -1: there are no nodes */
@@ -12205,10 +12195,73 @@ static void gs4i_seek_image(const gs4i_grid *grid, gs4_vec3 p, gs4i_near_particl
         g->image = GS4I_HOLDS_NODES;
 }
 
+/* A particle at p is near body number `collider`, by what it has of the numbers of a patch. */
+static void gs4i_meet_particle(const gs4i_grid *grid, int collider, const gs4_real four[4],
+                               gs4_vec3 n, gs4_vec3 p, gs4i_near_particle *g)
+{
+    if (!(four[0] < g->d)) return;
+    g->d = four[0];
+    g->bend = four[1];
+    g->curvature = four[2];
+    g->n[0] = n.x;
+    g->n[1] = n.y;
+    g->n[2] = n.z;
+    g->body = collider;
+    gs4i_seek_image(grid, p, g);
+}
+
+/* How far the particles of occupied block o are from a body. */
+static void gs4i_meet_body(const gs4_sim *sim, int collider, int o, gs4i_near_particle *g)
+{
+    const gs4i_grid *grid = &sim->grid;
+    const gs4i_frame frame = gs4i_tile_frame(grid, grid->occupied_block[o]);
+    const gs4_real deep = GS4I_IMAGE_NODES * grid->h;
+    const gs4i_surface *surface = gs4i_surface_of(sim, collider, o);
+    const gs4_real reach = GS4I_IMAGE_REACH * grid->h;
+    gs4_real tile[GS4I_TILE_REALS], least[GS4I_TILE * GS4I_TILE * GS4I_TILE];
+    size_t i = (size_t)grid->first[o], end = (size_t)grid->first[o + 1];
+    if (surface->kind == GS4I_SURFACE_FAR || !(surface->nearest < reach)) return;
+    if (surface->kind == GS4I_SURFACE_CURVED) {
+        gs4i_load_patches(sim, collider, o, tile);
+        gs4i_find_least(tile, least);
+    }
+    for (; i < end; i += GS4I_BATCH) {
+        const int n = gs4i_batch_size(i, end);
+        gs4i_batch q;
+        gs4i_lanes x[3];
+        gs4i_stencils s;
+        gs4i_gathered u;
+        int b;
+        gs4i_load_batch(&sim->particles, i, n, sim->integrator.prediction, &q);
+        gs4i_predict_positions(&q, sim->integrator.prediction, x);
+        gs4i_stencils_at(&s, &frame, x);
+        for (b = 0; b < n; b++, g++) {
+            const gs4_vec3 p = gs4i_vec3(GS4I_NTH(x[0], b), GS4I_NTH(x[1], b), GS4I_NTH(x[2], b));
+            gs4i_row w, dw;
+            gs4_vec3 slope;
+            g->base = s.base[b];
+            if (g->base < 0) continue; /* it will be sorted first */
+            if (surface->kind == GS4I_SURFACE_FLAT) {
+                u.value[0] = surface->d + gs4i_dot(surface->n, gs4i_sub(p, surface->at));
+                u.value[1] = u.value[0] > -deep ? GS4I_C(0) : grid->h;
+                u.value[2] = 0;
+                gs4i_meet_particle(grid, collider, u.value, surface->n, p, g);
+                continue;
+            }
+            if (!(least[g->base] < reach)) continue;
+            gs4i_x_weights(&s, b, &w, &dw);
+            gs4i_gather_local(tile + 4 * s.base[b], &s, b, &w, &dw, &u);
+            slope = gs4i_vec3(u.dx[4 * b], u.dy[4 * b], u.dz[4 * b]);
+            gs4i_meet_particle(grid, collider, u.value + 4 * b, slope, p, g);
+        }
+    }
+}
+
 /* Particles of one block and their images; particle NULL where it is near no sticky body. */
 typedef struct gs4i_near_particles {
     gs4i_near_particle *particle;
     gs4i_image_particle *images; /* all */
+    gs4_real inv_h;
 } gs4i_near_particles;
 
 GS4I_INLINE gs4i_near_particles gs4i_near_particles_of(const gs4_sim *sim, int o)
@@ -12217,6 +12270,7 @@ GS4I_INLINE gs4i_near_particles gs4i_near_particles_of(const gs4_sim *sim, int o
     gs4i_near_particles near;
     near.particle = NULL;
     near.images = (gs4i_image_particle *)g->all.data;
+    near.inv_h = sim->grid.inv_h;
     if (g->near && ((const int32_t *)g->of.data)[o] >= 0)
         near.particle =
             (gs4i_near_particle *)g->of_particles.data + ((const int32_t *)g->of.data)[o];
@@ -12229,30 +12283,19 @@ static void gs4i_find_near_particles(int index, void *context)
     const gs4_sim *sim = ((const gs4i_pass *)context)->sim;
     const gs4i_grid *grid = &sim->grid;
     gs4i_near_particle *g = gs4i_near_particles_of(sim, index).particle;
-    size_t i = (size_t)grid->first[index], end = (size_t)grid->first[index + 1];
+    const int n = grid->first[index + 1] - grid->first[index];
     int32_t *count = (int32_t *)sim->image_particles.first_of.data + index;
     int k;
     *count = 0;
     if (!g) return;
-    for (k = 0; k < (int)(end - i); k++) {
+    for (k = 0; k < n; k++) {
         g[k].d = GS4I_IMAGE_REACH * grid->h;
         g[k].body = g[k].base = -1;
+        g[k].image = GS4I_NO_IMAGE;
     }
     for (k = 0; k < sim->boundary.collider_count; k++)
         if (gs4i_is_sticky(&sim->boundary.colliders[k])) gs4i_meet_body(sim, k, index, g);
-    for (; i < end; i += GS4I_BATCH) {
-        const int n = gs4i_batch_size(i, end);
-        gs4i_batch q;
-        gs4i_lanes x[3];
-        int b;
-        gs4i_load_batch(&sim->particles, i, n, sim->integrator.prediction, &q);
-        gs4i_predict_positions(&q, sim->integrator.prediction, x);
-        for (b = 0; b < n; b++, g++) {
-            const gs4_vec3 at = gs4i_vec3(GS4I_NTH(x[0], b), GS4I_NTH(x[1], b), GS4I_NTH(x[2], b));
-            gs4i_seek_image(grid, at, g);
-            *count += g->image >= 0;
-        }
-    }
+    for (k = 0; k < n; k++) *count += g[k].image >= 0;
 }
 
 /* Volume of the image over that of the particle: behind a ball of radius R and before it lie shells
@@ -12265,6 +12308,12 @@ GS4I_INLINE gs4_real gs4i_image_part(const gs4i_near_particle *g)
     const gs4_real k = g->d * g->curvature, sure = gs4i_max(gs4i_abs(k) - GS4I_C(0.1), 0);
     const gs4_real t = gs4i_max(1 - (k < 0 ? -sure : sure), 0);
     return gs4i_min(t * t, 4);
+}
+
+/* Of the odd part of what a particle sees that is d before the surface. */
+GS4I_INLINE gs4_real gs4i_odd_share(gs4_real d, gs4_real inv_h)
+{
+    return gs4i_max(gs4i_min(GS4I_IMAGE_NODES - d * inv_h, 1), 0);
 }
 
 /* The image of a particle at p. */
@@ -12288,7 +12337,7 @@ static void gs4i_place_image_particle(const gs4_sim *sim, gs4_vec3 p,
     g->spin[0] = collider->is.angular_velocity.x;
     g->spin[1] = collider->is.angular_velocity.y;
     g->spin[2] = collider->is.angular_velocity.z;
-    g->share = gs4i_max(gs4i_min(GS4I_IMAGE_NODES - d * sim->grid.inv_h, 1), 0);
+    g->share = gs4i_odd_share(d, sim->grid.inv_h);
     g->part = gs4i_image_part(near);
     g->whole = 0;
     g->slot = near->image;
@@ -12516,23 +12565,36 @@ static int gs4i_is_whole(const gs4i_surroundings *t, int base)
     return whole;
 }
 
-/* Add the tile to the nodes that exist and are not held; those that get momentum are marked. */
-static void gs4i_add_to_surroundings(const gs4i_grid *grid, const gs4i_surroundings *t,
-                                     const gs4_real *tile, gs4_real *field)
+/* Do all nodes of a tile exist? */
+static int gs4i_is_complete(const gs4i_surroundings *t)
 {
-    int x, y, z, c;
-    for (z = 0; z < GS4I_TILE; z++)
-        for (y = 0; y < GS4I_TILE; y++)
-            for (x = 0; x < GS4I_TILE; x++, tile += 4) {
-                const int64_t node = gs4i_surrounding_node(t, x, y, z);
-                gs4_real *to;
-                if (node < 0 || (grid->flags[node] & GS4I_LACKS_IMAGE)) continue;
-                to = gs4i_of_node(field, (uint32_t)node);
-                for (c = 0; c < 4; c++) to[c] += tile[c];
-                if (field == grid->momentum && tile[3] > 0
-                    && gs4i_has_jumps(grid, gs4i_slot_of((uint32_t)node)))
-                    grid->flags[node] |= GS4I_IMAGED;
-            }
+    int i, all = 1;
+    for (i = 0; i < 27; i++) all &= t->slot[i] >= 0;
+    return all;
+}
+
+/* Add the touched rows of a tile to the nodes that exist and are not held; those that get momentum
+ * are marked. */
+static void gs4i_add_to_surroundings(const gs4i_grid *grid, const gs4i_surroundings *t,
+                                     uint64_t rows, const gs4_real *tile, gs4_real *field)
+{
+    int row, x, c;
+    for (row = 0; row < GS4I_TILE * GS4I_TILE; row++, tile += 4 * GS4I_TILE) {
+        const int y = (row & 7) + 2, z = (row >> 3) + 2,
+                  *slots = t->slot + 3 * (3 * (z >> 2) + (y >> 2));
+        if (!(rows >> row & 1)) continue;
+        for (x = 2; x < GS4I_TILE + 2; x++) {
+            const int slot = slots[x >> 2];
+            const uint32_t node = gs4i_first_node(slot) + (uint32_t)gs4i_place_of(x, y, z);
+            const gs4_real *four = tile + 4 * (x - 2);
+            gs4_real *to;
+            if (slot < 0 || (grid->flags[node] & GS4I_LACKS_IMAGE)) continue;
+            to = gs4i_of_node(field, node);
+            for (c = 0; c < 4; c++) to[c] += four[c];
+            if (field == grid->momentum && four[3] > 0 && gs4i_has_jumps(grid, slot))
+                grid->flags[node] |= GS4I_IMAGED;
+        }
+    }
 }
 
 static void gs4i_scatter_image_block(const gs4i_pass *pass, int index, int what)
@@ -12543,8 +12605,10 @@ static void gs4i_scatter_image_block(const gs4i_pass *pass, int index, int what)
                   *order = (const int32_t *)sim->image_particles.order.data;
     gs4_real tile[GS4I_TILE_REALS];
     gs4i_surroundings t;
-    int k, b, c;
+    uint64_t rows = 0;
+    int k, b, c, complete;
     gs4i_surroundings_of(&sim->grid, slot, &t);
+    complete = gs4i_is_complete(&t);
     memset(tile, 0, sizeof tile);
     for (k = first[slot]; k < first[slot + 1]; k += GS4I_BATCH) {
         const int n = first[slot + 1] - k < GS4I_BATCH ? first[slot + 1] - k : GS4I_BATCH;
@@ -12558,7 +12622,8 @@ static void gs4i_scatter_image_block(const gs4i_pass *pass, int index, int what)
             gs4_real(*from)[4] = g[b]->carried;
             const size_t four = 4 * sizeof *tile;
             if (s.base[b] < 0) continue;
-            if (what != GS4I_IMAGE_FORCE) g[b]->whole = gs4i_is_whole(&t, s.base[b]);
+            rows |= gs4i_touched_rows(s.base[b]);
+            if (what != GS4I_IMAGE_FORCE) g[b]->whole = complete || gs4i_is_whole(&t, s.base[b]);
             if (what == GS4I_IMAGE_MOMENTUM)
                 gs4i_scatter_quad(tile, &s, b, from[0]);
             else if (what == GS4I_IMAGE_FORCE) {
@@ -12580,7 +12645,7 @@ static void gs4i_scatter_image_block(const gs4i_pass *pass, int index, int what)
             }
         }
     }
-    gs4i_add_to_surroundings(&sim->grid, &t, tile,
+    gs4i_add_to_surroundings(&sim->grid, &t, rows, tile,
                              what == GS4I_IMAGE_FORCE ? sim->grid.force : sim->grid.momentum);
 }
 
@@ -12606,38 +12671,63 @@ static void gs4i_scatter_image_particles(gs4_sim *sim, gs4_task_fn kernel)
                                sim->image_particles.colour_first, kernel);
 }
 
+/* What the nodes around a slot have of a field, 0 where there are none. */
+static void gs4i_load_surroundings(const gs4i_surroundings *t, const gs4_real *field,
+                                   gs4_real *tile)
+{
+    static const int from[3] = { 8, 0, 0 }, to[3] = { 0, 8, 24 }, count[3] = { 8, 16, 8 };
+    int row, i;
+    for (row = 0; row < GS4I_TILE * GS4I_TILE; row++, tile += 4 * GS4I_TILE) {
+        const int y = (row & 7) + 2, z = (row >> 3) + 2, place = 4 * gs4i_place_of(0, y, z),
+                  *slots = t->slot + 3 * (3 * (z >> 2) + (y >> 2));
+        for (i = 0; i < 3; i++) {
+            const size_t bytes = (size_t)count[i] * sizeof *tile;
+            if (slots[i] < 0)
+                memset(tile + to[i], 0, bytes);
+            else
+                memcpy(tile + to[i],
+                       field + (ptrdiff_t)slots[i] * GS4I_NODE_REALS + place + from[i], bytes);
+        }
+    }
+    memset(tile, 0, 16 * sizeof *tile);
+}
+
+/* The next images of a slot, up to 16, of which particles take odd parts: from *k on. Returns how
+ * many. */
+static int gs4i_next_odd_images(const gs4i_image_particle *all, const int32_t *order, int *k,
+                                int end, int32_t next[GS4I_BATCH])
+{
+    int n = 0;
+    for (; *k < end && n < GS4I_BATCH; (*k)++) {
+        const gs4i_image_particle *g = all + order[*k];
+        if (g->share > 0 && g->whole) next[n++] = order[*k];
+    }
+    return n;
+}
+
 /* What the nodes have of a field at the images, velocity (what 0) or acceleration (1). */
 static void gs4i_gather_image_block(const gs4i_pass *pass, int index, int what)
 {
     gs4_sim *sim = pass->sim;
+    gs4i_image_particle *all = (gs4i_image_particle *)sim->image_particles.all.data;
     const int slot = pass->blocks[index];
     const int32_t *first = (const int32_t *)sim->image_particles.first.data,
                   *order = (const int32_t *)sim->image_particles.order.data;
     const gs4_real *field = what ? sim->grid.force : gs4i_gradient_velocity(&sim->grid);
-    gs4_real tile[GS4I_TILE_REALS], *to = tile;
+    gs4_real tile[GS4I_TILE_REALS];
     gs4i_surroundings t;
-    int x, y, z, k, b;
+    int32_t next[GS4I_BATCH];
+    int k = first[slot], n, b;
     gs4i_surroundings_of(&sim->grid, slot, &t);
-    for (z = 0; z < GS4I_TILE; z++)
-        for (y = 0; y < GS4I_TILE; y++)
-            for (x = 0; x < GS4I_TILE; x += 2, to += 8) { /* two nodes are of one block */
-                const int64_t node = gs4i_surrounding_node(&t, x, y, z);
-                if (node < 0)
-                    memset(to, 0, 8 * sizeof *to);
-                else
-                    memcpy(to, field + 4 * node, 8 * sizeof *to);
-            }
-    memset(to, 0, 16 * sizeof *to);
-    for (k = first[slot]; k < first[slot + 1]; k += GS4I_BATCH) {
-        const int n = first[slot + 1] - k < GS4I_BATCH ? first[slot + 1] - k : GS4I_BATCH;
+    gs4i_load_surroundings(&t, field, tile);
+    while ((n = gs4i_next_odd_images(all, order, &k, first[slot + 1], next)) > 0) {
         gs4i_image_particle *g[GS4I_BATCH];
         gs4i_stencils s;
         gs4i_gathered u;
-        gs4i_load_image_particles((gs4i_image_particle *)sim->image_particles.all.data, order + k,
-                                  n, &t, g, &s);
+        gs4i_load_image_particles(all, next, n, &t, g, &s);
         for (b = 0; b < n; b++) {
             gs4i_row w, d;
-            if (s.base[b] < 0 || !g[b]->whole || !(g[b]->share > 0)) continue;
+            if (s.base[b] < 0) continue;
             gs4i_x_weights(&s, b, &w, &d);
             if (what)
                 gs4i_gather_rate(sim->particles.deformation_reals, tile + 4 * s.base[b], &s, b, &w,
@@ -12684,61 +12774,55 @@ GS4I_INLINE gs4i_image_particle *gs4i_image_of(const gs4i_near_particles *near, 
 GS4I_INLINE const gs4i_image_particle *gs4i_odd_image(const gs4i_near_particles *near, int i)
 {
     const gs4i_image_particle *g = gs4i_image_of(near, i);
-    return g && g->whole && g->share > 0 ? g : NULL;
+    return g && gs4i_odd_share(near->particle[i].d, near->inv_h) > 0 && g->whole ? g : NULL;
 }
 
-/* Replace the values that n particles gathered by their part that is odd about the surface, of
- * velocities (what 0) about the body's, by their shares: u = (u(x) - u(x'))/2 + v */
-static void gs4i_make_value_odd(const gs4i_near_particles *near, int n, int what, gs4i_gathered *u)
+/* Replace the value that particle b gathered by its part that is odd about the surface, of
+ * velocities (what 0) about the body's, by its share: u = (u(x) - u(x'))/2 + v */
+GS4I_INLINE void gs4i_make_value_odd(const gs4i_image_particle *g, int b, int what,
+                                     gs4i_gathered *u)
 {
-    int b, c;
-    for (b = 0; b < n; b++) {
-        const gs4i_image_particle *g = gs4i_odd_image(near, b);
-        for (c = 0; c < 3 && g; c++)
-            u->value[4 * b + c] -= g->share
-                                   * (GS4I_C(0.5) * (u->value[4 * b + c] + g->seen[what][0][c])
-                                      - (what ? GS4I_C(0) : g->v[c]));
-    }
+    int c;
+    for (c = 0; c < 3; c++)
+        u->value[4 * b + c] -= g->share
+                               * (GS4I_C(0.5) * (u->value[4 * b + c] + g->seen[what][0][c])
+                                  - (what ? GS4I_C(0) : g->v[c]));
 }
 
-/* The same of gradients: grad u = (grad u(x) - grad u(x') R)/2 + spin x (I - n n). */
-static void gs4i_make_gradient_odd(const gs4i_near_particles *near, int n, int what,
-                                   gs4i_gathered *u)
+/* The same of its gradient: grad u = (grad u(x) - grad u(x') R)/2 + spin x (I - n n). */
+GS4I_INLINE void gs4i_make_gradient_odd(const gs4i_image_particle *g, int b, int what,
+                                        gs4i_gathered *u)
 {
-    int b, c, a;
-    for (b = 0; b < n; b++) {
-        const gs4i_image_particle *g = gs4i_odd_image(near, b);
-        gs4_real *column[3], turn[3][3] = { { 0, 0, 0 }, { 0, 0, 0 }, { 0, 0, 0 } }, across[3];
-        if (!g) continue;
-        column[0] = u->dx + 4 * b;
-        column[1] = u->dy + 4 * b;
-        column[2] = u->dz + 4 * b;
-        if (!what) gs4i_surface_spin(g, turn);
+    gs4_real *column[3], turn[3][3] = { { 0, 0, 0 }, { 0, 0, 0 }, { 0, 0, 0 } }, across[3];
+    int c, a;
+    column[0] = u->dx + 4 * b;
+    column[1] = u->dy + 4 * b;
+    column[2] = u->dz + 4 * b;
+    if (!what) gs4i_surface_spin(g, turn);
+    for (c = 0; c < 3; c++)
+        across[c] = g->seen[what][1][c] * g->n[0] + g->seen[what][2][c] * g->n[1]
+                    + g->seen[what][3][c] * g->n[2];
+    for (a = 0; a < 3; a++)
         for (c = 0; c < 3; c++)
-            across[c] = g->seen[what][1][c] * g->n[0] + g->seen[what][2][c] * g->n[1]
-                        + g->seen[what][3][c] * g->n[2];
-        for (a = 0; a < 3; a++)
-            for (c = 0; c < 3; c++)
-                column[a][c] -= g->share
-                                * (GS4I_C(0.5) * (column[a][c] + g->seen[what][1 + a][c])
-                                   - across[c] * g->n[a] - turn[a][c]);
+            column[a][c] -= g->share
+                            * (GS4I_C(0.5) * (column[a][c] + g->seen[what][1 + a][c])
+                               - across[c] * g->n[a] - turn[a][c]);
+}
+
+/* Both, of the velocities of n particles; where `acc` is given of accelerations too, of solids with
+ * their gradients. */
+static void gs4i_make_odd(const gs4i_near_particles *near, int n, int solids, gs4i_gathered *u,
+                          gs4i_gathered *acc)
+{
+    int b;
+    for (b = 0; b < n; b++) {
+        const gs4i_image_particle *g = gs4i_odd_image(near, b);
+        if (!g) continue;
+        gs4i_make_value_odd(g, b, 0, u);
+        gs4i_make_gradient_odd(g, b, 0, u);
+        if (acc) gs4i_make_value_odd(g, b, 1, acc);
+        if (acc && solids) gs4i_make_gradient_odd(g, b, 1, acc);
     }
-}
-
-/* Both, of velocities. */
-static void gs4i_make_odd(const gs4i_near_particles *near, int n, gs4i_gathered *u)
-{
-    gs4i_make_value_odd(near, n, 0, u);
-    gs4i_make_gradient_odd(near, n, 0, u);
-}
-
-/* The odd part of both, and of the gradients that were gathered. */
-static void gs4i_take_odd_parts(int solids, const gs4i_near_particles *near, int n,
-                                gs4i_gathered *u, gs4i_gathered *acc)
-{
-    gs4i_make_odd(near, n, u);
-    gs4i_make_value_odd(near, n, 1, acc);
-    if (solids) gs4i_make_gradient_odd(near, n, 1, acc);
 }
 
 /* Is what the images of block o see of velocity no cause for alarm? Of a reflection of L the
@@ -13394,7 +13478,7 @@ static void gs4i_scatter_stage(int index, void *context)
         gs4i_tile_prefetch(g, o, row, g->force);
         gs4i_stage_batch(&p, i, n, integrator.prediction, &frame, &q, &s);
         gs4i_gather_stage(nodes, with_plain ? plain : NULL, &s, n, &v);
-        if (near.particle) gs4i_make_odd(&near, n, &v);
+        if (near.particle) gs4i_make_odd(&near, n, 0, &v, NULL);
         if (p.with_subgrid)
             gs4i_find_subgrid(&p, i, n, &integrator, &q, v.value, subgrid);
         else
@@ -13556,15 +13640,22 @@ GS4I_INLINE void gs4i_store_batch(const gs4i_particles *p, size_t i, int n, cons
            4 * (size_t)n * sizeof *o->position_residual);
 }
 
-/* Is any of n positions inside of a body, or may be? By the ball around their box. Sticky bodies
- * are left out where image particles know of them. */
+/* Does a body put back particles that are inside of it? Sticky ones are left out where image
+ * particles know of them. */
+GS4I_INLINE int gs4i_touches(const gs4i_collider *b, int with_sticky)
+{
+    return !b->is_off && (with_sticky || !gs4i_is_sticky(b));
+}
+
+/* Is any of n positions inside of a body, or may be? By the ball around their box. */
 static int gs4i_may_touch(const gs4i_boundary *b, const gs4_real *x, int n, gs4_real h,
                           int with_sticky)
 {
     gs4_real low[3], high[3], prediction;
     gs4_vec3 midst;
     int i, a;
-    if (!b->collider_count) return 0;
+    for (i = 0; i < b->collider_count && !gs4i_touches(&b->colliders[i], with_sticky);) i++;
+    if (i == b->collider_count) return 0;
     for (a = 0; a < 3; a++) {
         for (low[a] = high[a] = x[a], i = 1; i < n; i++) {
             low[a] = gs4i_min(low[a], x[4 * i + a]);
@@ -13577,23 +13668,42 @@ static int gs4i_may_touch(const gs4i_boundary *b, const gs4_real *x, int n, gs4_
     prediction = gs4i_length(gs4i_vec3(high[0] - low[0], high[1] - low[1], high[2] - low[2]))
                  + GS4I_C(0.1) * h;
     for (i = 0; i < b->collider_count; i++)
-        if (!b->colliders[i].is_off && (with_sticky || !gs4i_is_sticky(&b->colliders[i]))
+        if (gs4i_touches(&b->colliders[i], with_sticky)
             && !(gs4i_collider_distance(&b->colliders[i], midst) > prediction))
             return 1;
     return 0;
 }
 
-/* Walls, colliders and emitters on each particle after the step. */
-static void gs4i_correct_contact(gs4_sim *sim, int block, size_t i, int n, gs4i_stored *o,
-                                 gs4i_gathered *L, gs4i_report *report)
+/* Are sixteen positions in the domain, of which n are in use? */
+GS4I_INLINE int gs4i_are_in_domain(const gs4i_grid *g, const gs4_real *x, int n)
+{
+    const gs4_real low[3] = { g->origin.x, g->origin.y, g->origin.z };
+    gs4i_lanes at[4];
+    int a, b, all = 1;
+    gs4i_to_lanes(x, n, at);
+    for (a = 0; a < 3; a++) {
+        const gs4_real high = low[a] + GS4I_C(g->cells[a]) * g->h;
+        GS4I_BATCH_LOOP(b) {
+            const gs4i_wide_mask in = (at[a][b] >= low[a]) & (at[a][b] < high);
+            all &= gs4i_all(&in);
+        }
+    }
+    return all;
+}
+
+/* Walls, colliders and emitters on each particle after the step. `clear`: see
+ * gs4i_find_clear_nodes, NULL where no body is sticky or image particles do not know of them. */
+static void gs4i_correct_contact(gs4_sim *sim, int block, const uint64_t *clear, size_t i, int n,
+                                 gs4i_stored *o, gs4i_gathered *L, gs4i_report *report)
 {
     gs4_real *elastic = sim->particles.elastic_reals
                             ? sim->particles.elastic + (size_t)sim->particles.elastic_reals * i
                             : NULL;
-    const int sampled = sim->desc.scheme == GS4_EXPLICIT,
-              touches = gs4i_may_touch(&sim->boundary, o->x, n, sim->grid.h, !sampled);
-    const unsigned inside = sampled ? gs4i_ended_inside(sim, block, o->x, n) : 0;
+    const int touches =
+        gs4i_may_touch(&sim->boundary, o->x, n, sim->grid.h, sim->desc.scheme != GS4_EXPLICIT);
+    const unsigned inside = clear ? gs4i_ended_inside(sim, block, clear, o->x, n) : 0;
     int b;
+    if (!touches && !inside && gs4i_are_in_domain(&sim->grid, o->x, n)) return;
     for (b = 0; b < n; b++) {
         const gs4i_collider *emitter;
         if (!touches && !(inside >> b & 1) && gs4i_is_in_domain(&sim->grid, o->x + 4 * b)) continue;
@@ -13721,7 +13831,9 @@ static int gs4i_is_safe(const gs4i_pass *pass, int index)
 /* The tiles that S7 reads of one block. */
 typedef struct gs4i_correction_tiles {
     gs4_real velocity[GS4I_TILE_REALS], acceleration[GS4I_TILE_REALS], jumps[GS4I_TILE_REALS];
-    int with_jumps;
+    int with_jumps, edge, sticks; /* may contact be here, and with sticky bodies? */
+    uint64_t clear_nodes[GS4I_TILE];
+    const uint64_t *clear; /* these, or NULL: see gs4i_correct_contact */
 } gs4i_correction_tiles;
 
 /* Gather for n particles; `u` keeps what came of the velocity. A batch with solids wants the
@@ -13740,7 +13852,7 @@ GS4I_INLINE void gs4i_gather_corrections(const gs4i_correction_tiles *t, const g
         gs4i_gather_rate(solids, t->acceleration + at, s, b, &w, &d, &acc);
         if (t->with_jumps) gs4i_gather_rate(solids, t->jumps + at, s, b, &w, &d, &jump);
     }
-    if (near->particle) gs4i_take_odd_parts(solids, near, n, u, &acc);
+    if (near->particle) gs4i_make_odd(near, n, solids, u, &acc);
     gs4i_to_lanes(u->value, n, k->U);
     gs4i_gradient_lanes(u->dx, u->dy, u->dz, n, k->L);
     gs4i_to_lanes(acc.value, n, k->A);
@@ -13761,10 +13873,14 @@ GS4I_INLINE void gs4i_prepare_decay(gs4i_response *r, size_t i, int n, int solid
     GS4I_BATCH_LOOP(b) k->volume[b] = k->A[3][b] / r->constants.tait[b];
 }
 
-GS4I_INLINE void gs4i_load_corrections(const gs4i_grid *g, int o, uint64_t rows,
-                                       gs4i_correction_tiles *tiles)
+GS4I_INLINE void gs4i_load_corrections(const gs4_sim *sim, int o, gs4i_correction_tiles *tiles)
 {
+    const gs4i_grid *g = &sim->grid;
+    const uint64_t rows = sim->reports[o].rows;
     tiles->with_jumps = gs4i_load_jumps(g, o, rows, tiles->jumps);
+    tiles->edge = tiles->with_jumps || gs4i_at_edge(g, o);
+    tiles->sticks = tiles->with_jumps && gs4i_sticks_near(sim, o);
+    tiles->clear = tiles->edge ? gs4i_find_clear_nodes(sim, o, tiles->clear_nodes) : NULL;
     gs4i_tile_load(g, o, rows, gs4i_gradient_velocity(g), tiles->velocity);
     gs4i_tile_load(g, o, rows, gs4i_acceleration(g), tiles->acceleration);
 }
@@ -13787,12 +13903,10 @@ static void gs4i_correct(int index, void *context)
     gs4i_correction_tiles tiles;
     gs4i_corrections k;
     gs4i_gathered u;
-    int row = 0, edge, sticks;
+    int row = 0;
     size_t i = (size_t)g->first[o], end = (size_t)g->first[o + 1];
     if (!pass->commit && gs4i_is_safe(pass, index)) return;
-    gs4i_load_corrections(g, o, report->rows, &tiles);
-    edge = tiles.with_jumps || gs4i_at_edge(g, o);
-    sticks = tiles.with_jumps && gs4i_sticks_near(sim, o);
+    gs4i_load_corrections(sim, o, &tiles);
     gs4i_begin_response(&r, sim, &p, &integrator, report, heat);
     memset(&k, 0, sizeof k);
     if (heat) gs4i_load_heat_tiles(sim, o, heat);
@@ -13814,7 +13928,7 @@ static void gs4i_correct(int index, void *context)
         if (p.with_subgrid) {
             gs4i_prefetch_subgrid(&p, i + 4 * GS4I_BATCH);
             gs4i_to_lanes(p.subgrid + 4 * i, n, k.subgrid);
-            if (sticks) gs4i_limit_jumps(&k);
+            if (tiles.sticks) gs4i_limit_jumps(&k);
         }
         gs4i_prepare_decay(&r, i, n, solids, &k);
         gs4i_correct_batch(integrator, &k, &q);
@@ -13825,7 +13939,7 @@ static void gs4i_correct(int index, void *context)
         }
         if (heat) gs4i_gather_heat(&r, &s, k.L, heat);
         gs4i_pack_batch(&q, 1, &out);
-        if (edge) gs4i_correct_contact(sim, o, i, n, &out, &u, report);
+        if (tiles.edge) gs4i_correct_contact(sim, o, tiles.clear, i, n, &out, &u, report);
         gs4i_see_motion(&r.seen, q.v, k.L);
         gs4i_store_batch(&p, i, n, &out);
     }
@@ -13998,9 +14112,12 @@ static void gs4i_gather_euler(int index, void *context)
     gs4i_report *report = &sim->reports[o];
     gs4i_response r;
     gs4_real nodes[GS4I_TILE_REALS];
+    uint64_t clear_nodes[GS4I_TILE];
+    const uint64_t *clear;
     int row = 0;
     size_t i = (size_t)g->first[o], end = (size_t)g->first[o + 1];
     if (!pass->commit && gs4i_is_safe(pass, index)) return;
+    clear = edge && pass->commit ? gs4i_find_clear_nodes(sim, o, clear_nodes) : NULL;
     gs4i_tile_load(g, o, report->rows, gs4i_velocity(g), nodes);
     gs4i_begin_response(&r, sim, &p, &sim->integrator, report, heat);
     if (heat) gs4i_load_heat_tiles(sim, o, heat);
@@ -14019,7 +14136,7 @@ static void gs4i_gather_euler(int index, void *context)
             gs4i_x_weights(&s, b, &w, &d);
             gs4i_gather_local(nodes + 4 * s.base[b], &s, b, &w, &d, &u);
         }
-        if (near.particle) gs4i_make_odd(&near, n, &u);
+        if (near.particle) gs4i_make_odd(&near, n, 0, &u, NULL);
         gs4i_advect_batch(sim->integrator.dt, &u, n, &q, C);
         gs4i_advance_response(&r, i, n, C, NULL, q.v[3], pass->commit);
         if (!pass->commit) {
@@ -14029,7 +14146,7 @@ static void gs4i_gather_euler(int index, void *context)
         }
         if (heat) gs4i_gather_heat(&r, &s, C, heat);
         gs4i_pack_batch(&q, 0, &out);
-        if (edge) gs4i_correct_contact(sim, o, i, n, &out, &u, report);
+        if (edge) gs4i_correct_contact(sim, o, clear, i, n, &out, &u, report);
         if (near.particle) near.particle += n;
         gs4i_see_motion(&r.seen, q.v, C);
         gs4i_store_batch(&p, i, n, &out);
@@ -16353,7 +16470,7 @@ static void gs4i_correct_from_faces(int index, void *context)
         }
         if (heat) gs4i_gather_heat(&r, &s[0], k.L, heat);
         gs4i_pack_batch(&q, 1, &out);
-        gs4i_correct_contact(sim, o, i, n, &out, &slope, report);
+        gs4i_correct_contact(sim, o, NULL, i, n, &out, &slope, report);
         gs4i_see_motion(&r.seen, q.v, k.L);
         gs4i_store_batch(&p, i, n, &out);
         gs4i_store_affine(&p, i, n, &slope, integrator.restart);

@@ -920,12 +920,13 @@ static gs4_real contact_steep(gs4_vec3 p, void *user)
 }
 
 /* Who ended inside a body is found wherever it ended, and far away bodies are not asked. Bodies: a
- * ball of two cells, a steep one, a plate of half a cell, a half space. */
+ * ball of two cells, a steep one, a plate of half a cell, a half space, a steep ball before one. */
 static void test_contact_ended(void)
 {
     int n, o, k;
     contact_seed = 11;
-    for (n = 0; n < 4; n++) {
+    for (n = 0; n < 5; n++) {
+        const gs4_shape floor = gs4_plane(at(0, (gs4_real)0.31, 0), at(0, 1, 0));
         gs4_sim_desc d = contact_desc(0, GS4_WALL_SLIP);
         const gs4_material m = scene_liquid(1000, 0.1, 12);
         const gs4_fill fill = scene_fill(at(0, 0, 0));
@@ -935,13 +936,20 @@ static void test_contact_ended(void)
         gs4_collider c;
         memset(&c, 0, sizeof c);
         c.shape = n == 2   ? gs4_box(at(0.1, 0.57, 0.1), at(0.93, 0.62, 1.1))
-                  : n == 3 ? gs4_plane(at(0, 0.31, 0), at(0, 1, 0))
+                  : n == 3 ? floor
                            : gs4_sdf(n ? contact_steep : contact_ball, &ball, at(0, 0, 0),
                                      at(1.2, 1.2, 1.2));
         CHECK_RESULT(sim, gs4_add_collider(sim, &c), 0);
+        if (n == 4) {
+            gs4_collider below = c;
+            below.shape = floor;
+            CHECK_RESULT(sim, gs4_add_collider(sim, &below), 1);
+        }
         CHECK(gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1.2, 1.2, 1.2)), &fill) > 0);
         CHECK_RESULT(sim, gs4_step(sim, (gs4_real)0.2 * gs4_stable_dt(sim)), 0);
-        for (o = 0; o < sim->grid.occupied; o++)
+        for (o = 0; o < sim->grid.occupied; o++) {
+            uint64_t clear[8];
+            CHECK(gs4i_find_clear_nodes(sim, o, clear) == clear);
             for (k = 0; k < 400; k++) {
                 const gs4i_frame f = gs4i_tile_frame(&sim->grid, sim->grid.occupied_block[o]);
                 gs4_real x[4] = { 0, 0, 0, 1 }, own;
@@ -952,13 +960,16 @@ static void test_contact_ended(void)
                     x[a] = f.origin[a] + (gs4_real)CONTACT_H * (f.first[a] + (gs4_real)t);
                 }
                 own = gs4i_shape_distance(&c.shape, gs4i_vec3(x[0], x[1], x[2]));
+                if (n == 4)
+                    own = gs4i_min(own, gs4i_shape_distance(&floor, gs4i_vec3(x[0], x[1], x[2])));
                 contact_calls = 0;
-                found = (int)gs4i_ended_inside(sim, o, x, 1);
+                found = (int)gs4i_ended_inside(sim, o, clear, x, 1);
                 wrong += found != (own < 0);
                 inside += found;
                 /* (1.5 + 1.4) sqrt(3)/2 */
                 asked += known && contact_calls > 0 && (double)own > 2.6 * CONTACT_H;
             }
+        }
         CHECK(wrong == 0 && inside > 100);
         CHECK(asked == 0);
         gs4_destroy(sim);

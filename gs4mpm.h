@@ -244,7 +244,9 @@
  *     p + s K div u~ = -K (J** - 1);   div u~ = 0 where K is infinite
  * Cells are liquid where material fills more than 51.5 % of their kernel. p is 0 where the surface
  * is: w is its distance from the centre of the liquid cell before it, in cells, found from how full
- * both are. Beyond liquid three layers of faces have u~ and acc by linear extrapolation, P; forces
+ * both are. dJ/dt has div u~ - (h^2/4) lap div u~: what transfers of J smooth away, so that sound is
+ * within 1.5 % at 20 cells a wave and dt = h/(2 c). Longer steps damp it: c dt/h = 30 within six.
+ * Beyond liquid three layers of faces have u~ and acc by linear extrapolation, P; forces
  * of stress there, and masses, act on the faces that those go on from, P^T m P acc = P^T f. So
  * stress takes no momentum, and its angular momentum is off by some 1e-3. Particles without liquid
  * around fly by themselves. Where K is infinite acc is split, as (u~ - v**)/s alone has what
@@ -15953,7 +15955,33 @@ static void gs4i_scatter_again(gs4_sim *sim, gs4i_node_pass *nodes)
     gs4i_fold_faces(sim, nodes);
 }
 
-/* div u~ of liquid cells, for J, where the right-hand side was. The largest. */
+/* What scattering J to cells and gathering from cells smooth away of a field q: h^2/8 of its
+ * Laplacian each. Next to air that is not known along that axis. Cells then see at most what was
+ * solved for, sinc(k h/2)^6 (1 + sin(k h/2)^2) < 1 of it, so the implicit pressure stays stable. */
+static gs4_real gs4i_smoothed_away(const gs4i_staggered *f, const gs4_real *q, const int at[3])
+{
+    const size_t i = gs4i_box_index(&f->box, GS4I_AT_CELL, at[0], at[1], at[2]);
+    gs4_real sum = 0;
+    int a, side;
+    for (a = 0; a < 3; a++) {
+        gs4_real here = 0;
+        int air = 0;
+        for (side = -1; side <= 1; side += 2) {
+            int p[3];
+            size_t n;
+            memcpy(p, at, sizeof p);
+            p[a] = gs4i_around(f, a, at[a] + side);
+            n = gs4i_box_index(&f->box, GS4I_AT_CELL, p[0], p[1], p[2]);
+            air |= f->kind[n] == GS4_CELL_AIR;
+            if (f->kind[n] == GS4_CELL_LIQUID) here += q[i] - q[n];
+        }
+        if (!air) sum += here;
+    }
+    return GS4I_C(0.25) * sum;
+}
+
+/* div u~ of liquid cells, for J, where the right-hand side was, with what its way to J and back to
+ * cells smooths away. The largest. */
 static gs4_real gs4i_find_divergence(gs4_sim *sim)
 {
     gs4i_staggered *f = &sim->staggered;
@@ -15962,9 +15990,14 @@ static gs4_real gs4i_find_divergence(gs4_sim *sim)
     size_t i;
     for (z = 0; z < f->box.size[2]; z++)
         GS4I_BOX_PLANE(&f->box, GS4I_AT_CELL, z, at, i) {
-            f->rhs[i] = 0;
+            f->pressure[i] = f->rhs[i] = 0;
+            if (f->kind[i] == GS4_CELL_LIQUID && !gs4i_is_copy(f, at))
+                f->pressure[i] = gs4i_face_divergence(f, GS4I_FACE_STAGE, at, sim->grid.inv_h);
+        }
+    for (z = 0; z < f->box.size[2]; z++)
+        GS4I_BOX_PLANE(&f->box, GS4I_AT_CELL, z, at, i) {
             if (f->kind[i] != GS4_CELL_LIQUID || gs4i_is_copy(f, at)) continue;
-            f->rhs[i] = gs4i_face_divergence(f, GS4I_FACE_STAGE, at, sim->grid.inv_h);
+            f->rhs[i] = f->pressure[i] + gs4i_smoothed_away(f, f->pressure, at);
             most = gs4i_max(most, gs4i_abs(f->rhs[i]));
         }
     gs4i_each_mirror(sim, GS4I_AT_CELL, f->rhs, gs4i_fill_number);

@@ -29,6 +29,7 @@ typedef struct ref_sim {
     ref_node *node; /* of cells + 4 along each axis; two are behind each wall */
     int count, restart, solids, n[3];
     double h, shift, lightest, most_c0, least_rho, origin[3], g[3];
+    double unpacking; /* c0/(200 h), 1/s; 0 with solids and unlike densities */
     double dt, alpha_m, alpha_f, gamma, ahead, s, before; /* of this step: ref_rule */
 } ref_sim;
 
@@ -297,6 +298,32 @@ static void ref_fill(ref_sim *s)
         }
 }
 
+/* At last mirrors are as full as their originals, as J asks how densely particles lie. */
+static void ref_fill_masses(ref_sim *s)
+{
+    int wall, i;
+    for (wall = 5; wall >= 0 && s->unpacking > 0; wall--)
+        for (i = 0; i < ref_nodes(s); i++) {
+            ref_node *mirror = &s->node[i], *from = ref_original(s, wall, i);
+            if (from && mirror->folds >> wall / 2 & 1) mirror->m = from->m;
+        }
+}
+
+/* f = sum w m_i / (rho0 h^3) */
+static double ref_filled(const ref_sim *s, const ref_stencil *t)
+{
+    double m = 0;
+    int i;
+    for (i = 0; i < 27; i++) m += t->w[i] * t->node[i]->m;
+    return m / (s->least_rho * s->h * s->h * s->h);
+}
+
+/* dJ/dt where particles lie too densely: c0/(200 h) min(0, max(1.08/f, 0.9) - J). */
+static double ref_unpack(const ref_sim *s, double f, double J)
+{
+    return s->unpacking * fmin(0, fmax(1.08 / f, 0.9) - J);
+}
+
 /* A particle that ended behind a wall is put on it and loses its velocity into it. */
 static void ref_put_back(const ref_sim *s, ref_particle *p)
 {
@@ -470,7 +497,7 @@ static void ref_restart(ref_sim *s)
 /* --- symplectic Euler: MLS-MPM with APIC ------------------------------------------------------ */
 
 /* (m v)_i = sum w [m (v + dt g) + (m C - dt J m/rho0 sigma 4/h^2) (x_i - x)], |C| dt at most 1/4;
- * v = sum w v_i,  C = sum v_i (x) grad w,  x += dt v,  J += dt J tr C;
+ * v = sum w v_i,  C = sum v_i (x) grad w,  x += dt v,  J += dt J tr C, then dt ref_unpack;
  * F and s by (4) with alpha_m = alpha_f = gamma = 1 and no rates. */
 static void ref_euler_step(ref_sim *s, double dt)
 {
@@ -497,6 +524,7 @@ static void ref_euler_step(ref_sim *s, double dt)
         }
     }
     ref_velocities(s);
+    ref_fill_masses(s);
     s->dt = dt;
     s->alpha_m = s->alpha_f = s->gamma = 1;
     for (k = 0; k < s->count; k++) {
@@ -506,6 +534,7 @@ static void ref_euler_step(ref_sim *s, double dt)
         ref_gather(&t, REF_VELOCITY, p->v, p->C);
         for (c = 0; c < 3; c++) p->x[c] += dt * p->v[c];
         p->J += dt * p->J * ref_trace(p->C);
+        p->J += dt * ref_unpack(s, ref_filled(s, &t), p->J);
         memset(p->M, 0, sizeof p->M);
         memset(p->ds, 0, sizeof p->ds);
         ref_correct_deformation(s, p, p->C);

@@ -90,6 +90,7 @@ static void ref_accelerate(ref_sim *s)
         n->remembers = n->m > s->lightest && !n->mirrors;
     }
     ref_fill(s);
+    ref_fill_masses(s);
 }
 
 /* dJ/dt where noise decays by itself and nothing is solid: k (B - J~), B = 1 + sum w b_i / (rho0
@@ -103,9 +104,9 @@ static double ref_volume_decay(const ref_sim *s, const ref_particle *p, double b
 }
 
 /* S7: A = sum w acc_i, U = sum w u_i, L = grad u;  by (4) dx/dt = U,  dJ/dt = J tr L, implicit in
- * J, and its decay,  dv/dt = A + (fade + noise) (V - v~) + near (U - v), the last implicit in v:
- * c0/h times the weight of mirror nodes, and in spray, whose nodes are filled by less than 8 %
- * (none from 20 %), once more. */
+ * J, its decay, and what makes room,  dv/dt = A + (fade + noise) (V - v~) + near (U - v), the
+ * last implicit in v: c0/h times the weight of mirror nodes, and in spray, whose nodes are filled
+ * by less than 8 % (none from 20 %), once more. */
 static void ref_correct_particles(ref_sim *s)
 {
     double at_once;
@@ -113,18 +114,18 @@ static void ref_correct_particles(ref_sim *s)
     int n, i, c;
     for (n = 0; n < s->count; n++) {
         ref_particle *p = &s->p[n];
-        double x[3], U[3], A[3], L[3][3], grad_acc[3][3], near, R, filled = 0, mirrors = 0, b = 0,
-                                                                   fades;
+        double x[3], U[3], A[3], L[3][3], grad_acc[3][3], near, R, filled, mirrors = 0, b = 0,
+                                                                           fades;
         ref_stencil t;
         for (c = 0; c < 3; c++) x[c] = p->x[c] + s->ahead * p->move[c];
         ref_weights(s, x, &t);
         ref_gather(&t, REF_VELOCITY, U, L);
         ref_gather(&t, REF_ACCELERATION, A, grad_acc);
         for (i = 0; i < 27; i++) {
-            filled += t.w[i] * t.node[i]->m / (s->least_rho * s->h * s->h * s->h);
             mirrors += t.w[i] * t.node[i]->mirrors;
             b += t.w[i] * t.node[i]->b;
         }
+        filled = ref_filled(s, &t);
         near = (mirrors + 1 - ref_smooth((filled - 0.08) / 0.12)) * s->most_c0 / s->h;
         for (c = 0; c < 3; c++) {
             R = A[c] + (fade + p->noise) * p->sub_grid[c]
@@ -134,7 +135,7 @@ static void ref_correct_particles(ref_sim *s)
             ref_correct(s, U[c], &p->x[c], &p->move[c]);
             p->lag[c] = ref_half(p->v[c] - p->move[c] - shift * p->a[c]);
         }
-        fades = ref_volume_decay(s, p, b);
+        fades = ref_volume_decay(s, p, b) + ref_unpack(s, filled, p->J + s->ahead * p->dJ);
         R = (p->J + s->before * p->dJ + s->s * fades) / (1 - s->s * ref_trace(L)) * ref_trace(L);
         ref_correct(s, R + fades, &p->J, &p->dJ);
         p->fades = ref_half(fades);

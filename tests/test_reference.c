@@ -22,6 +22,7 @@ typedef struct reference_scene {
     int oldroyd, euler;
     double velocity[3], spin, missing; /* m/s; rad/s; part of the particles that is left out */
     int steps, edit; /* before step `edit` positions are edited by hand; 0: never */
+    double packing;  /* mass of particles over what fills their space at rest */
 } reference_scene;
 
 #define STICK GS4_WALL_STICK
@@ -35,39 +36,45 @@ typedef struct reference_scene {
 /* clang-format off */
 static const reference_scene reference_scenes[] = {
     { "drop", { 12, 13, 11 }, ALL(SLIP), 0, 0, 0,
-      { 3.3, 4, 3 }, { 7, 8, 7 }, 0, 0, 0, { 3, 2, -1.5 }, 9, 0, 24, 0 },
+      { 3.3, 4, 3 }, { 7, 8, 7 }, 0, 0, 0, { 3, 2, -1.5 }, 9, 0, 24, 0, 1 },
     { "drop that keeps its sub-grid velocity", { 12, 9, 9 }, ALL(SLIP), 1, 0, INFINITY,
-      { 3, 3, 2 }, { 6, 6, 6 }, 0, 0, 0, { 3, 0, 0 }, 9, 0, 20, 0 },
+      { 3, 3, 2 }, { 6, 6, 6 }, 0, 0, 0, { 3, 0, 0 }, 9, 0, 20, 0, 1 },
     { "stick", { 6, 5, 4 }, ALL(STICK), 0.5, 0, 0,
-      { 0, 0, 0 }, { 6, 5, 4 }, 0, 0, 0, { 1, 1, 1 }, 5, 0.2, 12, 0 },
+      { 0, 0, 0 }, { 6, 5, 4 }, 0, 0, 0, { 1, 1, 1 }, 5, 0.2, 12, 0, 1 },
     { "slip", { 5, 4, 7 }, ALL(SLIP), 0.5, 0.5, 0,
-      { 0, 0, 0 }, { 5, 4, 7 }, 0, 0, 0, { 1, -1, 2 }, 5, 0.2, 12, 0 },
+      { 0, 0, 0 }, { 5, 4, 7 }, 0, 0, 0, { 1, -1, 2 }, 5, 0.2, 12, 0, 1 },
     { "separate", { 5, 6, 5 }, ALL(APART), 0, 0, 0.02,
-      { 0, 0, 0 }, { 5, 5, 5 }, 0, 0, 0, { -1, -1, 1 }, 5, 0.2, 12, 0 },
+      { 0, 0, 0 }, { 5, 5, 5 }, 0, 0, 0, { -1, -1, 1 }, 5, 0.2, 12, 0, 1 },
     { "three kinds of walls", { 6, 5, 4 }, { STICK, SLIP, APART, STICK, SLIP, APART }, 0.8, 0.2, 0,
-      { 0, 0, 0 }, { 6, 5, 4 }, 0, 0, 0, { 1, -2, 1 }, 5, 0.3, 12, 0 },
+      { 0, 0, 0 }, { 6, 5, 4 }, 0, 0, 0, { 1, -2, 1 }, 5, 0.3, 12, 0, 1 },
     { "three kinds, turned", { 5, 4, 6 }, { SLIP, APART, STICK, SLIP, APART, STICK }, 0, 0, 0.001,
-      { 0, 0, 0 }, { 5, 4, 6 }, 0, 0, 0, { -1, 2, 1 }, 5, 0.3, 12, 0 },
+      { 0, 0, 0 }, { 5, 4, 6 }, 0, 0, 0, { -1, 2, 1 }, 5, 0.3, 12, 0, 1 },
     { "three kinds, turned again", { 4, 5, 6 }, { APART, STICK, SLIP, APART, STICK, SLIP }, 1, 0, 0.05,
-      { 0, 0, 0 }, { 4, 5, 6 }, 0, 1, 0, { 1, 1, -2 }, 5, 0.3, 12, 0 },
+      { 0, 0, 0 }, { 4, 5, 6 }, 0, 1, 0, { 1, 1, -2 }, 5, 0.3, 12, 0, 1 },
     { "periodic", { 6, 5, 9 }, { ROUND, ROUND, STICK, SLIP, ROUND, ROUND }, 0.5, 0, 0,
-      { 0, 0, 0 }, { 6, 4, 9 }, 0, 1, 0, { 3, 0, -3 }, 5, 0.4, 12, 0 },
+      { 0, 0, 0 }, { 6, 4, 9 }, 0, 1, 0, { 3, 0, -3 }, 5, 0.4, 12, 0, 1 },
     { "cube", { 9, 10, 9 }, ALL(SLIP), 0, 0, 0,
-      { 2.5, 3, 3 }, { 5.5, 6, 6 }, 1, 0, 0, { 2, 1, -1 }, 30, 0, 24, 0 },
+      { 2.5, 3, 3 }, { 5.5, 6, 6 }, 1, 0, 0, { 2, 1, -1 }, 30, 0, 24, 0, 1 },
     { "cube whose decay is short", { 9, 9, 9 }, ALL(SLIP), 0.5, 0.5, 0.0005,
-      { 3, 3, 3 }, { 6, 6, 6 }, 1, 0, 0, { 2, 1, -1 }, 40, 0, 12, 0 },
+      { 3, 3, 3 }, { 6, 6, 6 }, 1, 0, 0, { 2, 1, -1 }, 40, 0, 12, 0, 1 },
     { "mix", { 8, 9, 7 }, { STICK, SLIP, APART, APART, SLIP, STICK }, 0, 0, 0.03,
-      { 0, 0, 1 }, { 8, 7, 5 }, 0.5, 1, 0, { 1, -2, 1 }, 12, 0.3, 12, 0 },
+      { 0, 0, 1 }, { 8, 7, 5 }, 0.5, 1, 0, { 1, -2, 1 }, 12, 0.3, 12, 0, 1 },
     { "mix, near Crank-Nicolson", { 8, 9, 7 }, { SLIP, STICK, STICK, SLIP, STICK, SLIP }, 0.9, 0.7, 0,
-      { 0, 0, 1 }, { 8, 7, 5 }, 0.5, 1, 0, { 1, -2, 1 }, 12, 0.3, 12, 0 },
+      { 0, 0, 1 }, { 8, 7, 5 }, 0.5, 1, 0, { 1, -2, 1 }, 12, 0.3, 12, 0, 1 },
     { "spray", { 12, 12, 9 }, ALL(STICK), 0.5, 0, 0.1,
-      { 0, 0, 0 }, { 12, 12, 9 }, 0, 0, 0, { 1, -2, 1 }, 3, 0.97, 14, 0 },
+      { 0, 0, 0 }, { 12, 12, 9 }, 0, 0, 0, { 1, -2, 1 }, 3, 0.97, 14, 0, 1 },
     { "edited", { 8, 8, 8 }, ALL(SLIP), 0, 0, 0,
-      { 2, 1, 2 }, { 6, 5, 6 }, 0.5, 1, 0, { 1, -1, 0.5 }, 9, 0, 12, 5 },
+      { 2, 1, 2 }, { 6, 5, 6 }, 0.5, 1, 0, { 1, -1, 0.5 }, 9, 0, 12, 5, 1 },
     { "Euler", { 6, 5, 7 }, { STICK, SLIP, APART, STICK, SLIP, APART }, 0, 0, 0,
-      { 0, 0, 0 }, { 6, 5, 6 }, 0.5, 1, 1, { 1, -2, 1 }, 9, 0.3, 14, 0 },
+      { 0, 0, 0 }, { 6, 5, 6 }, 0.5, 1, 1, { 1, -2, 1 }, 9, 0.3, 14, 0, 1 },
     { "Euler, turning", { 12, 9, 9 }, ALL(SLIP), 0, 0, 0,
-      { 3, 3, 2 }, { 6, 6, 6 }, 0.5, 1, 1, { 3, 1, 1 }, 40, 0, 14, 0 }
+      { 3, 3, 2 }, { 6, 6, 6 }, 0.5, 1, 1, { 3, 1, 1 }, 40, 0, 14, 0, 1 },
+    { "packed", { 6, 5, 4 }, { STICK, SLIP, APART, STICK, SLIP, APART }, 0.5, 0, 0,
+      { 0, 0, 0 }, { 6, 5, 4 }, 0, 0, 0, { 1, -2, 1 }, 5, 0, 12, 0, 1.1 },
+    { "packed around a period", { 6, 5, 4 }, { ROUND, ROUND, SLIP, SLIP, ROUND, ROUND }, 0, 0, 0.05,
+      { 0, 0, 0 }, { 6, 5, 4 }, 0, 0, 0, { 3, 0, -3 }, 5, 0, 12, 0, 1.3 },
+    { "packed, Euler", { 6, 5, 4 }, { SLIP, APART, STICK, SLIP, APART, STICK }, 0, 0, 0,
+      { 0, 0, 0 }, { 6, 5, 4 }, 0, 0, 1, { 1, -2, 1 }, 5, 0, 12, 0, 1.1 }
 };
 /* clang-format on */
 #undef STICK
@@ -156,7 +163,7 @@ static int reference_add(const reference_scene *c, gs4_sim *sim, const double ce
         p->C[(a + 2) % 3][(a + 1) % 3] = (double)(gs4_real)w[a];
         p->C[(a + 1) % 3][(a + 2) % 3] = -(double)(gs4_real)w[a];
     }
-    return gs4_add_points(sim, x, 1, (gs4_real)(h * h * h / 8), &f);
+    return gs4_add_points(sim, x, 1, (gs4_real)(c->packing * h * h * h / 8), &f);
 }
 
 /* Half a cell apart and shaken, a part of them missing; then what the library made of them. */
@@ -209,6 +216,7 @@ static void reference_begin(const reference_scene *c, gs4_sim *sim, const gs4_ma
     }
     r->node = (ref_node *)calloc((size_t)ref_nodes(r), sizeof *r->node);
     if (!r->node) abort();
+    if (!c->solid && !c->oldroyd) r->unpacking = r->most_c0 / (200 * r->h);
     reference_fill(c, sim, m, r);
     r->lightest = HUGE_VAL;
     for (i = 0; i < r->count; i++) r->lightest = fmin(r->lightest, r->p[i].m * eps * eps);

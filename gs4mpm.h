@@ -410,7 +410,7 @@
  * A mesh: about 400 (double 800) per cell face of its surface in the domain or within 10 cells of
  * it; where that is more than 1 GB it is refused. Its distance is sampled twice a cell within three
  * cells of the surface. A mesh that moves is sampled anew now and then, but for one that takes less
- * than 32 MB as a whole. While it is sampled, up to 70 more a triangle.
+ * than 32 MB as a whole. While it is sampled, up to 130 more a triangle.
  * Double, GS4: 121 (32 more) and 97. Stepping allocates nothing once the scene has stopped growing;
  * a kernel takes 61 KB of stack, partitioned 71; in double 120 and 141.
  *
@@ -10107,7 +10107,7 @@ typedef struct gs4i_facet_tree {
     const gs4_shape *shape;
     gs4i_facet_node *node;
     size_t *facet; /* 4 times a triangle and its form, by place */
-    int levels;    /* at the last one nodes have at most 8 triangles */
+    int levels;    /* at the last one nodes have at most 4 triangles */
     double spacing;
 } gs4i_facet_tree;
 
@@ -10237,7 +10237,7 @@ static int gs4i_build_facets(gs4i_memory *m, gs4i_facet_tree *t, const gs4_shape
     t->shape = s;
     t->spacing = spacing;
     t->levels = 0;
-    while (s->triangle_count - 1 >= 8 << t->levels) t->levels++;
+    while (s->triangle_count - 1 >= 4 << t->levels) t->levels++;
     t->facet = (size_t *)gs4i_alloc(m, (size_t)s->triangle_count, sizeof *t->facet);
     t->node = (gs4i_facet_node *)gs4i_alloc(m, (size_t)2 << t->levels, sizeof *t->node);
     if (!t->facet || !t->node) return 0;

@@ -648,7 +648,7 @@ static void run_mesh(void)
     RUN_ONCE(test_mesh_ball);
     RUN_ONCE(test_mesh_parts);
     RUN(test_mesh_table);
-    RUN_ONCE(test_mesh_table_moves);
+    RUN_FULL(test_mesh_table_moves);
     RUN(test_mesh_stray);
     RUN(test_mesh_far);
     RUN_FULL(test_mesh_fan);

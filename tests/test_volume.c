@@ -397,9 +397,9 @@ static void run_volume(void)
 {
     RUN(test_volume_of_blocks);
     RUN(test_volume_of_others);
-    RUN(test_volume_of_packed);
+    RUN_ONCE(test_volume_of_packed);
     RUN(test_volume_stops);
-    RUN(test_volume_of_smooth_flow);
+    RUN_ONCE(test_volume_of_smooth_flow);
     RUN_FULL(test_volume_momentum);
     RUN_FULL(test_volume_after_flow);
 }

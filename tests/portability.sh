@@ -9,7 +9,7 @@ set -u
 cd "$(dirname "$0")/.." || exit 1
 CC=${CC:-cc}
 
-quick='few_layout few_snippets few_warnings few_hashes'
+quick='few_layout few_warnings few_hashes'
 full='warnings tsan fused scenes hashes asan fuzz arm hashes_double wasm windows tiny musl i386 form layout names units snippets link frames examples'
 
 # A transfer kernel may be longer than 60 lines; nothing else. This one is a transpose, spelled out.
@@ -148,10 +148,9 @@ snippets() {
     sed -n 's/^ \*     //p' gs4mpm.h | awk '/^#include <stdio.h>/ { on = 1 } on; on && /^}/ { exit }' > "$tmp/snippet0.c"
     awk -v name="$tmp/snippet" '/^```/ { on = /^```c$/; n += on; next } on { print > (name n ".c") }' README.md 2> "$tmp/m" || skip "no README.md yet"
     for f in $(grep -l 'int main' "$tmp"/snippet*.c); do
-        check "$(head -n 3 "$f" | tail -n 1)" $CC -std=c99 -Wall -Wpedantic -Werror -I. ${syntax:-} "$f" -o "$tmp/linked" -lm
+        check "$(head -n 3 "$f" | tail -n 1)" $CC -std=c99 -Wall -Wpedantic -Werror -I. "$f" -o "$tmp/linked" -lm
     done
 }
-few_snippets() { syntax=-fsyntax-only; snippets; }
 
 # ==== names ====================================================================================================
 

@@ -173,7 +173,7 @@ static void test_partitioned_walls_rest(void)
             m.bulk_modulus = (gs4_real)1e8;
         }
         sim = partitioned_pool(d, &m, a, down, H);
-        partitioned_steps(sim, 0.2, 50);
+        partitioned_steps(sim, test_full ? 0.2 : 0.1, test_full ? 50 : 25);
         CHECK_BETWEEN(gs4_get_stats(sim).max_speed / sqrt(H), 0, big ? 1e-4 : limit);
         worst = partitioned_pressure_off(sim, a, down, H, worst);
         gs4_destroy(sim);

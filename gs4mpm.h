@@ -6326,6 +6326,9 @@ typedef struct gs4i_integrator {
     gs4_real before;     /* y** = y + before r: alpha_f dt - s; 0 for symplectic Euler */
     gs4_real next_shift; /* prediction.shift of the next step */
     int restart;         /* no rates yet: first step, or after an edit */
+    /* Share of feedback after an impact. As a rate a it gives velocity in later steps, too; after
+     * a first step, which takes it whole, (alpha_m - gamma) a dt in all. */
+    gs4_real impact;
     /* Decay of what the grid does not see, at the rate k = 1/flip_decay_time and as noise crosses
      * cells: see gs4i_set_decay. */
     gs4_real decay;           /* k, 1/s */
@@ -16105,7 +16108,7 @@ static int gs4i_finish_acceleration(gs4_sim *sim, gs4_real fastest)
         GS4I_TRY(gs4i_project(sim, GS4I_FACE_ACCELERATION));
         pass.scale = gs4i_min(GS4I_C(0.5), sim->integrator.s * fastest * sim->grid.inv_h);
     }
-    if (f->contact && (f->is_plain || gs4i_is_impact(sim))) pass.scale = GS4I_C(0.5);
+    if (f->contact && (f->is_plain || gs4i_is_impact(sim))) pass.scale = sim->integrator.impact;
     gs4i_parallel_for(&sim->tasks, f->box.size[2] + 1, gs4i_split_acceleration, &pass);
     return GS4_OK;
 }
@@ -18717,6 +18720,10 @@ static gs4i_integrator gs4i_make_integrator(const gs4_sim *sim, gs4_real dt)
     int i;
     k.dt = dt;
     k.restart = sim->restart;
+    gs4i_family(&k, r, s, 0);
+    k.impact = GS4I_C(0.5);
+    if (k.restart && sim->desc.integrator == GS4_INTEGRATOR_GS4)
+        k.impact /= 1 + k.alpha_m - k.gamma;
     gs4i_family(&k, r, s, k.restart);
     if (sim->desc.integrator == GS4_INTEGRATOR_BACKWARD_EULER) k.alpha_m = k.alpha_f = k.gamma = 1;
     k.affine_ratio = k.restart || sim->desc.integrator != GS4_INTEGRATOR_GS4 || !(sim->last_dt > 0)
@@ -22582,4 +22589,5 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  * no longer than ripples of its surfaces bear; separating and periodic walls. Forces of stress at
  * its free surfaces are not lost any more: there elastic bodies gained energy, and viscous ones
  * momentum. Its sound is within 1.5 % at 20 cells a wave, before 2.5. Incompressible liquid slides
- * around slippery colliders, which braked it or, where they turned, gave it energy without end. */
+ * around slippery colliders, which braked it or, where they turned, gave it energy without end.
+ * What meets a separating wall in its first step is thrown back no more. */

@@ -10204,7 +10204,7 @@ static void gs4i_build_node(gs4i_facet_tree *t, int level, int node)
     for (i = begin; i < end; i++) {
         gs4i_facet_corners(t->shape, t->facet[i] / 4, 0, c);
         for (a = 0; a < 3; a++) {
-            const double centre = gs4i_facet_centre(t, i, a);
+            const double centre = c[0][a] + c[1][a] + c[2][a];
             low[a] = gs4i_lesser(low[a], centre);
             high[a] = gs4i_greater(high[a], centre);
             for (k = 0; k < 3; k++) {
@@ -12150,17 +12150,12 @@ static unsigned gs4i_ended_inside(const gs4_sim *sim, int o, const uint64_t clea
     return inside;
 }
 
-/* What the patches of a body have around occupied block o, as a tile. */
-static void gs4i_load_patches(const gs4_sim *sim, int collider, int o, gs4_real *tile)
+/* A tile from what the 27 blocks around it have, four numbers a node: `none` and three times 0
+ * where there is nothing. */
+static void gs4i_load_around(const gs4_real *const of[27], gs4_real none, gs4_real *tile)
 {
     static const int from[3] = { 8, 0, 0 }, to[3] = { 0, 8, 24 }, count[3] = { 8, 16, 8 };
-    const gs4_real far = (GS4I_IMAGE_REACH + GS4I_NODES_REACH) * sim->grid.h, /* at least as far */
-        *nodes = (const gs4_real *)sim->image_particles.patches.nodes.data, *of[27];
     int row, i, k;
-    for (i = 0; i < 27; i++) {
-        const int patch = gs4i_patch_of(sim, collider, sim->grid.neighbour[27 * o + i]);
-        of[i] = patch < 0 ? NULL : nodes + (ptrdiff_t)patch * GS4I_NODE_REALS;
-    }
     for (row = 0; row < GS4I_TILE * GS4I_TILE; row++, tile += 4 * GS4I_TILE) {
         const int y = (row & 7) + 2, z = (row >> 3) + 2, place = 4 * gs4i_place_of(0, y, z);
         for (i = 0; i < 3; i++) {
@@ -12171,10 +12166,22 @@ static void gs4i_load_patches(const gs4_sim *sim, int collider, int o, gs4_real 
                 continue;
             }
             memset(out, 0, (size_t)count[i] * sizeof *out);
-            for (k = 0; k < count[i]; k += 4) out[k] = far;
+            for (k = 0; k < count[i]; k += 4) out[k] = none;
         }
     }
     memset(tile, 0, 16 * sizeof *tile);
+}
+
+/* What the patches of a body have around occupied block o; elsewhere it is at least as far. */
+static void gs4i_load_patches(const gs4_sim *sim, int collider, int o, gs4_real *tile)
+{
+    const gs4_real *nodes = (const gs4_real *)sim->image_particles.patches.nodes.data, *of[27];
+    int i;
+    for (i = 0; i < 27; i++) {
+        const int patch = gs4i_patch_of(sim, collider, sim->grid.neighbour[27 * o + i]);
+        of[i] = patch < 0 ? NULL : nodes + (ptrdiff_t)patch * GS4I_NODE_REALS;
+    }
+    gs4i_load_around(of, (GS4I_IMAGE_REACH + GS4I_NODES_REACH) * sim->grid.h, tile);
 }
 
 /* The least distance of the 27 nodes from each node of a tile on: no particle that sees them is
@@ -12705,21 +12712,11 @@ static void gs4i_scatter_image_particles(gs4_sim *sim, gs4_task_fn kernel)
 static void gs4i_load_surroundings(const gs4i_surroundings *t, const gs4_real *field,
                                    gs4_real *tile)
 {
-    static const int from[3] = { 8, 0, 0 }, to[3] = { 0, 8, 24 }, count[3] = { 8, 16, 8 };
-    int row, i;
-    for (row = 0; row < GS4I_TILE * GS4I_TILE; row++, tile += 4 * GS4I_TILE) {
-        const int y = (row & 7) + 2, z = (row >> 3) + 2, place = 4 * gs4i_place_of(0, y, z),
-                  *slots = t->slot + 3 * (3 * (z >> 2) + (y >> 2));
-        for (i = 0; i < 3; i++) {
-            const size_t bytes = (size_t)count[i] * sizeof *tile;
-            if (slots[i] < 0)
-                memset(tile + to[i], 0, bytes);
-            else
-                memcpy(tile + to[i],
-                       field + (ptrdiff_t)slots[i] * GS4I_NODE_REALS + place + from[i], bytes);
-        }
-    }
-    memset(tile, 0, 16 * sizeof *tile);
+    const gs4_real *of[27];
+    int i;
+    for (i = 0; i < 27; i++)
+        of[i] = t->slot[i] < 0 ? NULL : field + (ptrdiff_t)t->slot[i] * GS4I_NODE_REALS;
+    gs4i_load_around(of, 0, tile);
 }
 
 /* The next images of a slot, up to 16, of which particles take odd parts: from *k on. Returns how

@@ -25,7 +25,7 @@ typedef struct options {
     const char *checkpoint, *frames;
 } options;
 
-static gs4_vec3 at(double x, double y, double z)
+static gs4_vec3 vec(double x, double y, double z)
 {
     gs4_vec3 v;
     v.x = (gs4_real)x;
@@ -132,20 +132,20 @@ static gs4_sim *create_block(gs4_sim_desc *d, const options *o)
         m.arms = 4;
     }
     if (gs4_add_material(sim, &m) < 0) stop("gs4_add_material", sim);
-    c.shape = gs4_sphere(at(0.33, 0.21, 0.16), (gs4_real)0.09);
-    c.pivot = at(0.33, 0.21, 0.16);
+    c.shape = gs4_sphere(vec(0.33, 0.21, 0.16), (gs4_real)0.09);
+    c.pivot = vec(0.33, 0.21, 0.16);
     c.contact = GS4_WALL_SEPARATE;
     c.friction = (gs4_real)0.3;
-    c.angular_velocity = at(0, 4, 1);
+    c.angular_velocity = vec(0, 4, 1);
     if (o->heat) {
         c.is_isothermal = 1;
         c.temperature = 60;
     }
     if (gs4_add_collider(sim, &c) < 0) stop("gs4_add_collider", sim);
-    e.shape = gs4_cylinder(at(0.1, 0.2, 0.5), at(0.1, 0.2, 0.55), (gs4_real)0.05);
+    e.shape = gs4_cylinder(vec(0.1, 0.2, 0.5), vec(0.1, 0.2, 0.55), (gs4_real)0.05);
     if (o->heat) e.fill.temperature = 25;
     e.fill.material = 1;
-    e.fill.velocity = at(0, 0, -1);
+    e.fill.velocity = vec(0, 0, -1);
     if (gs4_add_emitter(sim, &e) < 0) stop("gs4_add_emitter", sim);
     return sim;
 }
@@ -154,11 +154,11 @@ static void fill_block(gs4_sim *sim)
 {
     gs4_fill block;
     memset(&block, 0, sizeof block);
-    block.velocity = at(0.3, 0.5, 0);
-    block.angular_velocity = at(0, 0, 2);
+    block.velocity = vec(0.3, 0.5, 0);
+    block.angular_velocity = vec(0, 0, 2);
     block.jitter = (gs4_real)0.2;
     block.random_seed = 7;
-    if (gs4_add_particles(sim, gs4_box(at(0.2, 0.1, 0.28), at(0.45, 0.3, 0.45)), &block) < 0)
+    if (gs4_add_particles(sim, gs4_box(vec(0.2, 0.1, 0.28), vec(0.45, 0.3, 0.45)), &block) < 0)
         stop("gs4_add_particles", sim);
 }
 
@@ -175,7 +175,7 @@ static gs4_sim *create_bunnies(gs4_sim_desc *d)
     d->cells[0] = d->cells[1] = 20;
     d->cells[2] = 60;
     d->cell_size = (gs4_real)0.012;
-    d->origin = at(-0.12, -0.12, 0);
+    d->origin = vec(-0.12, -0.12, 0);
     if (gs4_create(d, &sim) < 0) stop("gs4_create", NULL);
     for (i = 0; i < 2; i++) {
         m.density = 1200;
@@ -183,9 +183,9 @@ static gs4_sim *create_bunnies(gs4_sim_desc *d)
         m.sound_speed = 20;
         if (gs4_add_material(sim, &m) < 0) stop("gs4_add_material", sim);
     }
-    c.shape = gs4_box(at(-0.06, -0.06, 0.66), at(0.06, 0.06, 0.7));
+    c.shape = gs4_box(vec(-0.06, -0.06, 0.66), vec(0.06, 0.06, 0.7));
     c.contact = GS4_WALL_STICK;
-    c.velocity = at(0, 0, -3.5);
+    c.velocity = vec(0, 0, -3.5);
     if (gs4_add_collider(sim, &c) < 0) stop("gs4_add_collider", sim);
     return sim;
 }
@@ -209,7 +209,7 @@ static void fill_bunnies(gs4_sim *sim)
             vertices[i][k][2] = (gs4_real)(0.06 + 0.075 * i + 0.1 * (sin(tip) * y + cos(tip) * z));
         }
         bunny.material = i % 2;
-        bunny.velocity = at(0, 0, -1 - 0.2 * i);
+        bunny.velocity = vec(0, 0, -1 - 0.2 * i);
         if (gs4_add_particles(sim,
                               gs4_mesh(&vertices[i][0][0], BUNNY_VERTEX_COUNT,
                                        &bunny_triangles[0][0], BUNNY_TRIANGLE_COUNT),
@@ -287,7 +287,8 @@ static void hash_scene(const char *name, gs4_integrator integrator, const option
             sim = create(integrator, o, &calls);
             if (gs4_load(sim, o->checkpoint) < 0) stop("gs4_load", sim);
         }
-        if (i == 3 * (o->steps / 4) && gs4_move_collider(sim, 0, at(0.2, 0, 0.3), at(0, 0, 0)) < 0)
+        if (i == 3 * (o->steps / 4)
+            && gs4_move_collider(sim, 0, vec(0.2, 0, 0.3), vec(0, 0, 0)) < 0)
             stop("gs4_move_collider", sim);
         if (gs4_step(sim, gs4_stable_dt(sim) / 2) < 0) stop("gs4_step", sim);
     }

@@ -1,4 +1,5 @@
-/* All tests in one program: cc tests/main.c -I. -lm; once more with -DGS4_DOUBLE. See run.sh. */
+/* All tests in one program: cc tests/main.c -I. -lm; once more with -DGS4_DOUBLE. See run.sh.
+ * With -DGS4_FEW: `few ...` runs scenes of fuzz.c and determinism.c. */
 #define GS4MPM_IMPLEMENTATION
 #include "gs4mpm.h"
 #ifdef GS4_TESTS_UNOPTIMIZED /* they compile in half the time, see run.sh */
@@ -29,11 +30,19 @@
 #include "test_mesh.c"
 #include "test_reference.c"
 
+#ifdef GS4_FEW
+#undef GS4MPM_IMPLEMENTATION
+#include "few.c"
+#endif
+
 int main(int count, char **values)
 {
+#ifdef GS4_FEW
+    if (count > 1 && strcmp(values[1], "few") == 0) return few(count - 1, values + 1);
+#endif
     test_arguments(count, values);
     RUN(test_free_flight);
-    RUN_ONCE(test_spin);
+    RUN_FULL(test_spin);
     RUN_ONCE(test_momentum);
     RUN_ONCE(test_momentum_seam);
     RUN_ONCE(test_poiseuille);
@@ -58,14 +67,14 @@ int main(int count, char **values)
     RUN_SLOW(test_drop_draws_back);
     RUN_SLOW(test_die_swell);
     RUN_ONCE(test_heat_modes);
-    RUN(test_heat_order_in_time);
+    RUN_FULL(test_heat_order_in_time);
     RUN_ONCE(test_heat_stiff);
     RUN_FULL(test_heat_pulse);
     RUN_FULL(test_heat_surface);
     RUN_ONCE(test_heat_seam);
     RUN(test_heat_periodic_mean);
     RUN_ONCE(test_heat_breakdown);
-    RUN_ONCE(test_heat_on_each_wall);
+    RUN_FULL(test_heat_on_each_wall);
     RUN_ONCE(test_heat_one_wall);
     RUN_ONCE(test_heat_drifts);
     RUN_ONCE(test_heat_around);
@@ -74,23 +83,23 @@ int main(int count, char **values)
     RUN_FULL(test_heat_long_steps);
     RUN_FULL(test_heat_beside_walls);
     RUN_FULL(test_heat_waves_at_walls);
-    RUN_ONCE(test_heat_stefan);
-    RUN_ONCE(test_heat_conserved);
+    RUN_FULL(test_heat_stefan);
+    RUN_FULL(test_heat_conserved);
     RUN_FULL(test_heat_cycles);
-    RUN_ONCE(test_heat_of_viscosity);
-    RUN_ONCE(test_heat_slowly);
+    RUN_FULL(test_heat_of_viscosity);
+    RUN_FULL(test_heat_slowly);
     RUN_ONCE(test_phase_freezing);
     RUN_FULL(test_phase_melting);
     RUN_ONCE(test_phase_between);
     RUN_ONCE(test_phase_forgets);
     RUN_ONCE(test_heat_rims);
     RUN_ONCE(test_heat_full_box);
-    RUN_ONCE(test_heat_extremes);
+    RUN_FULL(test_heat_extremes);
     RUN(test_heat_glass);
     RUN(test_heat_not_converged);
     RUN_ONCE(test_heat_poured);
     RUN_ONCE(test_heat_uneven_steps);
-    RUN_ONCE(test_heat_draws);
+    RUN_FULL(test_heat_draws);
     RUN_ONCE(test_heat_partitioned);
     run_solid();
     run_errors();
@@ -113,14 +122,14 @@ int main(int count, char **values)
     RUN_FULL(test_stability_of_blades);
     RUN_ONCE(test_stability_of_two_densities);
     RUN_ONCE(test_extremes);
-    RUN_ONCE(test_short_decay);
+    RUN_FULL(test_short_decay);
     RUN(test_tiny_step);
     RUN(test_thickening);
     RUN(test_thickening_within_a_step);
     RUN(test_nozzle_from_outside);
     run_density();
     run_volume();
-    RUN_ONCE(test_order_as_printed);
+    RUN_FULL(test_order_as_printed);
     RUN(test_order_in_time);
     return test_finish();
 }

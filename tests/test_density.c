@@ -547,6 +547,6 @@ static void run_density(void)
     RUN(test_density_range);
     RUN_FULL(test_density_piston);
     RUN_FULL(test_density_rest);
-    RUN_ONCE(test_density_drops);
+    RUN_FULL(test_density_drops);
     RUN_SLOW(test_density_far_apart);
 }

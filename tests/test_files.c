@@ -1696,7 +1696,7 @@ static void run_files(void)
     RUN_ONCE(test_files_forged_order);
     RUN_ONCE(test_files_forged_anywhere);
     RUN(test_files_endless);
-    RUN_ONCE(test_files_other_desc);
+    RUN_FULL(test_files_other_desc);
     RUN(test_files_other_integrator);
     RUN(test_files_padding);
     RUN_ONCE(test_files_other_scene);

@@ -111,7 +111,7 @@ static void test_partitioned_rest(void)
     static const double rest[4] = { 0, 0.25, 0.5, 0.8 };
     const double limit = sizeof(gs4_real) == 8 ? 1e-9 : 1e-5;
     int n;
-    for (n = 0; n < 24; n += test_slow ? 1 : test_full ? 5 : 11) {
+    for (n = 0; n < 24; n += test_slow ? 1 : test_full ? 5 : 13) {
         const int a = n / 8, down = n & 1, which = n / 2 % 4, cells = 8;
         const double H = (5 + rest[which]) / cells;
         gs4_sim_desc d = partitioned_cube(cells);

@@ -999,7 +999,7 @@ static void run_poisson(void)
     RUN_ONCE(test_poisson_iterations);
     RUN_ONCE(test_poisson_faces);
     RUN(test_poisson_maze);
-    RUN_ONCE(test_poisson_shapes);
+    RUN_FULL(test_poisson_shapes);
     RUN(test_poisson_few_unknowns);
     RUN(test_poisson_order);
     RUN(test_poisson_guess_and_units);
@@ -1009,7 +1009,7 @@ static void run_poisson(void)
     RUN_ONCE(test_poisson_reuse);
     RUN(test_poisson_diagonal);
     RUN(test_poisson_limit);
-    RUN_ONCE(test_poisson_bad_guess);
+    RUN_FULL(test_poisson_bad_guess);
     RUN(test_poisson_contrast);
     RUN(test_poisson_breakdown);
     RUN(test_poisson_arguments);

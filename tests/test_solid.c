@@ -1045,8 +1045,8 @@ static void run_solid(void)
     RUN(test_solid_order_of_a_point);
     RUN(test_solid_turns);
     RUN_FULL(test_solid_waves);
-    RUN(test_solid_order);
-    RUN_ONCE(test_solid_spin);
+    RUN_FULL(test_solid_order);
+    RUN_FULL(test_solid_spin);
     RUN_FULL(test_solid_bounce);
     RUN_FULL(test_solid_ring);
     RUN_FULL(test_solid_yield);
@@ -1055,5 +1055,5 @@ static void run_solid(void)
     RUN_ONCE(test_solid_state);
     RUN(test_solid_is_paid_for_where_it_is);
     RUN_ONCE(test_solid_memory);
-    RUN_ONCE(test_solid_stability);
+    RUN_FULL(test_solid_stability);
 }

@@ -667,9 +667,9 @@ static void run_yield(void)
     RUN(test_yield_powers);
     RUN(test_yield_law);
     RUN(test_yield_lanes);
-    RUN_ONCE(test_yield_axes);
+    RUN_FULL(test_yield_axes);
     RUN(test_yield_newtonian);
-    RUN_ONCE(test_yield_stands);
+    RUN_FULL(test_yield_stands);
     RUN_FULL(test_yield_regularised);
     RUN_FULL(test_yield_channel);
     RUN_FULL(test_yield_slump);

@@ -302,7 +302,7 @@ static void test_drop_draws_back(void)
     static const double reference[2][2] = { { 2.16, 1.71899 }, { 3.36, 1.46163 } };
     gs4_material m = viscoelastic_liquid(4, 0.1, 0.02, 20);
     m.density = 1000;
-    physics_drop_widths(&m, reference, 2, 0.035);
+    physics_drop_widths(&m, 20, reference, 2, 0.035);
 }
 
 /* Start-up of plane Couette flow of Oldroyd-B between a wall and a body that moves, 1 apart,

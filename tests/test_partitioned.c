@@ -519,17 +519,19 @@ static void test_partitioned_order(void)
 
 /* --- a column that collapses ------------------------------------------------------------------ */
 
-/* Martin & Moyce 1952, table 2, n^2 = 2, a = 2.25 in: n t sqrt(g/a), front over a. Their time
- * begins where the gate is away: it is fitted, from the first point on. */
-static void test_partitioned_dam(void)
+/* Martin & Moyce 1952, a = 2.25 in, columns n^2 a high, n^2 = 1 and 2: n t sqrt(g/a), where the
+ * front over a is. Their time begins where the gate is away: what it is off is fitted. Theirs then
+ * is 13 % slower from the first place to the last for n^2 = 1, 4 % faster for 2. */
+static void partitioned_dam(int square)
 {
-    static const double T[5] = { 1.43, 1.83, 2.2, 2.51, 2.83 },
+    static const double T[2][5] = { { 0.97, 1.29, 1.62, 1.93, 2.24 },
+                                    { 1.43, 1.83, 2.2, 2.51, 2.83 } },
                         Z[5] = { 1.67, 2.11, 2.56, 3, 3.44 };
     const int n = test_full ? 16 : 8;
     gs4_sim_desc d = partitioned_cube(n);
     const gs4_material m = partitioned_liquid(0);
     gs4_fill f = scene_fill(at(0, 0, 0));
-    double energy, shift = 0, time = 0, before = 1, most = 0;
+    double energy, there[5] = { 0 }, shift = 0, time = 0, before = 1, most = 0;
     gs4_sim *sim;
     int k = 0, i;
     d.cells[0] = 5 * n;
@@ -538,9 +540,9 @@ static void test_partitioned_dam(void)
     d.gravity = at(0, -1, 0);
     CHECK_RESULT(NULL, gs4_create(&d, &sim), GS4_OK);
     f.material = gs4_add_material(sim, &m);
-    gs4_add_particles(sim, gs4_box(at(-1, -1, -1), at(1, 2, 2)), &f);
-    energy = gs4_get_stats(sim).mass;
-    while (k < 5 && time < 2.4) {
+    gs4_add_particles(sim, gs4_box(at(-1, -1, -1), at(1, square, 2)), &f);
+    energy = gs4_get_stats(sim).mass * 0.5 * square;
+    while (k < 5 && time < 3) {
         const double step = 0.02;
         double front = 0, total;
         gs4_view x;
@@ -553,18 +555,30 @@ static void test_partitioned_dam(void)
         total = total * gs4_get_stats(sim).mass / x.count + gs4_get_stats(sim).kinetic_energy;
         most = fmax(most, total / energy);
         if (front >= Z[k]) {
-            const double there = sqrt(2.0) * (time + step * (Z[k] - before) / (front - before));
-            if (k == 0) shift = T[0] - there;
-            CHECK_CLOSE((there + shift) / T[k], 1, 0.06);
+            there[k] = sqrt(square) * (time + step * (Z[k] - before) / (front - before));
+            shift += (T[square - 1][k] - there[k]) / 5;
             k++;
         }
         before = front;
         time += step;
     }
     CHECK(k == 5);
-    CHECK_BETWEEN(shift, 0, 0.4);
+    for (k = 0; k < 5; k++) {
+        if (test_filter[0])
+            printf("n^2 %d, front %.2f at %.3f, measured %.3f\n", square, Z[k], there[k] + shift,
+                   T[square - 1][k]);
+        CHECK_CLOSE((there[k] + shift) / T[square - 1][k], 1, 0.06);
+    }
+    if (test_filter[0]) printf("    shift %.3f, energy at most %.5f\n", shift, most);
+    CHECK_BETWEEN(shift, -0.1, 0.4);
     CHECK_BETWEEN(most, 0.999, 1.005);
     gs4_destroy(sim);
+}
+
+static void test_partitioned_dam(void)
+{
+    partitioned_dam(1);
+    partitioned_dam(2);
 }
 
 /* --- any bulk modulus ------------------------------------------------------------------------- */

@@ -14632,23 +14632,30 @@ static void gs4i_mirror_plane(int index, void *context)
     const gs4i_box *box = &f->box;
     const int place = pass->place, side = pass->side;
     const int a = side / 2, b = a == 0 ? 1 : 0, c = 3 - a - b;
+    const int separates = pass->sim->desc.walls[side] == GS4_WALL_SEPARATE;
+    const size_t step = b ? (size_t)gs4i_box_length(box, place, 0) : 1;
     int m, behind, image, at[3];
     gs4i_face_mirror one;
     one.is_normal = place == 1 << a && !box->periodic[a];
     one.bytes = pass->bytes;
     one.parity = place ? gs4i_wall_parity(pass->sim, place >> 1, side) : GS4I_C(1);
     at[c] = index;
-    for (m = 1; m <= 4 && gs4i_mirror_planes(f, place, side, m, &behind, &image); m++)
-        for (at[b] = 0; at[b] < gs4i_box_length(box, place, b); at[b]++) {
-            at[a] = behind;
-            one.behind = gs4i_box_index(box, place, at[0], at[1], at[2]);
-            at[a] = image;
-            one.image = gs4i_box_index(box, place, at[0], at[1], at[2]);
-            at[a] = side & 1 ? f->to[a] : f->from[a];
-            one.wall = one.is_normal ? gs4i_box_index(box, place, at[0], at[1], at[2]) : 0;
-            one.holds = gs4i_wall_holds(pass->sim, side, place, at);
+    for (m = 1; m <= 4 && gs4i_mirror_planes(f, place, side, m, &behind, &image); m++) {
+        at[b] = 0;
+        at[a] = behind;
+        one.behind = gs4i_box_index(box, place, at[0], at[1], at[2]);
+        at[a] = image;
+        one.image = gs4i_box_index(box, place, at[0], at[1], at[2]);
+        at[a] = side & 1 ? f->to[a] : f->from[a];
+        one.wall = one.is_normal ? gs4i_box_index(box, place, at[0], at[1], at[2]) : 0;
+        for (; at[b] < gs4i_box_length(box, place, b); at[b]++) {
+            one.holds = !separates || gs4i_wall_holds(pass->sim, side, place, at);
             pass->fn(pass->field, &one);
+            one.behind += step;
+            one.image += step;
+            one.wall += step;
         }
+    }
 }
 
 static void gs4i_mirror_side(gs4i_mirror_pass *pass)
@@ -15647,18 +15654,39 @@ GS4I_INLINE void gs4i_extrapolate_face(const gs4i_staggered_pass *pass, int c, c
     f->known[c][i] = (uint8_t)pass->layer;
 }
 
+/* Is any face of axis c known in row (y, z), or in the rows beside it? */
+static int gs4i_is_known_near(const gs4i_staggered *f, int c, int y, int z)
+{
+    const int nx = gs4i_box_length(&f->box, 1 << c, 0);
+    int side, x, any = 0;
+    for (side = 0; side < 5; side++) {
+        const int b = y + (side == 1) - (side == 2), d = z + (side == 3) - (side == 4);
+        const uint8_t *known;
+        if (b < 0 || b >= gs4i_box_length(&f->box, 1 << c, 1)) continue;
+        if (d < 0 || d >= gs4i_box_length(&f->box, 1 << c, 2)) continue;
+        known = f->known[c] + gs4i_box_index(&f->box, 1 << c, 0, b, d);
+        for (x = 0; x < nx; x++) any |= known[x];
+    }
+    return any;
+}
+
 static void gs4i_extrapolate_layer(int z, void *context)
 {
     const gs4i_staggered_pass *pass = (const gs4i_staggered_pass *)context;
     const gs4i_staggered *f = &pass->sim->staggered;
     int c, at[3];
-    size_t i;
     for (c = 0; c < 3; c++) {
         const ptrdiff_t nx = gs4i_box_length(&f->box, 1 << c, 0),
                         step[3] = { 1, nx, nx * gs4i_box_length(&f->box, 1 << c, 1) };
-        GS4I_EACH_FACE(f, c, z, at, i)
-            if (!f->known[c][i] && gs4i_face_place(f, c, at))
-                gs4i_extrapolate_face(pass, c, at, step, i);
+        at[2] = z;
+        if (z < f->from[2] || z >= f->to[2] + (c == 2)) continue;
+        for (at[1] = f->from[1]; at[1] < f->to[1] + (c == 1); at[1]++) {
+            const size_t row = gs4i_box_index(&f->box, 1 << c, 0, at[1], z);
+            if (!gs4i_is_known_near(f, c, at[1], z)) continue;
+            for (at[0] = f->from[0]; at[0] < f->to[0] + (c == 0); at[0]++)
+                if (!f->known[c][row + (size_t)at[0]])
+                    gs4i_extrapolate_face(pass, c, at, step, row + (size_t)at[0]);
+        }
     }
 }
 
@@ -15761,22 +15789,75 @@ static void gs4i_take_pressure(gs4_sim *sim)
 
 /* --- S4, S5 ----------------------------------------------------------------------------------- */
 
-/* Slopes of the first number of the faces of each axis, four numbers a particle: its gradient L. */
-GS4I_INLINE void gs4i_gather_slopes(gs4i_face_tile tile[3], const gs4i_stencils s[4], int n,
+/* One number a face, of a tile of such. A row of four is loaded where three count. */
+typedef gs4_real gs4i_number_tile[GS4I_TILE * GS4I_TILE * GS4I_TILE + 4];
+
+/* The velocity of faces of axis c. */
+static void gs4i_load_velocity_tile(const gs4_sim *sim, int o, int c, gs4_real *tile)
+{
+    const gs4i_staggered *f = &sim->staggered;
+    const uint64_t rows = sim->reports[o].rows;
+    int first[3], row, x;
+    gs4i_block_origin(&sim->grid, sim->grid.occupied_block[o], first);
+    memset(tile, 0, sizeof(gs4i_number_tile));
+    for (row = 0; row < 64; row++) {
+        const gs4_real *from;
+        if (!(rows >> row & 1)) continue;
+        from = f->given[c] + 4 * gs4i_face_row(f, first, 1 << c, row) + GS4I_FACE_VELOCITY;
+        for (x = 0; x < GS4I_TILE; x++) tile[GS4I_TILE * row + x] = from[4 * x];
+    }
+}
+
+/* sum_i v_i grad w_i of particle n. */
+GS4I_INLINE void gs4i_gather_slope(const gs4_real *tile, const gs4i_stencils *s, int n,
+                                   gs4_real *dx, gs4_real *dy, gs4_real *dz)
+{
+    gs4_real plain[4], y[4], z[4];
+    gs4i_quad sum, sum_y, sum_z, row, slope, r;
+    int j, k;
+    tile += s->base[n];
+    for (k = 0; k < 3; k++) {
+        for (j = 0; j < 3; j++) {
+            GS4I_LOAD(r, tile + GS4I_TILE * (GS4I_TILE * k + j));
+            if (j == 0) {
+                GS4I_SPLAT_MUL(row, GS4I_NTH_CONST(s->w[1][0], n), r);
+                GS4I_SPLAT_MUL(slope, GS4I_NTH_CONST(s->d[1][0], n), r);
+            } else {
+                GS4I_SPLAT_MAD(row, GS4I_NTH_CONST(s->w[1][j], n), r);
+                GS4I_SPLAT_MAD(slope, GS4I_NTH_CONST(s->d[1][j], n), r);
+            }
+        }
+        if (k == 0) {
+            GS4I_SPLAT_MUL(sum, GS4I_NTH_CONST(s->w[2][0], n), row);
+            GS4I_SPLAT_MUL(sum_y, GS4I_NTH_CONST(s->w[2][0], n), slope);
+            GS4I_SPLAT_MUL(sum_z, GS4I_NTH_CONST(s->d[2][0], n), row);
+        } else {
+            GS4I_SPLAT_MAD(sum, GS4I_NTH_CONST(s->w[2][k], n), row);
+            GS4I_SPLAT_MAD(sum_y, GS4I_NTH_CONST(s->w[2][k], n), slope);
+            GS4I_SPLAT_MAD(sum_z, GS4I_NTH_CONST(s->d[2][k], n), row);
+        }
+    }
+    GS4I_STORE(plain, sum);
+    GS4I_STORE(y, sum_y);
+    GS4I_STORE(z, sum_z);
+    *dx = *dy = *dz = 0;
+    for (j = 0; j < 3; j++) {
+        *dx += GS4I_NTH_CONST(s->d[0][j], n) * plain[j];
+        *dy += GS4I_NTH_CONST(s->w[0][j], n) * y[j];
+        *dz += GS4I_NTH_CONST(s->w[0][j], n) * z[j];
+    }
+}
+
+/* Slopes of velocity, four numbers a particle: its gradient L. */
+GS4I_INLINE void gs4i_gather_slopes(gs4i_number_tile tile[3], const gs4i_stencils s[4], int n,
                                     gs4i_gathered *slope)
 {
-    gs4i_gathered g;
     int b, c;
     memset(slope, 0, sizeof *slope);
     for (b = 0; b < n; b++)
-        for (c = 0; c < 3; c++) {
-            gs4i_row x, d;
-            gs4i_x_weights(&s[1 + c], b, &x, &d);
-            gs4i_gather_local(tile[c] + 4 * s[1 + c].base[b], &s[1 + c], b, &x, &d, &g);
-            slope->dx[4 * b + c] = g.dx[4 * b];
-            slope->dy[4 * b + c] = g.dy[4 * b];
-            slope->dz[4 * b + c] = g.dz[4 * b];
-        }
+        for (c = 0; c < 3; c++)
+            gs4i_gather_slope(tile[c], &s[1 + c], b, &slope->dx[4 * b + c], &slope->dy[4 * b + c],
+                              &slope->dz[4 * b + c]);
 }
 
 /* These for the next step, and the last ones beside them: the same, where there is none. */
@@ -15834,12 +15915,11 @@ static void gs4i_scatter_stress(int index, void *context)
     const int o = pass->blocks[index];
     const gs4i_frame frame = gs4i_tile_frame(&sim->grid, sim->grid.occupied_block[o]);
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
-    gs4i_face_tile given[3];
-    gs4_real force[3][GS4I_TILE * GS4I_TILE * GS4I_TILE + 4];
+    gs4i_number_tile velocity[3], force[3];
     gs4i_response r;
     int c, a;
     gs4i_begin_response(&r, sim, &p, &sim->integrator, &sim->reports[o], heat);
-    for (c = 0; c < 3; c++) gs4i_load_face_tile(sim, o, 1 << c, f->given[c], given[c]);
+    for (c = 0; c < 3; c++) gs4i_load_velocity_tile(sim, o, c, velocity[c]);
     memset(force, 0, sizeof force);
     if (heat) gs4i_clear_heat_tiles(heat);
     for (; i < end; i += GS4I_BATCH) {
@@ -15852,7 +15932,7 @@ static void gs4i_scatter_stress(int index, void *context)
         gs4i_lanes J, mu;
         int b;
         gs4i_stage_faces(sim, &frame, i, n, &q, s);
-        gs4i_gather_slopes(given, s, n, &slope);
+        gs4i_gather_slopes(velocity, s, n, &slope);
         gs4i_gradient_lanes(slope.dx, slope.dy, slope.dz, n, L);
         GS4I_BATCH_LOOP(b) J[b] = q.v[3][b] + sim->integrator.before * q.a[3][b];
         gs4i_turn_to_batch(&r, i, n);
@@ -15882,21 +15962,20 @@ static void gs4i_find_affine_task(int index, void *context)
 {
     const gs4i_pass *pass = (const gs4i_pass *)context;
     gs4_sim *sim = pass->sim;
-    const gs4i_staggered *f = &sim->staggered;
     const gs4i_particles p = sim->particles;
     const int o = pass->blocks[index];
     const gs4i_frame frame = gs4i_tile_frame(&sim->grid, sim->grid.occupied_block[o]);
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
-    gs4i_face_tile given[3];
+    gs4i_number_tile velocity[3];
     int b, c;
-    for (c = 0; c < 3; c++) gs4i_load_face_tile(sim, o, 1 << c, f->given[c], given[c]);
+    for (c = 0; c < 3; c++) gs4i_load_velocity_tile(sim, o, c, velocity[c]);
     for (; i < end; i += GS4I_BATCH) {
         const int n = gs4i_batch_size(i, end);
         gs4i_batch q;
         gs4i_stencils s[4];
         gs4i_gathered slope;
         gs4i_stage_faces(sim, &frame, i, n, &q, s);
-        gs4i_gather_slopes(given, s, n, &slope);
+        gs4i_gather_slopes(velocity, s, n, &slope);
         for (b = 0; b < n; b++) slope.dx[4 * b + 3] = p.affine[0][4 * (i + (size_t)b) + 3];
         gs4i_store_affine(&p, i, n, &slope, 1);
     }

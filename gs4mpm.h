@@ -14896,15 +14896,6 @@ typedef struct gs4i_staggered_pass {
     if ((z) < gs4i_box_length(&(f)->box, 1 << (c), 2)) \
         GS4I_BOX_PLANE(&(f)->box, 1 << (c), z, at, i)
 
-/* Is face `at` of axis c within the domain or on a wall of it? 2: on the wall. */
-static int gs4i_face_place(const gs4i_staggered *f, int c, const int at[3])
-{
-    int a;
-    for (a = 0; a < 3; a++)
-        if (at[a] < f->from[a] || at[a] >= f->to[a] + (a == c)) return 0;
-    return at[c] == f->from[c] || at[c] == f->to[c] ? 2 : 1;
-}
-
 /* v_i, P a and the density of the material, of one plane. */
 static void gs4i_face_velocities(int z, void *context)
 {

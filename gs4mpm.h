@@ -312,7 +312,10 @@
  * Coulomb friction, which brings what it can hold to rest in one to two steps). What a collider
  * takes from a node at once is a jump: it goes to the velocities of particles, not into their
  * rates. Near sticky ones, without solids and with a finite flip_decay_time, it takes none farther
- * than to V. A particle that ends inside a collider or behind a wall is put back on the surface.
+ * than to V. Before sticky ones that move, k_n of NOISE is c0/h more, or 500 |v|/h if that is less,
+ * v their velocity, within a cell, and none from three on: else particles went at up to 1.7 |v|
+ * (tests: contact_pairs). A particle that ends inside a collider or behind a wall is put back on
+ * the surface.
  * Where the grid sees little of a particle its sub-grid velocity decays at the rate c0/h: at a wall
  * by the weight of mirror nodes, at a sticky collider by that of nodes inside or held, and in spray
  * that fills nodes by less than 20 %.
@@ -11861,10 +11864,23 @@ GS4I_INLINE int gs4i_is_clear(gs4_real d, gs4_real h)
     return gs4i_is_outside(d, GS4I_C(0.75), h);
 }
 
-/* Three numbers of each node of a patch. Its distance d, such that sum w d is that of particles:
+/* The rate, 1/s, at which sub-grid velocity decays at p, d from a sticky body: c0/h, or 500 |v|/h
+ * (chosen) where that is less, v the body's velocity, within a cell of it, less up to three.
+ * A body that moves makes noise as it crosses nodes, by pressure, that is at c0: particles went at
+ * up to 1.7 of its speed, now 1.17. None at bodies at rest: where the layer at a wall is thinner
+ * than a cell this would mix it (in a pipe energy of a spin fell to .38, not to .51). */
+static gs4_real gs4i_near_decay(const gs4_sim *sim, const gs4i_collider *b, gs4_vec3 p, gs4_real d)
+{
+    const gs4_real inv_h = sim->grid.inv_h,
+                   speed = GS4I_C(500) * gs4i_length(gs4i_collider_velocity(b, p)) * inv_h,
+                   near = gs4i_max(gs4i_min((GS4I_IMAGE_REACH - d * inv_h) * GS4I_C(0.5), 1), 0);
+    return near * gs4i_min(speed, sim->integrator.fast_decay);
+}
+
+/* Four numbers of each node of a patch. Its distance d, such that sum w d is that of particles:
  * less a share of its second differences, as sum w d is d + h^2 lap d/8 else. How far the point as
  * deep behind the surface as images matter is from being as deep in the body. lap d (1/m), the
- * curvature. */
+ * curvature. The rate of gs4i_near_decay. */
 static void gs4i_sample_patch(int index, void *context)
 {
     const gs4_sim *sim = ((const gs4i_pass *)context)->sim;
@@ -11886,13 +11902,13 @@ static void gs4i_sample_patch(int index, void *context)
         to[4 * i] = *at - lap * GS4I_C(0.125);
         to[4 * i + 1] = h;
         to[4 * i + 2] = lap * sim->grid.inv_h * sim->grid.inv_h;
-        to[4 * i + 3] = 0;
+        gs4i_node_coordinates(first, i, x);
+        p = gs4i_place_position(&sim->grid, x, GS4I_AT_CELL);
+        to[4 * i + 3] = gs4i_near_decay(sim, b, p, *at);
         /* what particles see that may have images */
         if (!(*at > -2 * GS4I_NODES_REACH * h && *at < (GS4I_IMAGE_REACH + GS4I_NODES_REACH) * h
               && length > 0))
             continue;
-        gs4i_node_coordinates(first, i, x);
-        p = gs4i_place_position(&sim->grid, x, GS4I_AT_CELL);
         n = gs4i_scale(g, 1 / length);
         to[4 * i + 1] = gs4i_collider_distance(b, gs4i_sub(p, gs4i_scale(n, *at + deep))) + deep;
     }
@@ -12057,16 +12073,61 @@ static int gs4i_sample_patches(gs4_sim *sim)
     return sim->bad_distance ? GS4_OK : gs4i_keep_patches(sim);
 }
 
-/* Is a sticky body within three cells of what particles of occupied block o see? Not in scenes with
- * solids: what slides on one keeps its velocity. */
+/* Is a sticky body within three cells of what particles of occupied block o see? */
+static int gs4i_sticks_by(const gs4_sim *sim, int collider, int o)
+{
+    return gs4i_is_sticky(&sim->boundary.colliders[collider])
+           && gs4i_surface_of(sim, collider, o)->nearest < GS4I_IMAGE_REACH * sim->grid.h;
+}
+
+/* Is any? Not in scenes with solids: what slides on one keeps its velocity. */
 static int gs4i_sticks_near(const gs4_sim *sim, int o)
 {
     int i;
     for (i = 0; i < sim->boundary.collider_count && !sim->particles.deformation_reals; i++)
-        if (gs4i_is_sticky(&sim->boundary.colliders[i])
-            && gs4i_surface_of(sim, i, o)->nearest < GS4I_IMAGE_REACH * sim->grid.h)
-            return 1;
+        if (gs4i_sticks_by(sim, i, o)) return 1;
     return 0;
+}
+
+/* Rates of gs4i_near_decay by one body, of the nodes in a row of the tile of occupied block o: the
+ * greater of them and of what the fourth numbers of the row are. */
+static void gs4i_add_near_decay(const gs4_sim *sim, int collider, int o, int row, gs4_real *tile)
+{
+    const gs4i_surface *surface = gs4i_surface_of(sim, collider, o);
+    const gs4_real *nodes = (const gs4_real *)sim->image_particles.patches.nodes.data;
+    const int y = (row & 7) + 2, z = (row >> 3) + 2;
+    const int32_t *slots = sim->grid.neighbour + 27 * o + 3 * (3 * (z >> 2) + (y >> 2));
+    int x, patch[3];
+    for (x = 0; x < 3; x++) patch[x] = gs4i_patch_of(sim, collider, slots[x]);
+    for (x = 2; x < GS4I_TILE + 2; x++, tile += 4) {
+        gs4_real rate = 0;
+        if (surface->kind == GS4I_SURFACE_FLAT) {
+            const gs4_vec3 from = gs4i_scale(
+                gs4i_vec3(GS4I_C(x - 5.5), GS4I_C(y - 5.5), GS4I_C(z - 5.5)), sim->grid.h);
+            rate = gs4i_near_decay(sim, &sim->boundary.colliders[collider],
+                                   gs4i_add(surface->at, from),
+                                   surface->d + gs4i_dot(surface->n, from));
+        } else if (patch[x >> 2] >= 0) {
+            rate =
+                nodes[(ptrdiff_t)patch[x >> 2] * GS4I_NODE_REALS + 4 * gs4i_place_of(x, y, z) + 3];
+        }
+        tile[3] = gs4i_max(tile[3], rate);
+    }
+}
+
+/* Let the fourth numbers in rows of a tile of occupied block o be rates of gs4i_near_decay. Returns
+ * whether there may be any. */
+static int gs4i_load_near_decay(const gs4_sim *sim, int o, uint64_t rows, gs4_real *tile)
+{
+    int sticks = 0, row, i;
+    for (i = 0; i < sim->boundary.collider_count; i++) {
+        if (!gs4i_is_moving(&sim->boundary.colliders[i]) || !gs4i_sticks_by(sim, i, o)) continue;
+        for (row = 0; row < GS4I_TILE_REALS && !sticks; row += 4) tile[row + 3] = 0;
+        sticks = 1;
+        for (row = 0; row < GS4I_TILE * GS4I_TILE; row++)
+            if (rows >> row & 1) gs4i_add_near_decay(sim, i, o, row, tile + 4 * GS4I_TILE * row);
+    }
+    return sticks;
 }
 
 /* Nodes of the tile of occupied block o which say of every particle that they are nearest to that
@@ -13368,32 +13429,37 @@ GS4I_INLINE void gs4i_prefetch_subgrid(const gs4i_particles *p, size_t i)
         GS4I_PREFETCH(p->subgrid + 4 * i + b);
 }
 
-/* V - v~ of n particles, V = sum w v_i; and, where noise decays by itself, how much faster. */
-GS4I_INLINE void gs4i_subgrid_of(const gs4i_integrator *r, const gs4i_batch *q,
+/* V - v~ of n particles, V = sum w v_i; and, where noise decays by itself, how much faster: with
+ * `sticks` by what is beside V more. */
+GS4I_INLINE void gs4i_subgrid_of(const gs4i_integrator *r, const gs4i_batch *q, int sticks,
                                  gs4i_lanes subgrid[4])
 {
+    gs4i_lanes noise;
     int b, c;
     for (c = 0; c < 3; c++)
         GS4I_BATCH_LOOP(b) subgrid[c][b] -= q->v[c][b] + r->prediction.ahead * q->a[c][b];
-    memset(subgrid[3], 0, sizeof subgrid[3]);
+    memset(noise, 0, sizeof noise);
     if (r->crossing > 0) {
         for (c = 0; c < 3; c++)
-            GS4I_BATCH_LOOP(b) subgrid[3][b] += subgrid[c][b] * subgrid[c][b];
+            GS4I_BATCH_LOOP(b) noise[b] += subgrid[c][b] * subgrid[c][b];
         for (b = 0; b < GS4I_BATCH; b++)
-            GS4I_NTH(subgrid[3], b) = r->crossing * GS4I_SQRT(GS4I_NTH(subgrid[3], b));
-        GS4I_BATCH_LOOP(b) gs4i_faster(r, r->decay, r->stable_decay, &subgrid[3][b]);
+            GS4I_NTH(noise, b) = r->crossing * GS4I_SQRT(GS4I_NTH(noise, b));
+        if (sticks)
+            GS4I_BATCH_LOOP(b) noise[b] += subgrid[3][b];
+        GS4I_BATCH_LOOP(b) gs4i_faster(r, r->decay, r->stable_decay, &noise[b]);
     }
+    memcpy(subgrid[3], noise, sizeof noise);
 }
 
 /* V - v~ of n particles, of which V = sum w v_i was gathered. Their momenta sum up to none. Fourth
  * number: how much faster than others they decay as noise, |V - v~|/h (1/s). */
 GS4I_INLINE void gs4i_find_subgrid(const gs4i_particles *p, size_t i, int n,
-                                   const gs4i_integrator *r, const gs4i_batch *q, const gs4_real *V,
-                                   gs4i_lanes subgrid[4])
+                                   const gs4i_integrator *r, const gs4i_batch *q, int sticks,
+                                   const gs4_real *V, gs4i_lanes subgrid[4])
 {
     gs4_real out[4 * GS4I_BATCH];
     gs4i_to_lanes(V, n, subgrid);
-    gs4i_subgrid_of(r, q, subgrid);
+    gs4i_subgrid_of(r, q, sticks, subgrid);
     gs4i_from_lanes(subgrid[0], subgrid[1], subgrid[2], subgrid[3], out);
     gs4i_prefetch_subgrid(p, i + 4 * GS4I_BATCH);
     memcpy(p->subgrid + 4 * i, out, 4 * (size_t)n * sizeof *out);
@@ -13485,10 +13551,12 @@ static void gs4i_scatter_stage(int index, void *context)
     gs4i_response r;
     gs4_real nodes[GS4I_TILE_REALS], plain[GS4I_TILE_REALS], tile[GS4I_TILE_REALS];
     gs4i_near_particles near = gs4i_near_particles_of(sim, o);
-    int row = 0;
+    int row = 0, sticks;
     size_t i = (size_t)g->first[o], end = (size_t)g->first[o + 1];
     gs4i_tile_load(g, o, report->rows, gs4i_gradient_velocity(g), nodes);
     if (with_plain) gs4i_tile_load(g, o, report->rows, gs4i_velocity(g), plain);
+    sticks = integrator.crossing > 0
+             && gs4i_load_near_decay(sim, o, report->rows, with_plain ? plain : nodes);
     memset(tile, 0, sizeof tile);
     gs4i_begin_response(&r, sim, &p, &integrator, report, heat);
     if (heat) gs4i_clear_heat_tiles(heat);
@@ -13507,7 +13575,7 @@ static void gs4i_scatter_stage(int index, void *context)
         gs4i_gather_stage(nodes, with_plain ? plain : NULL, &s, n, &v);
         if (near.particle) gs4i_make_odd(&near, n, 0, &v, NULL);
         if (p.with_subgrid)
-            gs4i_find_subgrid(&p, i, n, &integrator, &q, v.value, subgrid);
+            gs4i_find_subgrid(&p, i, n, &integrator, &q, sticks, v.value, subgrid);
         else
             memset(subgrid, 0, sizeof subgrid);
         gs4i_gradient_lanes(v.dx, v.dy, v.dz, n, L);
@@ -16591,7 +16659,7 @@ static void gs4i_gather_from_faces(const gs4_sim *sim, const gs4i_taken_tiles *t
             slope->dz[4 * b + c] = g.dz[4 * b];
         }
     }
-    gs4i_subgrid_of(&sim->integrator, q, k->subgrid);
+    gs4i_subgrid_of(&sim->integrator, q, 0, k->subgrid);
     gs4i_gradient_lanes(slope->dx, slope->dy, slope->dz, n, k->L);
 }
 
@@ -22627,7 +22695,8 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  * flags a node; those written before cannot be read. The rim of a collider that turns counts in the
  * stable step and in default speeds of sound. Sticky colliders near each other hold nodes inside
  * of them alone; sub-grid velocity decays at the nodes that sticky colliders hold. They take
- * particles of liquids no farther than to the velocity that the grid sees. Distances of
+ * particles of liquids no farther than to the velocity that the grid sees, and where they move
+ * sub-grid velocity before them decays. Distances of
  * sticky colliders are asked for at nodes, of those at rest not every step.
  * Meshes: sampled where the domain meets them, at half a cell whatever their size, before coarser
  * where they were large. Parts that overlap are a union, before the overlap was empty. Parts inside

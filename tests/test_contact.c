@@ -1235,7 +1235,8 @@ static void contact_pair(int integrator, int motion, double thick, double gap, d
                  w = V / (sqrt(2.5 * 2.5 + 2 * 2) * h);
     static const double unit[3][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } };
     const int ball = thick >= 4;
-    const double rim = motion != CONTACT_TURNS ? 0.9 : ((ball ? 2 : 2.88) - 0.87) * w * h / V;
+    const double outer = (ball ? 2 : 2.88) - 0.87, sees = ball || gap > 1 ? 0 : 0.125 * (outer + 1),
+                 rim = motion != CONTACT_TURNS ? 0.9 : (outer - sees) * w * h / V;
     const gs4_material m = scene_liquid(1000, viscosity, 10);
     const gs4_fill fill = scene_fill(at(0, 0, 0));
     gs4_sim_desc d = contact_desc(integrator, GS4_WALL_SLIP);
@@ -1288,12 +1289,12 @@ static void contact_pair(int integrator, int motion, double thick, double gap, d
         printf("pair, integrator %d, motion %d, %g thick, gap %g, viscosity %g, wall %d: J %.3f to "
                "%.3f, speed %.3f\n",
                integrator, motion, thick, gap, viscosity, wall, low, high, fastest);
-    CHECK_BETWEEN(low, 0.95, 1);
-    CHECK_BETWEEN(high, 1, 1.05);
+    CHECK_BETWEEN(low, integrator ? 0.95 : 0.975, 1);
+    CHECK_BETWEEN(high, 1, integrator ? 1.05 : 1.015);
     /* What touches the plate goes as fast; of one that turns, nodes up to half the diagonal of a
-     * cell short of the rim, 2.88 cells out. GS4: with sub-grid velocity, which pressure gives to
-     * what is before it */
-    CHECK_BETWEEN(fastest, rim, (integrator ? ball ? 1.3 : 1.2 : 2) * squeeze);
+     * cell short of the rim, 2.88 cells out. A particle there sees of a weight of 3/4 that node, of
+     * 1/8 each those a cell farther in and out; in a gap of a cell what is out is at rest. */
+    CHECK_BETWEEN(fastest, rim, (integrator && ball ? 1.3 : 1.2) * squeeze);
     gs4_destroy(sim);
 }
 

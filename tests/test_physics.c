@@ -696,7 +696,7 @@ static double couette(double y, double t)
     return u;
 }
 
-/* Profile error (2-norm, but for the tenth next to the body, whose worst is *near) at time t, with
+/* Profile error (2-norm, of the tenth next to the body the worst as *near) at time t, with
  * n - gap cells between the wall and the surface of the body: a plane of nodes is 1/2 - gap of a
  * cell in front of that. *off: how many cells behind it the profile, taken for steady, reaches
  * u = 1. */
@@ -733,12 +733,12 @@ static double couette_error(int n, gs4_integrator integrator, double gap, double
         const double y = (double)x.data[(size_t)i * (size_t)x.stride + 1],
                      u = (double)v.data[(size_t)i * (size_t)v.stride];
         const double e = u - couette(y, t);
+        sum += e * e;
+        weight += 1;
         if (y > 0.9) {
             *near = fmax(*near, fabs(e));
             continue;
         }
-        sum += e * e;
-        weight += 1;
         yu += y * u;
         yy += y * y;
     }
@@ -749,9 +749,9 @@ static double couette_error(int n, gs4_integrator integrator, double gap, double
 
 /* Second order in space, with the surface at a plane of nodes and midway between two; a tenth of
  * a cell before one, where the filling leaves a gap that is no multiple of h, only the error is
- * held. In quick runs a plane of nodes for one integrator, midway for the other: a tenth of 16
- * cells is not far enough from the body. Next to it, which starts at once, GS4 keeps motion that
- * the grid does not see. */
+ * held. In quick runs a plane of nodes for one integrator, midway for the other. The body starts at
+ * once: without decay before it GS4 keeps motion there that the grid does not see, .1 at the worst
+ * and order .6. */
 static void test_couette(void)
 {
     static const double gaps[3] = { 0.01, 0.51, 0.4 }, times[2] = { 0.1, 0.4 };
@@ -770,9 +770,9 @@ static void test_couette(void)
                            "next to the body %.1e\n",
                            (int)physics_integrators[i], gaps[j], times[k], coarse, fine, order,
                            near);
-                CHECK(fine < (test_full ? 0.005 : 0.008));
-                if (j < 2) CHECK(near < 0.02);
-                if (j < 2) CHECK_BETWEEN(order, 1.84, 2.46);
+                CHECK(fine < (j == 2 ? 0.0065 : test_full ? 0.002 : 0.0025));
+                CHECK(near < (j == 2 ? 0.015 : 0.0025));
+                if (j < 2) CHECK_BETWEEN(order, 1.8, 2.25);
             }
 }
 

@@ -12131,8 +12131,8 @@ static int gs4i_load_near_decay(const gs4_sim *sim, int o, uint64_t rows, gs4_re
 }
 
 /* Nodes of the tile of occupied block o which say of every particle that they are nearest to that
- * it is outside of all sticky bodies: bit 8 y + x of each z. Returns NULL if there are no sticky
- * bodies. */
+ * it is outside of all sticky bodies: bit 8 y + x of each z. Returns NULL if none is within three
+ * cells of them: no particle gets there in a step. */
 static const uint64_t *gs4i_find_clear_nodes(const gs4_sim *sim, int o, uint64_t clear[GS4I_TILE])
 {
     const gs4i_patch *all = (const gs4i_patch *)sim->image_particles.patches.all.data;
@@ -12141,7 +12141,7 @@ static const uint64_t *gs4i_find_clear_nodes(const gs4_sim *sim, int o, uint64_t
     for (k = 0; k < sim->boundary.collider_count; k++) {
         const gs4i_surface *surface;
         uint64_t of[27];
-        if (!gs4i_is_sticky(&sim->boundary.colliders[k])) continue;
+        if (!gs4i_sticks_by(sim, k, o)) continue;
         any = 1;
         surface = gs4i_surface_of(sim, k, o);
         if (!(surface->nearest < GS4I_C(1.32) * sim->grid.h))

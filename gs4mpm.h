@@ -31,7 +31,7 @@
  *     }
  *
  * WHAT IT DOES NOT DO, YET. The semi-implicit scheme is declared and refused with a sentence; so
- * are, with the partitioned scheme, separating colliders.
+ * is, with the partitioned scheme, friction of separating colliders.
  * It has no surface tension, no two-way coupling to colliders, no domain beyond
  * 3992^3 cells.
  *
@@ -269,7 +269,10 @@
  * order; slippery ones close the share of a face that is inside. A separating wall holds what moves
  * into it or pressed on it in the last step; where the solve finds that it would have to pull, it
  * lets go, p is 0 on it, and what moves into it is held, at most three times a step, each a scatter
- * and a solve more. What is held by its impact alone has theta = 1/2, with finite K too.
+ * and a solve more. What is held by its impact alone has theta = 1/2, with finite K too. Separating
+ * colliders do the same at places of a cell each, as slippery ones where they hold; what they have
+ * let go of in a step they hold again only where that would enter by a twentieth of a cell. They
+ * have no friction yet.
  *
  * Symplectic Euler, the fast tier: one affine scatter with stress and one gather (MLS-MPM, APIC),
  * first order.
@@ -10993,6 +10996,11 @@ static int gs4i_is_sticky(const gs4i_collider *b)
     return b->is.contact == GS4_WALL_STICK && !b->is_emitter && !b->is_off;
 }
 
+static int gs4i_separates(const gs4i_collider *b)
+{
+    return b->is.contact == GS4_WALL_SEPARATE && !b->is_emitter && !b->is_off;
+}
+
 /* Is a sticky wall, or a sticky body other than `c`, within `reach` (m) of p? */
 static int gs4i_sticks_elsewhere(const gs4i_boundary *b, const gs4i_grid *g, const gs4i_collider *c,
                                  gs4_vec3 p, gs4_real reach)
@@ -14517,6 +14525,8 @@ static int gs4i_has_separating(const gs4_sim *sim)
 {
     int i, any = 0;
     for (i = 0; i < 6; i++) any |= sim->desc.walls[i] == GS4_WALL_SEPARATE;
+    for (i = 0; i < sim->boundary.collider_count; i++)
+        any |= gs4i_separates(&sim->boundary.colliders[i]);
     return any;
 }
 
@@ -15080,8 +15090,42 @@ static gs4_real gs4i_share_behind(gs4_real d)
 
 static gs4_real gs4i_axis_of(gs4_vec3 v, int c) { return c == 0 ? v.x : c == 1 ? v.y : v.z; }
 
+/* A body that separates holds or has let go at places of its surface: cells, of which each has this
+ * bit in `contact`, and another where it has let go in this step. With how far before the surface a
+ * place is (cells): surfaces lie on faces of cells, and on their centres, more often than a third
+ * of a cell from both. */
+#define GS4I_BODY_HOLDS 64
+#define GS4I_BODY_HAS_LET_GO 128
+#define GS4I_BEFORE_SURFACE 0.37
+
+/* The place of contact next to p, which is d (m) from the surface along the normal n. */
+static size_t gs4i_place_of_contact(const gs4i_staggered *f, const gs4i_grid *g, gs4_vec3 p,
+                                    gs4_real d, gs4_vec3 n)
+{
+    const gs4_vec3 q =
+        gs4i_sub(gs4i_sub(p, gs4i_scale(n, d - GS4I_C(GS4I_BEFORE_SURFACE) * g->h)), g->origin);
+    int at[3], a;
+    for (a = 0; a < 3; a++) {
+        const int x = (int)floor((double)(gs4i_axis_of(q, a) * g->inv_h)) - f->box.low[a];
+        at[a] = x < f->from[a] ? f->from[a] : x < f->to[a] ? x : f->to[a] - 1;
+    }
+    return gs4i_box_index(&f->box, GS4I_AT_CELL, at[0], at[1], at[2]);
+}
+
+/* Does a body act on what is at p, d (m) from its surface? One that separates where it holds; deep
+ * inside there is no place to ask. */
+static int gs4i_body_holds(const gs4i_staggered *f, const gs4i_grid *g, const gs4i_collider *b,
+                           gs4_vec3 p, gs4_real d)
+{
+    if (!gs4i_separates(b) || gs4i_abs(d) > 2 * g->h) return 1;
+    return (f->contact[gs4i_place_of_contact(f, g, p, d,
+                                             gs4i_collider_normal(b, p, GS4I_C(0.5) * g->h))]
+            & GS4I_BODY_HOLDS)
+           != 0;
+}
+
 /* One body at one face: sticky ones and emitters hold it where its centre is inside, slippery ones
- * close what is inside. */
+ * close what is inside, and so do separating ones where they hold. */
 static void gs4i_body_at_face(gs4i_staggered *f, const gs4i_grid *g, const gs4i_collider *b,
                               const int node[3], int c, size_t face)
 {
@@ -15094,6 +15138,11 @@ static void gs4i_body_at_face(gs4i_staggered *f, const gs4i_grid *g, const gs4i_
     else
         open = gs4i_open_share(b, centre, c, g->h);
     if (open >= f->open[c][face]) return;
+    if (gs4i_separates(b)) {
+        /* liquid ends less deep; what is between two sides stays closed */
+        const gs4_real d = gs4i_collider_distance(b, centre);
+        if (d > -GS4I_C(0.75) * g->h && !gs4i_body_holds(f, g, b, centre, d)) return;
+    }
     f->open[c][face] = open < GS4I_C(0.01) ? GS4I_C(0) : open;
     f->held[c][face] = b->is_emitter || gs4i_is_sticky(b);
     r = gs4i_sub(centre, gs4i_vec3(GS4I_C(b->at[0]), GS4I_C(b->at[1]), GS4I_C(b->at[2])));
@@ -15118,9 +15167,10 @@ static void gs4i_bodies_at_block(gs4_sim *sim, int slot)
             cell = gs4i_box_index(&f->box, GS4I_AT_CELL, at[0], at[1], at[2]);
             if (!b->is_emitter) {
                 const gs4_vec3 p = gs4i_place_position(g, x, GS4I_AT_CELL);
-                f->cell[4 * cell + GS4I_CELL_SOLID] =
-                    gs4i_max(f->cell[4 * cell + GS4I_CELL_SOLID],
-                             gs4i_share_behind(gs4i_collider_distance(b, p) * g->inv_h));
+                const gs4_real d = gs4i_collider_distance(b, p),
+                               share = gs4i_share_behind(d * g->inv_h);
+                gs4_real *solid = f->cell + 4 * cell + GS4I_CELL_SOLID;
+                if (share > *solid && gs4i_body_holds(f, g, b, p, d)) *solid = share;
             }
             for (c = 0; c < 3; c++)
                 gs4i_body_at_face(f, g, b, x, c,
@@ -15282,7 +15332,8 @@ static void gs4i_classify_face(const gs4_sim *sim, gs4i_staggered *f, int c, con
     kind_before = f->kind[before];
     if (f->open[c] && (kind == GS4_CELL_SOLID || kind_before == GS4_CELL_SOLID)) f->open[c][i] = 0;
     if ((kind != GS4_CELL_LIQUID && kind_before != GS4_CELL_LIQUID) || kind == GS4_CELL_SOLID
-        || kind_before == GS4_CELL_SOLID || (f->open[c] && !(f->open[c][i] > 0)))
+        || kind_before == GS4_CELL_SOLID
+        || (f->open[c] && !(f->open[c][i] > 0 && q[GS4I_FACE_DENSITY] > 0)))
         return;
     if (kind != kind_before)
         w = kind == GS4_CELL_LIQUID ? gs4i_surface_weight(f->cell[4 * cell], f->cell[4 * before])
@@ -15581,6 +15632,139 @@ static int gs4i_was_pressed(const gs4i_grid *g, const int x[3])
     return node >= 0 && (g->flags[node] & GS4I_WAS_PRESSED) != 0;
 }
 
+/* A cell near a body that separates: its place of contact, distance d (m) and normal. */
+typedef struct gs4i_contact_cell {
+    const gs4i_collider *body;
+    size_t cell, place;
+    int at[3], node[3];
+    gs4_vec3 p, n;
+    gs4_real d;
+} gs4i_contact_cell;
+
+typedef void (*gs4i_contact_fn)(gs4_sim *sim, const gs4i_contact_cell *k);
+
+/* Apply `fn` to all cells of the domain within some cells of the surface of a body that separates;
+ * in the order of bodies and slots. */
+static void gs4i_each_contact_cell(gs4_sim *sim, gs4_real cells, gs4i_contact_fn fn)
+{
+    const gs4i_staggered *f = &sim->staggered;
+    const gs4i_grid *g = &sim->grid;
+    gs4i_contact_cell k;
+    int n, slot, i, a, first[3];
+    for (n = 0; n < sim->boundary.collider_count; n++)
+        for (slot = 0; slot < g->active; slot++) {
+            k.body = &sim->boundary.colliders[n];
+            if (!gs4i_separates(k.body)
+                || gs4i_collider_distance(k.body, gs4i_block_centre(g, g->block[slot]))
+                       > (cells + GS4I_C(2.7)) * g->h)
+                continue;
+            gs4i_block_origin(g, g->block[slot], first);
+            for (i = 0; i < GS4I_BLOCK_NODES; i++) {
+                int outside = 0;
+                gs4i_node_coordinates(first, i, k.node);
+                for (a = 0; a < 3; a++) {
+                    k.at[a] = k.node[a] - f->box.low[a];
+                    outside |= k.at[a] < f->from[a] || k.at[a] >= f->to[a];
+                }
+                if (outside) continue;
+                k.p = gs4i_place_position(g, k.node, GS4I_AT_CELL);
+                k.d = gs4i_collider_distance(k.body, k.p);
+                if (gs4i_abs(k.d) > cells * g->h) continue;
+                k.n = gs4i_collider_normal(k.body, k.p, GS4I_C(0.5) * g->h);
+                k.cell = gs4i_box_index(&f->box, GS4I_AT_CELL, k.at[0], k.at[1], k.at[2]);
+                k.place = gs4i_place_of_contact(f, g, k.p, k.d, k.n);
+                fn(sim, &k);
+            }
+        }
+}
+
+/* A number that faces have, as a velocity: given, taken or seen. */
+typedef struct gs4i_face_motion {
+    gs4_real *const *field;
+    int reals, number;
+} gs4i_face_motion;
+
+/* Component c at a cell, the mean of those of its faces that have material; is there any? */
+static int gs4i_motion_at_cell(const gs4i_staggered *f, gs4i_face_motion m, int c, const int at[3],
+                               gs4_real *v)
+{
+    gs4_real sum = 0;
+    int side, p[3], n = 0;
+    memcpy(p, at, sizeof p);
+    for (side = 0; side < 2; side++) {
+        size_t i;
+        p[c] = at[c] + side;
+        i = gs4i_box_index(&f->box, 1 << c, p[0], p[1], p[2]);
+        if (!(f->given[c][4 * i + GS4I_FACE_MASS] > 0)) continue;
+        sum += m.field[c][(size_t)m.reals * i + (size_t)m.number];
+        n++;
+    }
+    *v = n ? sum / GS4I_C(n) : GS4I_C(0);
+    return n > 0;
+}
+
+/* How that changes with a cell along axis a; by the faces of the cell where that is its own. */
+static gs4_real gs4i_motion_slope(const gs4i_staggered *f, gs4i_face_motion m, int c, int a,
+                                  const int at[3])
+{
+    gs4_real end[2] = { 0, 0 }, here = 0;
+    int side, p[3], there[2];
+    memcpy(p, at, sizeof p);
+    gs4i_motion_at_cell(f, m, c, at, &here);
+    for (side = 0; side < 2; side++)
+        if (a == c) {
+            size_t i;
+            p[c] = at[c] + side;
+            i = gs4i_box_index(&f->box, 1 << c, p[0], p[1], p[2]);
+            there[side] = f->given[c][4 * i + GS4I_FACE_MASS] > 0;
+            end[side] = m.field[c][(size_t)m.reals * i + (size_t)m.number];
+        } else {
+            p[a] = gs4i_around(f, a, at[a] + 2 * side - 1);
+            there[side] =
+                p[a] >= 0 && p[a] < f->box.size[a] && gs4i_motion_at_cell(f, m, c, p, &end[side]);
+        }
+    if (a == c) return there[0] && there[1] ? end[1] - end[0] : GS4I_C(0);
+    if (there[0] && there[1]) return GS4I_C(0.5) * (end[1] - end[0]);
+    return there[1] ? end[1] - here : there[0] ? here - end[0] : GS4I_C(0);
+}
+
+/* How fast (m/s) a cell moves into the body; at its surface, `reach` (cells) from the cell: films
+ * that grow thinner move towards it and do not meet it. */
+static gs4_real gs4i_motion_into_body(const gs4i_staggered *f, const gs4i_contact_cell *k,
+                                      gs4i_face_motion m, gs4_real reach)
+{
+    const gs4_vec3 own = gs4i_collider_velocity(k->body, k->p);
+    gs4_real into = 0, v;
+    int c, a;
+    for (c = 0; c < 3; c++) {
+        const gs4_real n = gs4i_axis_of(k->n, c);
+        if (!gs4i_motion_at_cell(f, m, c, k->at, &v)) continue;
+        for (a = 0; a < 3 && reach != 0; a++)
+            v -= reach * gs4i_axis_of(k->n, a) * gs4i_motion_slope(f, m, c, a, k->at);
+        into -= n * (v - gs4i_axis_of(own, c));
+    }
+    return into;
+}
+
+static gs4_real gs4i_cells_to_surface(const gs4_sim *sim, const gs4i_contact_cell *k)
+{
+    return k->d * sim->grid.inv_h;
+}
+
+static void gs4i_guess_contact_of_cell(gs4_sim *sim, const gs4i_contact_cell *k)
+{
+    gs4i_staggered *f = &sim->staggered;
+    const gs4i_face_motion seen = { f->given, 4, GS4I_FACE_VELOCITY };
+    const gs4_real into = gs4i_motion_into_body(f, k, seen, gs4i_cells_to_surface(sim, k));
+    const gs4_real rounding =
+        sim->integrator.restart
+            ? 10 * GS4I_EPSILON * gs4i_length(gs4i_collider_velocity(k->body, k->p)) + GS4I_TINY
+            : GS4I_C(0);
+    if (f->cell[4 * k->cell + GS4I_CELL_FILL] > 0
+        && (into > -rounding || gs4i_was_pressed(&sim->grid, k->node)))
+        f->contact[k->place] |= GS4I_BODY_HOLDS;
+}
+
 /* What is likely in contact: where material moves into a wall or pressed on it; at first all. */
 static void gs4i_guess_contact(gs4_sim *sim)
 {
@@ -15633,6 +15817,120 @@ static int gs4i_should_hold(const gs4i_staggered *f, int side, const gs4i_wall_c
     return any;
 }
 
+/* What a body does to a liquid cell, for its place, where right-hand sides were, with weights where
+ * compliances were: how much the body pushes it, by the area of its surface there and the pressure
+ * on that, viscous stress included,
+ * p - d dp/dn, where the gradient is what changes its velocity; or how fast it moves into the body
+ * that has let go. As m/s. */
+static void gs4i_vote_of_liquid(gs4_sim *sim, const gs4i_contact_cell *k)
+{
+    gs4i_staggered *f = &sim->staggered;
+    const gs4i_integrator *r = &sim->integrator;
+    const gs4i_face_motion stage = { f->taken, 4, GS4I_FACE_STAGE };
+    const gs4_real reach = gs4i_cells_to_surface(sim, k);
+    gs4_real area = 0, change = 0, density = 0, weight, speed;
+    size_t face[6];
+    int c, side;
+    if (f->kind[k->cell] != GS4_CELL_LIQUID) return;
+    gs4i_box_faces_of(&f->box, k->at, face);
+    for (c = 0; c < 3; c++) {
+        const gs4_real n = gs4i_axis_of(k->n, c);
+        gs4_real sum = 0, faces = 0;
+        area += n * (f->open[c][face[2 * c + 1]] - f->open[c][face[2 * c]]);
+        for (side = 0; side < 2; side++) {
+            const size_t i = face[2 * c + side];
+            const gs4_real *q = f->given[c] + 4 * i, *t = f->taken[c] + 4 * i;
+            if (f->known[c][i] != GS4I_FACE_SOLVED) continue;
+            sum += t[GS4I_FACE_STAGE] - (q[GS4I_FACE_VELOCITY] + r->s * t[GS4I_FACE_ACCELERATION]);
+            density = gs4i_max(density, q[GS4I_FACE_DENSITY]);
+            faces++;
+        }
+        if (faces > 0) change += n * sum / faces;
+    }
+    if (!(density > 0)) return; /* shut in */
+    if (f->contact[k->place] & GS4I_BODY_HOLDS) {
+        weight = gs4i_max(area, 0) + GS4I_C(0.05); /* there are places of which no cell is cut */
+        speed =
+            r->s * f->pressure[k->cell] / density * sim->grid.inv_h + gs4i_max(reach, 0) * change;
+    } else {
+        weight = f->cell[4 * k->cell + GS4I_CELL_FILL];
+        speed = gs4i_motion_into_body(f, k, stage, reach);
+    }
+    f->rhs[k->place] += weight * speed;
+    f->cell[4 * k->place + GS4I_CELL_COMPLIANCE] += weight;
+}
+
+/* The same of a cell that flies by itself, at places without liquid: how fast it moves in. */
+static void gs4i_vote_of_spray(gs4_sim *sim, const gs4i_contact_cell *k)
+{
+    gs4i_staggered *f = &sim->staggered;
+    const gs4i_face_motion seen = { f->seen, 1, 0 };
+    const gs4_real fill = f->cell[4 * k->cell + GS4I_CELL_FILL];
+    if (!(f->cell[4 * k->place + GS4I_CELL_COMPLIANCE] > 0) && fill > 0)
+        f->rhs[k->place] += fill * gs4i_motion_into_body(f, k, seen, gs4i_cells_to_surface(sim, k));
+}
+
+/* Is there a place beside, at sides and corners, where a body holds liquid? */
+static int gs4i_holds_beside(const gs4i_staggered *f, const int at[3])
+{
+    int i, a, any = 0;
+    for (i = 0; i < 27; i++) {
+        const int step[3] = { i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1 };
+        int p[3], outside = 0;
+        size_t n;
+        for (a = 0; a < 3; a++) {
+            p[a] = gs4i_around(f, a, at[a] + step[a]);
+            outside |= p[a] < 0 || p[a] >= f->box.size[a];
+        }
+        if (outside) continue;
+        n = gs4i_box_index(&f->box, GS4I_AT_CELL, p[0], p[1], p[2]);
+        any |= (f->contact[n] & GS4I_BODY_HOLDS) && f->cell[4 * n + GS4I_CELL_COMPLIANCE] > 0;
+    }
+    return any;
+}
+
+/* Should a body hold a place? What it has let go of in this step it holds again only where that
+ * would move into it by a twentieth of a cell: it is put back on the surface by itself. What flies
+ * is held where it moves in, and beside liquid that is held, so that a surface sees the same body
+ * on both sides of it. */
+static int gs4i_body_should_hold(const gs4_sim *sim, const int at[3], size_t place, gs4_real least)
+{
+    const gs4i_staggered *f = &sim->staggered;
+    const gs4_real weight = f->cell[4 * place + GS4I_CELL_COMPLIANCE], vote = f->rhs[place];
+    if (!(weight > 0))
+        return (f->contact[place] & GS4I_BODY_HOLDS) && (vote > 0 || gs4i_holds_beside(f, at));
+    if (f->contact[place] & GS4I_BODY_HOLDS) return vote / weight > -least;
+    if (f->contact[place] & GS4I_BODY_HAS_LET_GO)
+        least = GS4I_C(0.05) * sim->grid.h / sim->integrator.dt;
+    return vote / weight > least;
+}
+
+/* gs4i_revise_contact at bodies: liquid first, then what flies. */
+static int gs4i_revise_bodies(gs4_sim *sim)
+{
+    gs4i_staggered *f = &sim->staggered;
+    const gs4_real least =
+        10 * gs4i_max(sim->desc.solver_tolerance, GS4I_EPSILON) * gs4i_fastest_face(f);
+    int flies, z, at[3], changed = 0;
+    size_t i;
+    for (i = 0; i < gs4i_box_count(&f->box, GS4I_AT_CELL); i++)
+        f->rhs[i] = f->cell[4 * i + GS4I_CELL_COMPLIANCE] = 0;
+    gs4i_each_contact_cell(sim, GS4I_C(1), gs4i_vote_of_liquid);
+    gs4i_each_contact_cell(sim, GS4I_C(1.5), gs4i_vote_of_spray);
+    for (flies = 0; flies < 2; flies++)
+        for (z = 0; z < f->box.size[2]; z++)
+            GS4I_BOX_PLANE(&f->box, GS4I_AT_CELL, z, at, i) {
+                const int holds = (f->contact[i] & GS4I_BODY_HOLDS) != 0;
+                if ((f->cell[4 * i + GS4I_CELL_COMPLIANCE] > 0) == flies
+                    || holds == gs4i_body_should_hold(sim, at, i, least))
+                    continue;
+                f->contact[i] ^= GS4I_BODY_HOLDS;
+                if (holds) f->contact[i] |= GS4I_BODY_HAS_LET_GO;
+                changed++;
+            }
+    return changed;
+}
+
 /* By what the solve found walls let go of cells that they would have to pull, and hold those that
  * move into them; at `last` they only hold. First cells of liquid, then the others. How many
  * changed. What the solver leaves undone is no reason. */
@@ -15657,7 +15955,7 @@ static int gs4i_revise_contact(gs4_sim *sim, int last)
             changed++;
         }
     }
-    return changed;
+    return changed + (f->open[0] ? gs4i_revise_bodies(sim) : 0);
 }
 
 /* Is anything held by its impact alone, not by what accelerates it? With `pressure` what the split
@@ -16164,6 +16462,8 @@ static int gs4i_finish_faces(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     gs4i_guess_contact(sim);
     gs4i_fold_faces(sim, nodes);
+    if (sim->staggered.contact)
+        gs4i_each_contact_cell(sim, GS4I_C(1.5), gs4i_guess_contact_of_cell);
     return GS4_OK;
 }
 
@@ -16441,9 +16741,9 @@ static int gs4i_fit_precondition(void *context, const double *r, double *out)
 }
 
 /* Of the folded forces, so much may be left over: momentum is conserved within it. About 12
- * iterations. */
+ * iterations, beside bodies that let go up to 300. */
 #define GS4I_FIT_TOLERANCE (sizeof(gs4_real) == 8 ? 1e-12 : 1e-8)
-#define GS4I_FIT_ITERATIONS 200
+#define GS4I_FIT_ITERATIONS 1000
 
 /* (P3), into the first guess of u~. */
 static int gs4i_fit_stress(gs4_sim *sim)
@@ -16734,11 +17034,15 @@ static void gs4i_correct_from_faces(int index, void *context)
     if (pass->commit) gs4i_report_motion(report, &r.seen);
 }
 
-/* Does material press on a wall that separates, before a node behind it? */
+/* Does material press on a wall that separates, before a node behind it; or on a body, at a place
+ * that it has there? */
 static int gs4i_presses(const gs4_sim *sim, const int at[3])
 {
     const gs4i_staggered *f = &sim->staggered;
     int side, any = 0;
+    if (f->contact)
+        any = f->contact[gs4i_box_index(&f->box, GS4I_AT_CELL, at[0], at[1], at[2])]
+              & GS4I_BODY_HOLDS;
     for (side = 0; side < 6 && f->contact; side++) {
         const int a = side / 2, there = side & 1 ? f->to[a] : f->from[a] - 1;
         if (at[a] != there || sim->desc.walls[side] != GS4_WALL_SEPARATE) continue;
@@ -20816,10 +21120,10 @@ static int gs4i_check_collider(gs4_sim *sim, gs4_collider *c)
         GS4I_TRY(gs4i_check_thickness(e, &c->shape, (double)sim->grid.h));
     GS4I_TRY(gs4i_require(e, (int)c->contact >= 0 && c->contact <= GS4_WALL_SEPARATE,
                           "contact of a collider must be stick, slip or separate"));
-    GS4I_TRY(gs4i_require(e, c->contact != GS4_WALL_SEPARATE || sim->desc.scheme == GS4_EXPLICIT,
-                          "contact: the partitioned scheme of this version has no separating "
-                          "colliders; use stick or slip"));
     GS4I_TRY(gs4i_check(e, "friction", c->friction, GS4I_NOT_NEGATIVE));
+    GS4I_TRY(gs4i_require(e, c->friction == 0 || sim->desc.scheme == GS4_EXPLICIT,
+                          "friction: separating colliders of the partitioned scheme of this "
+                          "version have none; leave it 0"));
     GS4I_TRY(gs4i_require(e, c->friction == 0 || c->contact == GS4_WALL_SEPARATE,
                           "friction is for contact GS4_WALL_SEPARATE, leave it 0"));
     GS4I_TRY(gs4i_check3(e, "velocity", c->velocity));
@@ -22541,10 +22845,13 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 
 #undef GS4I_BACKSLASHES
 #undef GS4I_BATCH_LOOP
+#undef GS4I_BEFORE_SURFACE
 #undef GS4I_BIAS
 #undef GS4I_BLOCK_NODES
 #undef GS4I_BLOCK_REACH
 #undef GS4I_BLOCK_SIDE
+#undef GS4I_BODY_HAS_LET_GO
+#undef GS4I_BODY_HOLDS
 #undef GS4I_BOX_PLANE
 #undef GS4I_C
 #undef GS4I_CHOOSE
@@ -22726,4 +23033,5 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  * its free surfaces are not lost any more: there elastic bodies gained energy, and viscous ones
  * momentum. Its sound is within 1.5 % at 20 cells a wave, before 2.5. Incompressible liquid slides
  * around slippery colliders, which braked it or, where they turned, gave it energy without end.
- * What meets a separating wall in its first step is thrown back no more. */
+ * What meets a separating wall in its first step is thrown back no more. Separating colliders, with
+ * the partitioned scheme too. */

@@ -24,6 +24,7 @@
 #include "test_contact.c"
 #include "test_partitioned.c"
 #include "test_partitioned_walls.c"
+#include "test_partitioned_bodies.c"
 #include "test_partitioned_surface.c"
 #include "test_partitioned_periodic.c"
 #include "test_partitioned_flows.c"
@@ -112,6 +113,7 @@ int main(int count, char **values)
     run_contact();
     run_partitioned();
     run_partitioned_walls();
+    run_partitioned_bodies();
     run_partitioned_surface();
     run_partitioned_periodic();
     run_partitioned_flows();

@@ -1000,8 +1000,9 @@ static void test_partitioned_refusals(void)
     memset(&c, 0, sizeof c);
     c.shape = gs4_sphere(at(0.5, 0.5, 0.5), (gs4_real)0.2);
     c.contact = GS4_WALL_SEPARATE;
+    c.friction = (gs4_real)0.3;
     CHECK_RESULT(sim, gs4_add_collider(sim, &c), GS4_ERROR_ARGUMENT);
-    CHECK(strstr(gs4_last_error(sim), "contact") != NULL);
+    CHECK(strstr(gs4_last_error(sim), "friction") != NULL);
     gs4_destroy(sim);
 }
 

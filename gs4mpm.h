@@ -11222,6 +11222,7 @@ typedef struct gs4i_staggered {
     gs4_real *diagonal, *rhs, *pressure;   /* of [[poisson]] */
     int compressible;                      /* some K is finite */
     int is_safe;                           /* no particle needs a trial */
+    int bodies_separate;                   /* some do */
     int is_viscous;                        /* sticky walls take hold of what moves along them */
     int is_plain;                          /* acc is not split, and not remembered */
     int without_split, without_correction; /* for tests of what they are for */
@@ -14520,14 +14521,20 @@ static void gs4i_take_staggered(gs4i_staggered *f, int bodies, int stress, int s
     f->contact = separates ? (uint8_t *)gs4i_box_take(box, 1) : NULL;
 }
 
+static int gs4i_has_separating_bodies(const gs4_sim *sim)
+{
+    int i, any = 0;
+    for (i = 0; i < sim->boundary.collider_count; i++)
+        any |= gs4i_separates(&sim->boundary.colliders[i]);
+    return any;
+}
+
 /* Is there anything that material can leave? */
 static int gs4i_has_separating(const gs4_sim *sim)
 {
     int i, any = 0;
     for (i = 0; i < 6; i++) any |= sim->desc.walls[i] == GS4_WALL_SEPARATE;
-    for (i = 0; i < sim->boundary.collider_count; i++)
-        any |= gs4i_separates(&sim->boundary.colliders[i]);
-    return any;
+    return any || gs4i_has_separating_bodies(sim);
 }
 
 /* Is there a body that liquid slides along? What div acc is in cells that it cuts is not known well
@@ -14580,6 +14587,7 @@ static int gs4i_begin_staggered(gs4_sim *sim)
     f->iterations = 0;
     f->residual = 0;
     f->is_viscous = stress;
+    f->bodies_separate = gs4i_has_separating_bodies(sim);
     f->compressible = 0;
     for (a = 0; a < sim->material_count; a++) f->compressible |= sim->constants[a].compliance > 0;
     f->is_plain = f->compressible || gs4i_has_slippery(sim);
@@ -15332,9 +15340,10 @@ static void gs4i_classify_face(const gs4_sim *sim, gs4i_staggered *f, int c, con
     kind_before = f->kind[before];
     if (f->open[c] && (kind == GS4_CELL_SOLID || kind_before == GS4_CELL_SOLID)) f->open[c][i] = 0;
     if ((kind != GS4_CELL_LIQUID && kind_before != GS4_CELL_LIQUID) || kind == GS4_CELL_SOLID
-        || kind_before == GS4_CELL_SOLID
-        || (f->open[c] && !(f->open[c][i] > 0 && q[GS4I_FACE_DENSITY] > 0)))
+        || kind_before == GS4_CELL_SOLID || (f->open[c] && !(f->open[c][i] > 0)))
         return;
+    /* beside what a body has let go of there may be none */
+    if (f->bodies_separate && !(q[GS4I_FACE_DENSITY] > 0) && !gs4i_is_copy(f, at)) return;
     if (kind != kind_before)
         w = kind == GS4_CELL_LIQUID ? gs4i_surface_weight(f->cell[4 * cell], f->cell[4 * before])
                                     : gs4i_surface_weight(f->cell[4 * before], f->cell[4 * cell]);
@@ -15817,7 +15826,7 @@ static int gs4i_should_hold(const gs4i_staggered *f, int side, const gs4i_wall_c
     return any;
 }
 
-/* What a body does to a liquid cell, for its place, where right-hand sides were, with weights where
+/* What a body does to a liquid cell, for its place, where dilations were, with weights where
  * compliances were: how much the body pushes it, by the area of its surface there and the pressure
  * on that, viscous stress included,
  * p - d dp/dn, where the gradient is what changes its velocity; or how fast it moves into the body
@@ -15856,7 +15865,7 @@ static void gs4i_vote_of_liquid(gs4_sim *sim, const gs4i_contact_cell *k)
         weight = f->cell[4 * k->cell + GS4I_CELL_FILL];
         speed = gs4i_motion_into_body(f, k, stage, reach);
     }
-    f->rhs[k->place] += weight * speed;
+    f->cell[4 * k->place + GS4I_CELL_DILATION] += weight * speed;
     f->cell[4 * k->place + GS4I_CELL_COMPLIANCE] += weight;
 }
 
@@ -15867,7 +15876,8 @@ static void gs4i_vote_of_spray(gs4_sim *sim, const gs4i_contact_cell *k)
     const gs4i_face_motion seen = { f->seen, 1, 0 };
     const gs4_real fill = f->cell[4 * k->cell + GS4I_CELL_FILL];
     if (!(f->cell[4 * k->place + GS4I_CELL_COMPLIANCE] > 0) && fill > 0)
-        f->rhs[k->place] += fill * gs4i_motion_into_body(f, k, seen, gs4i_cells_to_surface(sim, k));
+        f->cell[4 * k->place + GS4I_CELL_DILATION] +=
+            fill * gs4i_motion_into_body(f, k, seen, gs4i_cells_to_surface(sim, k));
 }
 
 /* Is there a place beside, at sides and corners, where a body holds liquid? */
@@ -15896,7 +15906,8 @@ static int gs4i_holds_beside(const gs4i_staggered *f, const int at[3])
 static int gs4i_body_should_hold(const gs4_sim *sim, const int at[3], size_t place, gs4_real least)
 {
     const gs4i_staggered *f = &sim->staggered;
-    const gs4_real weight = f->cell[4 * place + GS4I_CELL_COMPLIANCE], vote = f->rhs[place];
+    const gs4_real weight = f->cell[4 * place + GS4I_CELL_COMPLIANCE],
+                   vote = f->cell[4 * place + GS4I_CELL_DILATION];
     if (!(weight > 0))
         return (f->contact[place] & GS4I_BODY_HOLDS) && (vote > 0 || gs4i_holds_beside(f, at));
     if (f->contact[place] & GS4I_BODY_HOLDS) return vote / weight > -least;
@@ -15914,7 +15925,7 @@ static int gs4i_revise_bodies(gs4_sim *sim)
     int flies, z, at[3], changed = 0;
     size_t i;
     for (i = 0; i < gs4i_box_count(&f->box, GS4I_AT_CELL); i++)
-        f->rhs[i] = f->cell[4 * i + GS4I_CELL_COMPLIANCE] = 0;
+        f->cell[4 * i + GS4I_CELL_DILATION] = f->cell[4 * i + GS4I_CELL_COMPLIANCE] = 0;
     gs4i_each_contact_cell(sim, GS4I_C(1), gs4i_vote_of_liquid);
     gs4i_each_contact_cell(sim, GS4I_C(1.5), gs4i_vote_of_spray);
     for (flies = 0; flies < 2; flies++)
@@ -15955,7 +15966,7 @@ static int gs4i_revise_contact(gs4_sim *sim, int last)
             changed++;
         }
     }
-    return changed + (f->open[0] ? gs4i_revise_bodies(sim) : 0);
+    return changed + (f->bodies_separate ? gs4i_revise_bodies(sim) : 0);
 }
 
 /* Is anything held by its impact alone, not by what accelerates it? With `pressure` what the split
@@ -16462,7 +16473,7 @@ static int gs4i_finish_faces(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     gs4i_guess_contact(sim);
     gs4i_fold_faces(sim, nodes);
-    if (sim->staggered.contact)
+    if (sim->staggered.bodies_separate)
         gs4i_each_contact_cell(sim, GS4I_C(1.5), gs4i_guess_contact_of_cell);
     return GS4_OK;
 }

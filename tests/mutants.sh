@@ -7,8 +7,8 @@
 #   sh tests/mutants.sh -n          none: only whether each line applies, and how many there are
 # All of them are compiled into one program; the variable GS4_MUTANT says which one acts, 0: none.
 # So two compilations, float and double, are enough; and with none the tests must be green.
-# A mutant is tried on the tests named in its line, also with --full, then on all quick ones in
-# float, in double, and on the full ones. CC as in run.sh; JOBS (2) mutants at a time; VERBOSE=1
+# A mutant is tried on the tests named in its line, also with --full and then in double, then on all
+# quick ones in float, in double, and on the full ones. CC as in run.sh; JOBS (2) mutants at a time; VERBOSE=1
 # tells of all of them.
 set -u
 cd "$(dirname "$0")/.." || exit 1
@@ -116,6 +116,7 @@ try() {
     done
     for test in $tests; do
         [ -z "$how" ] && red "$m" float --full "$test" && how='hint, full'
+        [ -z "$how" ] && red "$m" double --full "$test" && how='hint, full, double'
     done
     if [ -z "$how" ] && red "$m" float; then how=quick; fi
     if [ -z "$how" ]; then

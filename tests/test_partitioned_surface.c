@@ -126,6 +126,30 @@ static void test_partitioned_surface_decay(void)
     if (test_full) CHECK_CLOSE(surface_decay(GS4_EXPLICIT, 8, 0, 2, 0.5), 0.925, 0.01);
 }
 
+/* What is left of both modes after the time of e^-1/2, in n, 2 n, 4 n steps: order in time. */
+static void test_partitioned_surface_order(void)
+{
+    int n, i;
+    for (n = 0; n < 4; n++) {
+        const int spheroidal = n & 1, be = n / 2;
+        const double k = surface_wave_number[spheroidal], T = 0.5 / (k * k);
+        gs4_material m = scene_liquid(1, 1, 0);
+        double left[3], order;
+        m.incompressible = 1;
+        for (i = 0; i < 3; i++) {
+            gs4_sim *sim = surface_sphere(&m, GS4_PARTITIONED, 6, spheroidal, 2);
+            sim->desc.integrator = be ? GS4_INTEGRATOR_BACKWARD_EULER : GS4_INTEGRATOR_GS4;
+            partitioned_steps(sim, T, (int)ceil(T / (double)gs4_stable_dt(sim)) << i);
+            left[i] = surface_share(sim, 6, spheroidal, 2);
+            gs4_destroy(sim);
+        }
+        order = log2(fabs((left[0] - left[1]) / (left[1] - left[2])));
+        if (test_filter[0])
+            printf("spheroidal %d, integrator %d: order %.2f\n", spheroidal, be, order);
+        CHECK_BETWEEN(order, be ? 0.85 : 1.95, be ? 1.1 : 2.25);
+    }
+}
+
 /* Elastic spheres ring with k sqrt(G/rho), and never gain; what is left after `periods`. */
 static double surface_ring(int R, int spheroidal, int a, int periods, double *frequency)
 {
@@ -240,6 +264,7 @@ static void test_partitioned_surface_momentum(void)
 static void run_partitioned_surface(void)
 {
     RUN_FULL(test_partitioned_surface_decay);
+    if (sizeof(gs4_real) == 8) RUN_FULL(test_partitioned_surface_order);
     RUN_FULL(test_partitioned_surface_ring);
     RUN_ONCE(test_partitioned_surface_momentum);
 }

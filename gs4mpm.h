@@ -19162,14 +19162,22 @@ static void gs4i_set_decay(gs4i_integrator *k, const gs4_sim *sim)
                              : GS4I_C(0);
 }
 
+/* Rates of the partitioned scheme have what pressure takes from motion that the solve does not
+ * want, over a step. Those of steps much shorter are too large for this one, which starts anew. */
+static int gs4i_outgrows_rates(const gs4_sim *sim, gs4_real dt)
+{
+    return sim->desc.scheme == GS4_PARTITIONED && sim->last_dt > 0 && (double)dt > 4 * sim->last_dt;
+}
+
 static gs4i_integrator gs4i_make_integrator(const gs4_sim *sim, gs4_real dt)
 {
     const gs4_real r = sim->desc.rho_inf, s = sim->desc.rho_inf_spurious, h = sim->grid.h;
-    const int with_rates = sim->particles.with_rates;
+    const int with_rates = sim->particles.with_rates,
+              grown = !sim->restart && gs4i_outgrows_rates(sim, dt);
     gs4i_integrator k;
     int i;
     k.dt = dt;
-    k.restart = sim->restart;
+    k.restart = sim->restart || grown;
     gs4i_family(&k, r, s, 0);
     k.impact = GS4I_C(0.5);
     if (k.restart && sim->desc.integrator == GS4_INTEGRATOR_GS4)
@@ -19179,8 +19187,8 @@ static gs4i_integrator gs4i_make_integrator(const gs4_sim *sim, gs4_real dt)
     k.affine_ratio = k.restart || sim->desc.integrator != GS4_INTEGRATOR_GS4 || !(sim->last_dt > 0)
                          ? GS4I_C(0)
                          : dt / GS4I_C(sim->last_dt);
-    k.prediction.ahead = with_rates ? k.alpha_f * dt : GS4I_C(0);
-    k.prediction.shift = k.restart ? GS4I_C(0) : sim->shift;
+    k.prediction.ahead = with_rates && !grown ? k.alpha_f * dt : GS4I_C(0);
+    k.prediction.shift = sim->restart ? GS4I_C(0) : sim->shift;
     k.prediction.bend = sim->desc.scheme == GS4_PARTITIONED
                             ? GS4I_C(0.5) * k.prediction.ahead * k.prediction.ahead
                             : GS4I_C(0);
@@ -19188,7 +19196,7 @@ static gs4i_integrator gs4i_make_integrator(const gs4_sim *sim, gs4_real dt)
     if (!with_rates) k.alpha_m = k.alpha_f = k.gamma = 1; /* of heat: backward Euler */
     k.inv_alpha_m = 1 / k.alpha_m;
     k.s = k.alpha_f * k.gamma * dt / k.alpha_m;
-    k.before = with_rates ? k.prediction.ahead - k.s : GS4I_C(0);
+    k.before = with_rates && !grown ? k.prediction.ahead - k.s : GS4I_C(0);
     k.inv_area = sim->grid.inv_h * sim->grid.inv_h;
     k.fast_decay = k.inv_node_mass = 0;
     k.inv_densest_node_mass = GS4I_HUGE;

@@ -111,8 +111,8 @@ static void test_partitioned_levels(void)
 
 /* --- steps of any length ---------------------------------------------------------------------- */
 
-/* A step of 1e-9 s among long ones, where stiff lies on soft and both are viscous, in flight: energy
- * only falls. Rates of the short one would give the next up to 1e5 times what there was. */
+/* A step of 1e-9 s among long ones, where stiff lies on soft and both are viscous, in flight:
+ * energy only falls. Rates of the short one would give the next up to 1e5 times what there was. */
 static void test_partitioned_short_step(void)
 {
     int n, k, i;

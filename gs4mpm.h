@@ -272,7 +272,7 @@
  * and a solve more. What is held by its impact alone has theta = 1/2, with finite K too. Separating
  * colliders do the same at places of a cell each, as slippery ones where they hold; what they have
  * let go of in a step they hold again only where that would enter by a twentieth of a cell. They
- * have no friction yet.
+ * have no friction yet. A step more than four times as long as the last starts its rates anew.
  *
  * Symplectic Euler, the fast tier: one affine scatter with stress and one gather (MLS-MPM, APIC),
  * first order.
@@ -19162,8 +19162,8 @@ static void gs4i_set_decay(gs4i_integrator *k, const gs4_sim *sim)
                              : GS4I_C(0);
 }
 
-/* Rates of the partitioned scheme have what pressure takes from motion that the solve does not
- * want, over a step. Those of steps much shorter are too large for this one, which starts anew. */
+/* Rates of the partitioned scheme are impulses of pressure over a step. Those of a step much
+ * shorter are too large for this one, which starts anew. The 4 is chosen. */
 static int gs4i_outgrows_rates(const gs4_sim *sim, gs4_real dt)
 {
     return sim->desc.scheme == GS4_PARTITIONED && sim->last_dt > 0 && (double)dt > 4 * sim->last_dt;
@@ -23053,4 +23053,4 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  * momentum. Its sound is within 1.5 % at 20 cells a wave, before 2.5. Incompressible liquid slides
  * around slippery colliders, which braked it or, where they turned, gave it energy without end.
  * What meets a separating wall in its first step is thrown back no more. Separating colliders, with
- * the partitioned scheme too. */
+ * the partitioned scheme too; there a step much longer than the last one gives no energy. */

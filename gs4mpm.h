@@ -16180,30 +16180,25 @@ static void gs4i_load_velocity_tile(const gs4_sim *sim, int o, int c, gs4_real *
 GS4I_INLINE void gs4i_gather_slope(const gs4_real *tile, const gs4i_stencils *s, int n,
                                    gs4_real *dx, gs4_real *dy, gs4_real *dz)
 {
-    gs4_real plain[4], y[4], z[4];
+    gs4_real plain[4] = { 0, 0, 0, 0 }, y[4], z[4];
     gs4i_quad sum, sum_y, sum_z, row, slope, r;
     int j, k;
     tile += s->base[n];
+    GS4I_LOAD(sum, plain);
+    GS4I_LOAD(sum_y, plain);
+    GS4I_LOAD(sum_z, plain);
     for (k = 0; k < 3; k++) {
-        for (j = 0; j < 3; j++) {
+        GS4I_LOAD(r, tile + GS4I_TILE * GS4I_TILE * k);
+        GS4I_SPLAT_MUL(row, GS4I_NTH_CONST(s->w[1][0], n), r);
+        GS4I_SPLAT_MUL(slope, GS4I_NTH_CONST(s->d[1][0], n), r);
+        for (j = 1; j < 3; j++) {
             GS4I_LOAD(r, tile + GS4I_TILE * (GS4I_TILE * k + j));
-            if (j == 0) {
-                GS4I_SPLAT_MUL(row, GS4I_NTH_CONST(s->w[1][0], n), r);
-                GS4I_SPLAT_MUL(slope, GS4I_NTH_CONST(s->d[1][0], n), r);
-            } else {
-                GS4I_SPLAT_MAD(row, GS4I_NTH_CONST(s->w[1][j], n), r);
-                GS4I_SPLAT_MAD(slope, GS4I_NTH_CONST(s->d[1][j], n), r);
-            }
+            GS4I_SPLAT_MAD(row, GS4I_NTH_CONST(s->w[1][j], n), r);
+            GS4I_SPLAT_MAD(slope, GS4I_NTH_CONST(s->d[1][j], n), r);
         }
-        if (k == 0) {
-            GS4I_SPLAT_MUL(sum, GS4I_NTH_CONST(s->w[2][0], n), row);
-            GS4I_SPLAT_MUL(sum_y, GS4I_NTH_CONST(s->w[2][0], n), slope);
-            GS4I_SPLAT_MUL(sum_z, GS4I_NTH_CONST(s->d[2][0], n), row);
-        } else {
-            GS4I_SPLAT_MAD(sum, GS4I_NTH_CONST(s->w[2][k], n), row);
-            GS4I_SPLAT_MAD(sum_y, GS4I_NTH_CONST(s->w[2][k], n), slope);
-            GS4I_SPLAT_MAD(sum_z, GS4I_NTH_CONST(s->d[2][k], n), row);
-        }
+        GS4I_SPLAT_MAD(sum, GS4I_NTH_CONST(s->w[2][k], n), row);
+        GS4I_SPLAT_MAD(sum_y, GS4I_NTH_CONST(s->w[2][k], n), slope);
+        GS4I_SPLAT_MAD(sum_z, GS4I_NTH_CONST(s->d[2][k], n), row);
     }
     GS4I_STORE(plain, sum);
     GS4I_STORE(y, sum_y);

@@ -583,6 +583,7 @@ if [ "${1:-}" = --group ]; then                     # one group in this process
     group=$2
     write_sources
     "$group"
+    times > "$tmp/times"; echo "processor time of it: $(tail -n 1 "$tmp/times")"
     finish
     exit
 fi

@@ -198,14 +198,15 @@ typedef struct yield_flow {
     double plug, flux, error;
 } yield_flow;
 
-static yield_flow yield_measure(const gs4_sim *sim, int along, int across, const double *profile)
+static yield_flow yield_measure(const gs4_sim *sim, int along, int across, double half,
+                                const double *profile)
 {
     const gs4_view x = gs4_particles(sim, GS4_FIELD_POSITION),
                    v = gs4_particles(sim, GS4_FIELD_VELOCITY);
     yield_flow q = { 0, 0, 0 };
     int i, middle = 0;
     for (i = 0; i < x.count; i++) {
-        const double y = fabs((double)x.data[i * x.stride + across] - 1),
+        const double y = fabs((double)x.data[i * x.stride + across] / half - 1),
                      u = (double)v.data[i * v.stride + along];
         const int k = y < 1 ? (int)(y * YIELD_STEPS) : YIELD_STEPS - 1;
         const double there =
@@ -258,7 +259,7 @@ static void test_yield_axes(void)
             if (across == along) continue;
             sim = yield_channel(&m, 16, along, across, GS4_INTEGRATOR_GS4);
             CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)0.1), GS4_OK);
-            plug = yield_measure(sim, along, across, NULL).plug;
+            plug = yield_measure(sim, along, across, 1, NULL).plug;
             if (first == 0) first = plug;
             CHECK_CLOSE(plug / exact, 1, 0.02);
             CHECK_CLOSE(plug / first, 1, 1e-4);
@@ -279,13 +280,13 @@ static double yield_steady(const struct yield_row *row, double creep, int n, dou
     for (i = 0; i < 4; i++) {
         CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)(yield_start_t[i] - t)), GS4_OK);
         t = yield_start_t[i];
-        q = yield_measure(sim, 0, 1, u);
+        q = yield_measure(sim, 0, 1, 1, u);
         if (test_filter[0])
             printf("  t %.2f: %+.2f %%\n", t, 100 * (q.plug / yield_start(&m, t) - 1));
         CHECK_CLOSE(q.plug / yield_start(&m, t), 1, share);
     }
     CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)(4 - t)), GS4_OK);
-    q = yield_measure(sim, 0, 1, u);
+    q = yield_measure(sim, 0, 1, 1, u);
     gs4_destroy(sim);
     if (test_filter[0])
         printf(
@@ -358,7 +359,7 @@ static void test_yield_channel(void)
         for (k = 0; k < 5; k++) {
             const double before = k ? yield_start_t[k - 1] : 0;
             CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)(yield_start_t[k] - before)), GS4_OK);
-            q = yield_measure(sim, 0, 1, NULL);
+            q = yield_measure(sim, 0, 1, 1, NULL);
             CHECK_CLOSE(q.plug / row->plug, yield_start_u[i][k], 0.02);
         }
         CHECK_CLOSE(q.plug / row->plug, yield_start_u[i][4], 0.02);
@@ -373,6 +374,54 @@ static void test_yield_channel(void)
     }
 }
 
+/* Two liquids in SI units, millimetres of them, from rest to steady flow: rows "HB1" and "HB3" of
+ * the reference, within 2 %. */
+static void test_yield_dimensional(void)
+{
+    static const struct {
+        double yield, consistency, index, density, half, pressure, plug, mean, rate, creep;
+    } rows[2] = { { 15, 6, 0.5, 1150, 5e-3, 6000, 5.20833e-3, 4.55729e-3, 6.25, 0.005 },
+                  { 5, 0.5, 0.7, 1050, 3e-3, 4000, 3.12617e-2, 2.59429e-2, 43.3836, 0.01 } };
+    enum {
+        CELLS = 24
+    };
+    int i;
+    for (i = 0; i < 2; i++) {
+        gs4_material m = yield_material(rows[i].yield, rows[i].index, 0);
+        gs4_sim_desc d = scene_cube(CELLS);
+        const gs4_fill f = scene_fill(at(0, 0, 0));
+        const double h = 2 * rows[i].half / CELLS;
+        gs4_sim *sim;
+        yield_flow q;
+        int w;
+        m.density = (gs4_real)rows[i].density;
+        m.sound_speed = (gs4_real)(10 * rows[i].plug);
+        m.herschel_bulkley.consistency = (gs4_real)rows[i].consistency;
+        m.herschel_bulkley.creep_rate = (gs4_real)(rows[i].creep * rows[i].rate);
+        d.cells[0] = d.cells[2] = 4;
+        d.cell_size = (gs4_real)h;
+        for (w = 0; w < 6; w++) d.walls[w] = w / 2 == 1 ? GS4_WALL_STICK : GS4_WALL_PERIODIC;
+        d.gravity = at(rows[i].pressure / rows[i].density, 0, 0);
+        d.cfl = (gs4_real)0.9;
+        sim = physics_create(&d, &m);
+        CHECK(gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(4 * h, CELLS * h, 4 * h)), &f) > 0);
+        /* 3.5 times rho h^2 over the least viscosity, that at the wall */
+        CHECK_RESULT(
+            sim,
+            gs4_advance(sim, (gs4_real)(3.5 * rows[i].density * rows[i].half * rows[i].half
+                                        * rows[i].rate / (rows[i].pressure * rows[i].half))),
+            GS4_OK);
+        q = yield_measure(sim, 0, 1, rows[i].half, NULL);
+        if (test_filter[0])
+            printf("HB%d: plug %+.2f %%, mean %+.2f %%, %g steps\n", 2 * i + 1,
+                   100 * (q.plug / rows[i].plug - 1), 100 * (q.flux / rows[i].mean - 1),
+                   (double)gs4_get_stats(sim).steps);
+        CHECK_CLOSE(q.plug / rows[i].plug, 1, 0.02);
+        CHECK_CLOSE(q.flux / rows[i].mean, 1, 0.02);
+        gs4_destroy(sim);
+    }
+}
+
 /* A liquid without a yield stress and of the index 1 is a Newtonian one, to the bit. */
 static void test_yield_newtonian(void)
 {
@@ -383,7 +432,7 @@ static void test_yield_newtonian(void)
     for (i = 0; i < 2; i++) {
         sims[i] = yield_channel(&m, 8, 0, 1, GS4_INTEGRATOR_GS4);
         CHECK_RESULT(sims[i], gs4_advance(sims[i], (gs4_real)0.2), GS4_OK);
-        q[i] = yield_measure(sims[i], 0, 1, NULL);
+        q[i] = yield_measure(sims[i], 0, 1, 1, NULL);
         gs4_destroy(sims[i]);
         m = scene_liquid(1, 1, 8);
     }
@@ -403,13 +452,13 @@ static void test_yield_stands(void)
     CHECK_CLOSE(u[0], 0.02 * (1 - sqrt(1 - 0.36)) / 0.6, 1e-4 * u[0] + 2e-5);
     sim = yield_channel(&m, 8, 0, 1, GS4_INTEGRATOR_GS4);
     CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)0.2), GS4_OK);
-    CHECK_CLOSE(yield_measure(sim, 0, 1, NULL).plug / u[0], 1, 0.04);
+    CHECK_CLOSE(yield_measure(sim, 0, 1, 1, NULL).plug / u[0], 1, 0.04);
     gs4_destroy(sim);
     m.herschel_bulkley.yield_stress = (gs4_real)(1.0 / 3);
     sim = yield_channel(&m, 8, 0, 1, GS4_INTEGRATOR_GS4);
     CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)0.2), GS4_OK);
     /* a plug as wide as the channel but for a layer at its walls: weight less yield stress */
-    CHECK_CLOSE(yield_measure(sim, 0, 1, NULL).plug / (0.2 * (1 - 1.0 / 3)), 1, 0.1);
+    CHECK_CLOSE(yield_measure(sim, 0, 1, 1, NULL).plug / (0.2 * (1 - 1.0 / 3)), 1, 0.1);
     gs4_destroy(sim);
 }
 
@@ -672,6 +721,7 @@ static void run_yield(void)
     RUN_FULL(test_yield_stands);
     RUN_FULL(test_yield_regularised);
     RUN_FULL(test_yield_channel);
+    RUN_SLOW(test_yield_dimensional);
     RUN_FULL(test_yield_slump);
     RUN_ONCE(test_yield_presets);
 }

@@ -50,7 +50,7 @@ int main(int count, char **values)
     RUN_ONCE(test_poiseuille);
     RUN_FULL(test_shear_wave);
     RUN_FULL(test_stokes_first);
-    RUN_FULL(test_couette);
+    RUN_FULL_ONCE(test_couette);
     RUN_ONCE(test_couette_surface);
     RUN_ONCE(test_sticky_askew);
     RUN_FULL(test_sticky_pipe);
@@ -58,9 +58,9 @@ int main(int count, char **values)
     RUN_ONCE(test_sound_speed);
     RUN(test_sharp_mirrors);
     RUN_FULL(test_drop_at_rest);
-    RUN_FULL(test_noise_after_impact);
+    RUN_FULL_ONCE(test_noise_after_impact);
     RUN_SLOW(test_drop_impact);
-    RUN_FULL(test_elastic_wave);
+    RUN_FULL_ONCE(test_elastic_wave);
     RUN_FULL(test_channel_overshoot);
     RUN_FULL(test_elastic_couette);
     RUN(test_stress_is_paid_for_where_it_is);
@@ -81,7 +81,7 @@ int main(int count, char **values)
     RUN_ONCE(test_heat_drifts);
     RUN_ONCE(test_heat_around);
     RUN_ONCE(test_heat_walls);
-    RUN_FULL(test_heat_bounds);
+    RUN_FULL_ONCE(test_heat_bounds);
     RUN_FULL(test_heat_long_steps);
     RUN_FULL(test_heat_beside_walls);
     RUN_FULL(test_heat_waves_at_walls);

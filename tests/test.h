@@ -6,6 +6,7 @@
  *   RUN(test)        quick, in both precisions
  *   RUN_ONCE(test)   quick in float, where double says the same again: in double with --full
  *   RUN_FULL(test)   with --full       RUN_SLOW(test)   with --slow
+ *   RUN_FULL_ONCE(test)   with --full in float, where double says the same again: with --slow
  * Arguments of the program: --full, --slow, --times (seconds of each test), --stop (at the first
  * failure), and a part of a name, which runs the tests that contain it in whatever tier. */
 #ifndef TEST_H
@@ -64,6 +65,8 @@ static void test_between(double value, double low, double high, const char *file
 #define RUN(test) test_run(test, #test, 1)
 #define RUN_ONCE(test) test_run(test, #test, test_full || sizeof(gs4_real) == 4)
 #define RUN_FULL(test) test_run(test, #test, test_full)
+#define TEST_FULL_ONCE (test_slow || (test_full && sizeof(gs4_real) == 4))
+#define RUN_FULL_ONCE(test) test_run(test, #test, TEST_FULL_ONCE)
 #define RUN_SLOW(test) test_run(test, #test, test_slow)
 
 static void test_run(void (*test)(void), const char *name, int in_tier)

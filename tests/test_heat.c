@@ -2012,6 +2012,6 @@ static void test_heat_partitioned(void)
     int i;
     physics_scheme = GS4_PARTITIONED;
     for (i = 0; i < (int)(sizeof quick / sizeof quick[0]); i++) quick[i]();
-    for (i = 0; i < (int)(sizeof full / sizeof full[0]) && test_full; i++) full[i]();
+    for (i = 0; i < (int)(sizeof full / sizeof full[0]) && TEST_FULL_ONCE; i++) full[i]();
     physics_scheme = GS4_EXPLICIT;
 }

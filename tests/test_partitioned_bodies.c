@@ -360,7 +360,7 @@ static void run_partitioned_bodies(void)
 {
     RUN_FULL(test_partitioned_bodies_let_go);
     RUN_FULL(test_partitioned_bodies_thrown);
-    RUN_FULL(test_partitioned_bodies_leave);
+    RUN_FULL_ONCE(test_partitioned_bodies_leave);
     RUN_FULL(test_partitioned_bodies_rest);
     RUN_FULL(test_partitioned_bodies_thin);
     RUN_FULL(test_partitioned_bodies_symmetry);

@@ -147,8 +147,8 @@ static void test_partitioned_short_step(void)
 
 static void run_partitioned_exact(void)
 {
-    RUN_FULL(test_partitioned_levels);
+    RUN_FULL_ONCE(test_partitioned_levels);
     RUN_FULL(test_partitioned_short_step);
-    RUN_FULL(test_partitioned_drop);
+    RUN_FULL_ONCE(test_partitioned_drop);
     RUN_SLOW(test_partitioned_drop_draws_back);
 }

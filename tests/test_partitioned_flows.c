@@ -296,6 +296,6 @@ static void run_partitioned_flows(void)
 {
     RUN_ONCE(test_partitioned_sound);
     RUN_FULL(test_partitioned_sound_unresolved);
-    RUN_FULL(test_partitioned_bucket);
+    RUN_FULL_ONCE(test_partitioned_bucket);
     RUN_FULL(test_partitioned_frictionless);
 }

@@ -263,8 +263,8 @@ static void test_partitioned_surface_momentum(void)
 
 static void run_partitioned_surface(void)
 {
-    RUN_FULL(test_partitioned_surface_decay);
+    RUN_FULL_ONCE(test_partitioned_surface_decay);
     if (sizeof(gs4_real) == 8) RUN_FULL(test_partitioned_surface_order);
-    RUN_FULL(test_partitioned_surface_ring);
+    RUN_FULL_ONCE(test_partitioned_surface_ring);
     RUN_ONCE(test_partitioned_surface_momentum);
 }

@@ -334,6 +334,6 @@ static void run_partitioned_walls(void)
     RUN_FULL(test_partitioned_walls_thrown);
     RUN_ONCE(test_partitioned_walls_rest);
     RUN(test_partitioned_walls_piston);
-    RUN_FULL(test_partitioned_walls_symmetry);
+    RUN_FULL_ONCE(test_partitioned_walls_symmetry);
     RUN_FULL(test_partitioned_walls_bits);
 }

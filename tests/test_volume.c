@@ -401,5 +401,5 @@ static void run_volume(void)
     RUN(test_volume_stops);
     RUN_ONCE(test_volume_of_smooth_flow);
     RUN_FULL(test_volume_momentum);
-    RUN_FULL(test_volume_after_flow);
+    RUN_FULL_ONCE(test_volume_after_flow);
 }

@@ -719,9 +719,9 @@ static void run_yield(void)
     RUN_FULL(test_yield_axes);
     RUN(test_yield_newtonian);
     RUN_FULL(test_yield_stands);
-    RUN_FULL(test_yield_regularised);
-    RUN_FULL(test_yield_channel);
+    RUN_FULL_ONCE(test_yield_regularised);
+    RUN_FULL_ONCE(test_yield_channel);
     RUN_SLOW(test_yield_dimensional);
-    RUN_FULL(test_yield_slump);
+    RUN_FULL_ONCE(test_yield_slump);
     RUN_ONCE(test_yield_presets);
 }

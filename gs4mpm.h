@@ -16509,26 +16509,47 @@ static gs4_real gs4i_smoothed_away(const gs4i_staggered *f, const gs4_real *q, c
     return GS4I_C(0.25) * sum;
 }
 
-/* div u~ of liquid cells, for J, where the right-hand side was, with what its way to J and back to
- * cells smooths away. The largest. */
+/* div u~ of liquid cells, where pressure was. */
+static void gs4i_divergence_of_cells(int z, void *context)
+{
+    const gs4i_staggered_pass *pass = (const gs4i_staggered_pass *)context;
+    gs4i_staggered *f = &pass->sim->staggered;
+    int at[3];
+    size_t i;
+    GS4I_BOX_PLANE(&f->box, GS4I_AT_CELL, z, at, i) {
+        f->pressure[i] = 0;
+        if (f->kind[i] == GS4_CELL_LIQUID && !gs4i_is_copy(f, at))
+            f->pressure[i] = gs4i_face_divergence(f, GS4I_FACE_STAGE, at, pass->sim->grid.inv_h);
+    }
+}
+
+/* The same for J, where the right-hand side was, with what its way to J and back smooths away. */
+static void gs4i_divergence_for_volume(int z, void *context)
+{
+    const gs4i_staggered_pass *pass = (const gs4i_staggered_pass *)context;
+    gs4i_staggered *f = &pass->sim->staggered;
+    int at[3];
+    size_t i;
+    GS4I_BOX_PLANE(&f->box, GS4I_AT_CELL, z, at, i) {
+        f->rhs[i] = 0;
+        if (f->kind[i] == GS4_CELL_LIQUID && !gs4i_is_copy(f, at))
+            f->rhs[i] = f->pressure[i] + gs4i_smoothed_away(f, f->pressure, at);
+    }
+}
+
+/* div u~ for J. The largest. */
 static gs4_real gs4i_find_divergence(gs4_sim *sim)
 {
     gs4i_staggered *f = &sim->staggered;
+    gs4i_staggered_pass pass;
     gs4_real most = 0;
-    int z, at[3];
     size_t i;
-    for (z = 0; z < f->box.size[2]; z++)
-        GS4I_BOX_PLANE(&f->box, GS4I_AT_CELL, z, at, i) {
-            f->pressure[i] = f->rhs[i] = 0;
-            if (f->kind[i] == GS4_CELL_LIQUID && !gs4i_is_copy(f, at))
-                f->pressure[i] = gs4i_face_divergence(f, GS4I_FACE_STAGE, at, sim->grid.inv_h);
-        }
-    for (z = 0; z < f->box.size[2]; z++)
-        GS4I_BOX_PLANE(&f->box, GS4I_AT_CELL, z, at, i) {
-            if (f->kind[i] != GS4_CELL_LIQUID || gs4i_is_copy(f, at)) continue;
-            f->rhs[i] = f->pressure[i] + gs4i_smoothed_away(f, f->pressure, at);
-            most = gs4i_max(most, gs4i_abs(f->rhs[i]));
-        }
+    memset(&pass, 0, sizeof pass);
+    pass.sim = sim;
+    gs4i_parallel_for(&sim->tasks, f->box.size[2], gs4i_divergence_of_cells, &pass);
+    gs4i_parallel_for(&sim->tasks, f->box.size[2], gs4i_divergence_for_volume, &pass);
+    for (i = 0; i < gs4i_box_count(&f->box, GS4I_AT_CELL); i++)
+        most = gs4i_max(most, gs4i_abs(f->rhs[i]));
     gs4i_each_mirror(sim, GS4I_AT_CELL, f->rhs, gs4i_fill_number);
     gs4i_wrap_cells(sim, f->rhs, 1);
     return most;
@@ -19177,7 +19198,7 @@ static gs4i_integrator gs4i_make_integrator(const gs4_sim *sim, gs4_real dt)
     k.impact = GS4I_C(0.5);
     if (k.restart && sim->desc.integrator == GS4_INTEGRATOR_GS4)
         k.impact /= 1 + k.alpha_m - k.gamma;
-    gs4i_family(&k, r, s, k.restart);
+    if (k.restart) gs4i_family(&k, r, s, 1);
     if (sim->desc.integrator == GS4_INTEGRATOR_BACKWARD_EULER) k.alpha_m = k.alpha_f = k.gamma = 1;
     k.affine_ratio = k.restart || sim->desc.integrator != GS4_INTEGRATOR_GS4 || !(sim->last_dt > 0)
                          ? GS4I_C(0)

@@ -527,7 +527,7 @@ static void partitioned_dam(int square)
     static const double T[2][5] = { { 0.97, 1.29, 1.62, 1.93, 2.24 },
                                     { 1.43, 1.83, 2.2, 2.51, 2.83 } },
                         Z[5] = { 1.67, 2.11, 2.56, 3, 3.44 };
-    const int n = test_full ? 16 : 8;
+    const int n = 16;
     gs4_sim_desc d = partitioned_cube(n);
     const gs4_material m = partitioned_liquid(0);
     gs4_fill f = scene_fill(at(0, 0, 0));

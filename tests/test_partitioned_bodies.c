@@ -5,7 +5,7 @@ typedef struct bodies_case {
     contact_frame f;
     gs4_sim_desc d;
     gs4_material m;
-    int shape, is_soft;
+    int shape;
     gs4_wall contact;
     double deep, friction;
 } bodies_case;

@@ -5,7 +5,7 @@
  *   A column, 0.05 m high and wide, collapses in a tank twice as long, sloshes and settles: depth
  *   by the height of its centre of mass. And what the first second of water takes.
  *   cc -O3 -march=native bench/volume.c -I. -lm -o volume
- *   ./volume [--cells N] [--seconds N] [--repeats N] [--out FILE]        half a minute
+ *   ./volume [--cells N] [--seconds N] [--repeats N] [--out FILE]        a minute
  * Cells over D, four fifths of it over the column; seconds until the pool is looked at; runs of the
  * first second. CSV on standard output, the drop as a chart in FILE, volume.svg. */
 #define _POSIX_C_SOURCE 200112L

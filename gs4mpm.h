@@ -46,6 +46,7 @@
  *                                                    [[grid]]      blocks of nodes near material
  *                                                    [[box]]       dense box of cells around them
  *                                                    [[elliptic]]  one scalar equation on the box
+ *                                                    [[stokes]]    velocity and pressure at once
  *                                                    [[particles]] the store, and how it is sorted
  *                                                    [[liquid]]    pressure, viscosity, presets
  *                                                    [[viscoelastic]] non-local stress
@@ -6309,6 +6310,1183 @@ static int gs4i_elliptic_solve(gs4i_elliptic *e, const gs4_sim_desc *desc)
     e->iterations += stats.iterations;
     e->residual = stats.residual;
     return result;
+}
+
+/* ==== [[stokes]] velocity and pressure together, on faces and cells ============================ *
+ *
+ * One step of an implicit viscous flow: u at faces, p in cells, and
+ *
+ *     A u - B^T p = b,   A = M + D^T W D        momentum of each unknown face           (ST1)
+ *     B u + C p   = e                           volume of each liquid cell              (ST2)
+ *
+ * M = w rho/s, C = 1/(s K) or 0, b and e as the scheme has them. B is the divergence, B^T minus the
+ * gradient. D u are the rates of strain by rows, W what energy they cost:
+ *
+ *     normal, a liquid cell and an axis a      (u_a behind - u_a before)/h             W = 2 mu
+ *     shear, an edge across the axes a and b   (du_a/db + du_b/da), differences over h
+ *                                              W = mu_e n/4, n liquid cells of four, and
+ *                                              mu_e the harmonic mean of their mu
+ *
+ *          u_a[c] o-----+-----  the edge is +; its faces in the order of gs4i_stokes_row:
+ *                 |     |       0: u_a of c    2: u_b of c
+ *        u_b[c-a] |--o--+--o--  1: u_a of c-b  3: u_b of c-a
+ *                 |     |  u_b[c]
+ *         u_a[c-b]      o
+ *
+ * With the arithmetic mean the edge of a stiff cell ties two faces outside of it by one equation,
+ * and sharp stiff inclusions never converge. An edge has no row where one of its faces is none, or
+ * where two liquid cells touch only there, with air on both sides. Products compute rows first, by
+ * differences: translations and rotations give 0 to rounding.
+ *
+ * WALLS. A face is none, unknown, given (its value is in u), or lies within a wall, along it:
+ * its value is the mirror image of its partner across the edge, odd (2 u_wall - partner, u_wall is
+ * in u: sticks) or even (partner: slips). Then its pair of the row is 2 (partner - u_wall), or 0.
+ *
+ * SIZES. Lengths are in h, masses in T (a power of two near the mean of M):
+ *     u' = u, p' = p/(T h), M' = M/T, W' = W/(T h^2), C' = C T h^2, b' = b/T, e' = h e
+ * and residuals are those of the primed equations, all rows alike. mu' is cut off at 1e6 times the
+ * mass around: beyond, float loses the mass beside it, and nothing changes that could be seen; at
+ * 1e2 in cells with less than two liquid neighbours, which are spray.
+ *
+ * Larionov, Batty & Bridson 2017. */
+
+/* What a face is. */
+enum {
+    GS4I_STOKES_NONE = 0, /* between cells of air, or beyond the box */
+    GS4I_STOKES_UNKNOWN,
+    GS4I_STOKES_GIVEN,
+    GS4I_STOKES_ODD, /* within a wall: 2 u - partner */
+    GS4I_STOKES_EVEN /* within a wall: its partner */
+};
+
+/* --- the equations, numbered ------------------------------------------------------------------ */
+
+#define GS4I_STOKES_STIFFEST 1e6 /* times the mass around a cell: mu' is cut off there; */
+#define GS4I_STOKES_SPRAY 1e2    /* in cells with less than two liquid neighbours */
+
+enum {
+    GS4I_STOKES_COLOURS = 48, /* see gs4i_stokes_colour */
+    GS4I_STOKES_CHUNK = 2048, /* numbers a task; sums have its order */
+    GS4I_STOKES_RESTART = 30,
+    /* what is counted in planes: faces by colour, cells, rows */
+    GS4I_STOKES_CELLS = GS4I_STOKES_COLOURS,
+    GS4I_STOKES_ROWS,
+    GS4I_STOKES_COUNTS
+};
+
+/* Faces, rows and cells that count have numbers from 1 on; 0 is nobody: a face that does not move,
+ * a row without weight, a cell without pressure. A link is twice a number, and 1 more where the
+ * face counts double, beside its odd mirror image. */
+typedef uint32_t gs4i_link;
+
+/* Of a plane: mass of its unknown faces, their number, and a value that will not do. */
+typedef struct gs4i_stokes_look {
+    double mass, faces;
+    const char *fault, *accepted;
+    double value;
+} gs4i_stokes_look;
+
+typedef struct gs4i_stokes_system {
+    double h, mass_unit;                     /* T */
+    int32_t faces, rows, cells, all;         /* with nobody; faces and cells together */
+    int32_t colour[GS4I_STOKES_COLOURS + 1]; /* first face of each */
+    int32_t *number[4], *counts;             /* of faces of each axis, and of cells, in the box */
+    double *sums;                            /* per plane or task, added in order */
+    gs4i_stokes_look *look;
+    /* per face: M'; share in B; its links, signs + - + - + -: rows of the cells
+     * before and behind, of the low and the high edge along each other axis; cells before and
+     * behind */
+    gs4_real *mass, *share;
+    gs4i_link (*face_rows)[6];
+    int32_t (*face_cells)[2];
+    /* per cell: C'; mu'; faces, signs - + - + - +; its closed pocket from 1 on,
+     * or 0 */
+    gs4_real *compliance, *viscosity;
+    int32_t (*cell_faces)[6], *pocket;
+    /* per row: W'; what given faces add to it; its links, signs + - + - */
+    gs4_real *weight, *given;
+    gs4i_link (*row_faces)[4];
+    /* of all, faces, then cells: solution, b', residual or product, what it is of; bases of GMRES;
+     * per row: W' D u */
+    double *x, *b, *r, *z, *stress;
+    gs4_real *basis;
+    float *inverse; /* 1 / diagonal of A', and of what pressure meets */
+    int32_t pockets;
+    double *pocket_sum, *pocket_cells;
+    gs4i_scratch maps, numbered, linked, vectors;
+} gs4i_stokes_system;
+
+/* What the solve is given, in the layout of the box; faces across axis c are [c], edges along axis
+ * e are [e]. Along periodic axes `first` to `end` are the cells that are solved for, those at the
+ * ends are neighbours, and face `end` is face `first`; entries beyond are neither read nor
+ * written. */
+typedef struct gs4i_stokes {
+    const gs4i_box *box;
+    const gs4i_tasks *tasks;
+    gs4i_memory *memory;
+    int first[3], end[3];
+    gs4_real h;
+    const uint8_t *kind;       /* gs4_cell; p is unknown in the liquid, 0 in the air */
+    const uint8_t *face[3];    /* GS4I_STOKES_...; all four cells of an unknown's normal rows ... */
+    const gs4_real *mass[3];   /* M, of unknown faces: above 0 */
+    const gs4_real *open[3];   /* share of unknown and given faces in B; NULL: 1 */
+    const gs4_real *viscosity; /* mu of liquid cells, 0 or above */
+    const gs4_real *compliance; /* C of liquid cells; NULL: 0 */
+    const gs4_real *rhs[3];     /* b of unknown faces */
+    const gs4_real *rhs_p;      /* e of liquid cells */
+    gs4_real *u[3], *p;         /* in: what is given, and a guess; out */
+    double tolerance;           /* relative residual */
+    int max_iterations;
+    int threads; /* how finely work is cut: as in gs4_poisson_desc */
+    /* out */
+    int iterations, pockets;
+    double residual, removed_mean;
+    const char *fault, *accepted; /* what was wrong, in words */
+    double fault_value;
+    gs4i_stokes_system system; /* kept from solve to solve, zeros at first */
+} gs4i_stokes;
+
+/* --- rows of strain --------------------------------------------------------------------------- */
+
+/* Entry of a place `steps` beyond `at` along an axis, around periodic ones; is there one? */
+static int gs4i_stokes_entry(const gs4i_stokes *s, int place, const int at[3], int axis, int steps,
+                             size_t *entry)
+{
+    int p[3], a;
+    for (a = 0; a < 3; a++) {
+        const int low = s->first[a], high = s->end[a];
+        p[a] = at[a] + (a == axis ? steps : 0);
+        if (s->box->periodic[a] && p[a] < low) p[a] += high - low;
+        if (s->box->periodic[a] && p[a] >= high) p[a] -= high - low;
+        if (p[a] < low || p[a] >= high + (!s->box->periodic[a] && (place >> a & 1))) return 0;
+    }
+    *entry = gs4i_box_index(s->box, place, p[0], p[1], p[2]);
+    return 1;
+}
+
+/* All entries i, at at[], of a place in the plane z that are solved for. */
+#define GS4I_STOKES_LENGTH(s, place, a) \
+    ((s)->end[a] + (!(s)->box->periodic[a] && ((place) >> (a)&1)))
+#define GS4I_STOKES_PLANE(s, place, z, at, i)                                             \
+    for (at[2] = (z), at[1] = (z) < GS4I_STOKES_LENGTH(s, place, 2)                       \
+                                  ? (s)->first[1]                                         \
+                                  : GS4I_STOKES_LENGTH(s, place, 1);                      \
+         at[1] < GS4I_STOKES_LENGTH(s, place, 1); at[1]++)                                \
+        for (at[0] = (s)->first[0], i = gs4i_box_index((s)->box, place, at[0], at[1], z); \
+             at[0] < GS4I_STOKES_LENGTH(s, place, 0); at[0]++, i++)
+
+/* The row of an edge: its faces in the order of the picture, and what they are multiplied by. */
+typedef struct gs4i_stokes_row {
+    int axis[4];
+    size_t face[4], cell[4];
+    int coefficient[4]; /* signs included */
+    int liquid, cells;  /* n; a bit for each of its cells that is liquid */
+} gs4i_stokes_row;
+
+/* Are its cells such that it has a row? */
+static int gs4i_stokes_edge_cells(const gs4i_stokes *s, int e, const int at[3],
+                                  gs4i_stokes_row *row)
+{
+    const int a = (e + 1) % 3, b = (e + 2) % 3;
+    int k, air = 0;
+    row->liquid = row->cells = 0;
+    for (k = 0; k < 4; k++) {
+        int p[3];
+        memcpy(p, at, sizeof p);
+        p[a] -= k >> 1;
+        if (!gs4i_stokes_entry(s, GS4I_AT_CELL, p, b, -(k & 1), &row->cell[k])) {
+            air |= 1 << k;
+            continue;
+        }
+        if (s->kind[row->cell[k]] == GS4_CELL_AIR) air |= 1 << k;
+        if (s->kind[row->cell[k]] != GS4_CELL_LIQUID) continue;
+        row->cells |= 1 << k;
+        row->liquid++;
+    }
+    /* 0 and 3 are across the edge from each other, so are 1 and 2 */
+    return row->liquid && !(row->cells == 9 && air == 6) && !(row->cells == 6 && air == 9);
+}
+
+/* The row of an edge along e; 0 if it has none. */
+static int gs4i_stokes_edge(const gs4i_stokes *s, int e, const int at[3], gs4i_stokes_row *row)
+{
+    const int a = (e + 1) % 3, b = (e + 2) % 3;
+    int k, what[4];
+    if (!gs4i_stokes_edge_cells(s, e, at, row)) return 0;
+    for (k = 0; k < 4; k++) {
+        row->axis[k] = k < 2 ? a : b;
+        if (!gs4i_stokes_entry(s, 1 << row->axis[k], at, k < 2 ? b : a, -(k & 1), &row->face[k]))
+            return 0;
+        what[k] = s->face[row->axis[k]][row->face[k]];
+        if (what[k] == GS4I_STOKES_NONE) return 0;
+        row->coefficient[k] = k & 1 ? -1 : 1;
+    }
+    for (k = 0; k < 4; k += 2) {
+        const int here = what[k] >= GS4I_STOKES_ODD, there = what[k + 1] >= GS4I_STOKES_ODD;
+        const int mirror = here ? what[k] : what[k + 1];
+        if (!here && !there) continue;
+        row->coefficient[k] *= here && there ? 0 : mirror == GS4I_STOKES_ODD ? 2 : 0;
+        row->coefficient[k + 1] = -row->coefficient[k];
+    }
+    return row->liquid;
+}
+
+/* The row of a cell along axis a: its faces behind and before; 0 if it has none. */
+static int gs4i_stokes_normal(const gs4i_stokes *s, int a, const int at[3], size_t face[2])
+{
+    size_t cell;
+    return gs4i_stokes_entry(s, GS4I_AT_CELL, at, a, 0, &cell) && s->kind[cell] == GS4_CELL_LIQUID
+           && gs4i_stokes_entry(s, 1 << a, at, a, 1, &face[0])
+           && gs4i_stokes_entry(s, 1 << a, at, a, 0, &face[1])
+           && s->face[a][face[0]] != GS4I_STOKES_NONE && s->face[a][face[1]] != GS4I_STOKES_NONE;
+}
+
+/* Rates of strain of s->u: of each liquid cell du_a/da in normal[a]; of each edge along e, across a
+ * and b, du_a/db + du_b/da in shear[e]; 0 where there is no row. */
+typedef struct gs4i_stokes_strain {
+    const gs4i_stokes *s;
+    gs4_real *const *normal, *const *shear, *const *force;
+    gs4_real scale;
+} gs4i_stokes_strain;
+
+static void gs4i_stokes_rates_plane(int z, void *context)
+{
+    const gs4i_stokes_strain *t = (const gs4i_stokes_strain *)context;
+    const gs4i_stokes *s = t->s;
+    const gs4_real inv_h = 1 / s->h;
+    gs4i_stokes_row row;
+    int at[3], a, e;
+    size_t i, face[2];
+    for (a = 0; a < 3; a++) GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i)
+    t->normal[a][i] = gs4i_stokes_normal(s, a, at, face)
+                          ? inv_h * (s->u[a][face[0]] - s->u[a][face[1]])
+                          : GS4I_C(0);
+    for (e = 0; e < 3; e++) GS4I_STOKES_PLANE(s, 7 ^ 1 << e, z, at, i)
+        {
+            gs4_real sum[4];
+            int k;
+            t->shear[e][i] = 0;
+            if (!gs4i_stokes_edge(s, e, at, &row)) continue;
+            for (k = 0; k < 4; k++)
+                sum[k] = row.coefficient[k]
+                             ? GS4I_C(row.coefficient[k]) * s->u[row.axis[k]][row.face[k]]
+                             : 0;
+            t->shear[e][i] = inv_h * ((sum[0] + sum[1]) + (sum[2] + sum[3]));
+        }
+}
+
+static void gs4i_stokes_rates(const gs4i_stokes *s, gs4_real *const normal[3],
+                              gs4_real *const shear[3])
+{
+    gs4i_stokes_strain t;
+    t.s = s;
+    t.normal = normal;
+    t.shear = shear;
+    t.force = NULL;
+    t.scale = 0;
+    gs4i_parallel_for(s->tasks, s->box->size[2] + 1, gs4i_stokes_rates_plane, &t);
+}
+
+/* force += scale D^T w q at unknown faces, of stresses q at cells (q_aa in normal[a]) and edges
+ * (q_ab in shear[e], across a and b); w is 1 for a cell, n/4 for an edge: -1 is the force of q on a
+ * volume. Edges without row are not read. */
+static void gs4i_stokes_forces_plane(int z, void *context)
+{
+    const gs4i_stokes_strain *t = (const gs4i_stokes_strain *)context;
+    const gs4i_stokes *s = t->s;
+    const gs4_real scale = t->scale / s->h;
+    gs4i_stokes_row row;
+    int at[3], c, q;
+    size_t i, from, face[2];
+    for (c = 0; c < 3; c++) GS4I_STOKES_PLANE(s, 1 << c, z, at, i)
+        {
+            gs4_real sum[6] = { 0, 0, 0, 0, 0, 0 };
+            if (s->face[c][i] != GS4I_STOKES_UNKNOWN) continue;
+            for (q = 0; q < 6; q++) {
+                /* rows in the order of gs4i_stokes_system's face_rows */
+                const int e = (c + 1 + q / 4) % 3, k = (q < 4 ? 2 : 0) + (q & 1);
+                int to[3];
+                memcpy(to, at, sizeof to);
+                if (q < 2) {
+                    to[c] += q - 1;
+                    if (gs4i_stokes_normal(s, c, to, face)
+                        && gs4i_stokes_entry(s, GS4I_AT_CELL, to, c, 0, &from))
+                        sum[q] = GS4I_C(1 - 2 * q) * t->normal[c][from];
+                    continue;
+                }
+                to[3 - c - e] += q & 1;
+                if (gs4i_stokes_edge(s, e, to, &row)
+                    && gs4i_stokes_entry(s, 7 ^ 1 << e, to, e, 0, &from))
+                    sum[q] =
+                        GS4I_C(0.25) * GS4I_C(row.liquid * row.coefficient[k]) * t->shear[e][from];
+            }
+            t->force[c][i] += scale * ((sum[0] + sum[1]) + ((sum[2] + sum[3]) + (sum[4] + sum[5])));
+        }
+}
+
+static void gs4i_stokes_add_forces(const gs4i_stokes *s, gs4_real *const normal[3],
+                                   gs4_real *const shear[3], gs4_real scale,
+                                   gs4_real *const force[3])
+{
+    gs4i_stokes_strain t;
+    t.s = s;
+    t.normal = normal;
+    t.shear = shear;
+    t.force = force;
+    t.scale = scale;
+    gs4i_parallel_for(s->tasks, s->box->size[2] + 1, gs4i_stokes_forces_plane, &t);
+}
+
+/* --- numbers ---------------------------------------------------------------------------------- */
+
+/* Faces of one colour share no row: axis, parity of i + j + k; the last cells along periodic axes
+ * with an odd number of cells, which have neighbours of their own parity, by themselves. */
+static int gs4i_stokes_colour(const gs4i_stokes *s, int c, const int at[3])
+{
+    int a, last = 0;
+    for (a = 0; a < 3; a++)
+        last |= (s->box->periodic[a] && ((s->end[a] - s->first[a]) & 1) && at[a] == s->end[a] - 1)
+                << a;
+    return c + 3 * ((at[0] + at[1] + at[2]) & 1) + 6 * last;
+}
+
+typedef struct gs4i_stokes_task {
+    gs4i_stokes *s;
+    int filling; /* numbers are counted, then given */
+} gs4i_stokes_task;
+
+/* Numbers of faces and cells of a plane, in the order of the box. */
+static void gs4i_stokes_number_plane(int z, void *context)
+{
+    const gs4i_stokes_task *t = (const gs4i_stokes_task *)context;
+    const gs4i_stokes *s = t->s;
+    const gs4i_stokes_system *y = &s->system;
+    int32_t *count = y->counts + (size_t)z * GS4I_STOKES_COUNTS;
+    int at[3], c;
+    size_t i;
+    for (c = 0; c < 3; c++) GS4I_STOKES_PLANE(s, 1 << c, z, at, i)
+        {
+            int32_t n;
+            y->number[c][i] = 0;
+            if (s->face[c][i] != GS4I_STOKES_UNKNOWN) continue;
+            n = count[gs4i_stokes_colour(s, c, at)]++;
+            if (!t->filling) continue;
+            y->number[c][i] = n;
+            y->mass[n] = GS4I_C((double)s->mass[c][i] / y->mass_unit);
+            y->share[n] = s->open[c] ? s->open[c][i] : 1;
+        }
+    GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i)
+    {
+        int32_t n;
+        y->number[3][i] = 0;
+        if (s->kind[i] != GS4_CELL_LIQUID) continue;
+        n = count[GS4I_STOKES_CELLS]++;
+        if (!t->filling) continue;
+        y->number[3][i] = n;
+        y->compliance[n] =
+            s->compliance ? GS4I_C((double)s->compliance[i] * y->mass_unit * y->h * y->h) : 0;
+    }
+}
+
+/* mu' of a cell with faces f of axes a, see SIZES. */
+static double gs4i_stokes_cut_viscosity(const gs4i_stokes *s, const int at[3], size_t cell,
+                                        const int32_t f[6])
+{
+    const gs4i_stokes_system *y = &s->system;
+    const double mu = (double)s->viscosity[cell] / (y->mass_unit * y->h * y->h);
+    double mass = 0, most;
+    int q, faces = 0, neighbours = 0;
+    size_t i;
+    for (q = 0; q < 6; q++) {
+        faces += f[q] > 0;
+        mass += f[q] ? (double)y->mass[f[q]] : 0;
+        neighbours += gs4i_stokes_entry(s, GS4I_AT_CELL, at, q / 2, 2 * (q & 1) - 1, &i)
+                      && s->kind[i] == GS4_CELL_LIQUID;
+    }
+    most = (neighbours > 1 ? GS4I_STOKES_STIFFEST : GS4I_STOKES_SPRAY) * mass / (faces ? faces : 1);
+    return mu < most ? mu : most;
+}
+
+/* Faces of cells, and cells of faces. */
+static void gs4i_stokes_join_plane(int z, void *context)
+{
+    gs4i_stokes *s = (gs4i_stokes *)context;
+    gs4i_stokes_system *y = &s->system;
+    int at[3], c, q;
+    size_t i, to;
+    GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i)
+    {
+        const int32_t n = y->number[3][i];
+        if (!n) continue;
+        for (q = 0; q < 6; q++)
+            y->cell_faces[n][q] =
+                gs4i_stokes_entry(s, 1 << q / 2, at, q / 2, q & 1, &to) ? y->number[q / 2][to] : 0;
+        y->viscosity[n] = GS4I_C(gs4i_stokes_cut_viscosity(s, at, i, y->cell_faces[n]));
+    }
+    for (c = 0; c < 3; c++) GS4I_STOKES_PLANE(s, 1 << c, z, at, i)
+        {
+            const int32_t n = y->number[c][i];
+            for (q = 0; q < 2 && n; q++)
+                y->face_cells[n][q] =
+                    gs4i_stokes_entry(s, GS4I_AT_CELL, at, c, q - 1, &to) ? y->number[3][to] : 0;
+        }
+}
+
+/* A row as it is numbered: its faces and coefficients, W', and what given faces add. */
+typedef struct gs4i_stokes_terms {
+    int axis[4], coefficient[4], count;
+    size_t face[4];
+    double weight;
+} gs4i_stokes_terms;
+
+/* Row q of a place: 0 1 2 of a cell, 3 4 5 of an edge. Is there one with weight and an unknown? */
+static int gs4i_stokes_find_row(const gs4i_stokes *s, int q, const int at[3], gs4i_stokes_terms *t)
+{
+    const gs4i_stokes_system *y = &s->system;
+    gs4i_stokes_row row;
+    size_t cell;
+    double sum = 0;
+    int k, unknowns = 0;
+    t->count = q < 3 ? 2 : 4;
+    if (q < 3) {
+        if (!gs4i_stokes_normal(s, q, at, t->face)) return 0;
+        gs4i_stokes_entry(s, GS4I_AT_CELL, at, q, 0, &cell);
+        t->weight = 2 * (double)y->viscosity[y->number[3][cell]];
+        for (k = 0; k < 2; k++) {
+            t->axis[k] = q;
+            t->coefficient[k] = 1 - 2 * k;
+        }
+    } else {
+        if (!gs4i_stokes_edge(s, q - 3, at, &row)) return 0;
+        for (k = 0; k < 4; k++) {
+            t->axis[k] = row.axis[k];
+            t->face[k] = row.face[k];
+            t->coefficient[k] = row.coefficient[k];
+            if (row.cells >> k & 1) sum += 1 / (double)y->viscosity[y->number[3][row.cell[k]]];
+        }
+        t->weight = 0.25 * row.liquid * (row.liquid / sum);
+    }
+    for (k = 0; k < t->count; k++)
+        unknowns += t->coefficient[k] && y->number[t->axis[k]][t->face[k]];
+    return unknowns && t->weight > 0;
+}
+
+static void gs4i_stokes_fill_row(gs4i_stokes_system *y, const gs4i_stokes_terms *t, int q,
+                                 int32_t n)
+{
+    int k;
+    y->weight[n] = GS4I_C(t->weight);
+    for (k = 0; k < 4; k++) {
+        const int32_t f = k < t->count && t->coefficient[k] ? y->number[t->axis[k]][t->face[k]] : 0;
+        const gs4i_link twice = k < t->count && abs(t->coefficient[k]) == 2;
+        y->row_faces[n][k] = f ? 2 * (gs4i_link)f + twice : 0;
+        /* a cell is before its face behind; an edge along e is among the third and fourth rows of
+         * faces across e + 2 */
+        if (f) y->face_rows[f][(q < 3 ? 0 : k < 2 ? 4 : 2) + (k & 1)] = 2 * (gs4i_link)n + twice;
+    }
+}
+
+/* Rows of a plane: counted, linked, or, once there is a solution to find, what given faces add. */
+enum {
+    GS4I_STOKES_COUNT,
+    GS4I_STOKES_LINK,
+    GS4I_STOKES_GIVE
+};
+
+static void gs4i_stokes_row_plane(int z, void *context)
+{
+    const gs4i_stokes_task *t = (const gs4i_stokes_task *)context;
+    gs4i_stokes *s = t->s;
+    gs4i_stokes_system *y = &s->system;
+    int32_t *count = y->counts + (size_t)z * GS4I_STOKES_COUNTS + GS4I_STOKES_ROWS,
+            n = t->filling == GS4I_STOKES_COUNT ? 0 : *count;
+    gs4i_stokes_terms row;
+    int at[3], q, k;
+    size_t i;
+    for (q = 0; q < 6; q++) GS4I_STOKES_PLANE(s, q < 3 ? GS4I_AT_CELL : 7 ^ 1 << (q - 3), z, at, i)
+        {
+            if (!gs4i_stokes_find_row(s, q, at, &row)) continue;
+            if (t->filling == GS4I_STOKES_LINK) gs4i_stokes_fill_row(y, &row, q, n);
+            if (t->filling == GS4I_STOKES_GIVE) {
+                gs4_real sum[4] = { 0, 0, 0, 0 };
+                for (k = 0; k < row.count; k++)
+                    if (row.coefficient[k] && !y->number[row.axis[k]][row.face[k]])
+                        sum[k] = GS4I_C(row.coefficient[k]) * s->u[row.axis[k]][row.face[k]];
+                y->given[n] = (sum[0] + sum[1]) + (sum[2] + sum[3]);
+            }
+            n++;
+        }
+    if (t->filling == GS4I_STOKES_COUNT) *count = n;
+}
+
+/* Numbers of a plane into numbers of all, from 1 on; gives how many there are, with nobody. */
+static int32_t gs4i_stokes_sum_counts(const gs4i_stokes *s, int what, int32_t next)
+{
+    int z;
+    for (z = 0; z <= s->box->size[2]; z++) {
+        int32_t *count = s->system.counts + (size_t)z * GS4I_STOKES_COUNTS + what;
+        const int32_t here = *count;
+        *count = next;
+        next += here;
+    }
+    return next;
+}
+
+/* --- closed pockets --------------------------------------------------------------------------- */
+
+static int32_t gs4i_stokes_root(int32_t *pocket, int32_t a)
+{
+    while (pocket[a] != a) a = pocket[a] = pocket[pocket[a]];
+    return a;
+}
+
+/* Parts of the liquid that no unknown face joins to air, and that do not compress: p is unique
+ * there but for its mean, and the mean of e' must vanish. The air is cell 0. */
+static void gs4i_stokes_find_pockets(gs4i_stokes *s)
+{
+    gs4i_stokes_system *y = &s->system;
+    int32_t *pocket = y->pocket, f, c;
+    y->pockets = 0;
+    for (c = 0; c < y->cells; c++) pocket[c] = y->compliance[c] > 0 ? 0 : c;
+    for (f = 1; f < y->faces; f++)
+        if (y->share[f] > 0) {
+            const int32_t a = gs4i_stokes_root(pocket, y->face_cells[f][0]),
+                          b = gs4i_stokes_root(pocket, y->face_cells[f][1]);
+            pocket[a > b ? a : b] = a > b ? b : a;
+        }
+    for (c = 1; c < y->cells; c++) pocket[c] = gs4i_stokes_root(pocket, c);
+    /* a root is before all that it holds; numbers are negative for a while */
+    for (c = 1; c < y->cells; c++)
+        if (pocket[c] == c)
+            pocket[c] = -++y->pockets;
+        else
+            pocket[c] = pocket[pocket[c]];
+    for (c = 1; c < y->cells; c++) pocket[c] = -pocket[c];
+}
+
+/* Takes the mean in each closed pocket from v, of cells; the largest. */
+static double gs4i_stokes_take_means(gs4i_stokes_system *y, double *v)
+{
+    double most = 0;
+    int32_t c, k;
+    if (!y->pockets) return 0;
+    for (k = 0; k <= y->pockets; k++) y->pocket_sum[k] = y->pocket_cells[k] = 0;
+    for (c = 1; c < y->cells; c++) {
+        y->pocket_sum[y->pocket[c]] += v[c];
+        y->pocket_cells[y->pocket[c]]++;
+    }
+    y->pocket_sum[0] = 0;
+    for (k = 1; k <= y->pockets; k++) {
+        y->pocket_sum[k] /= y->pocket_cells[k];
+        if (fabs(y->pocket_sum[k]) > most) most = fabs(y->pocket_sum[k]);
+    }
+    for (c = 1; c < y->cells; c++) v[c] -= y->pocket_sum[y->pocket[c]];
+    return most;
+}
+
+/* --- setup ------------------------------------------------------------------------------------ */
+
+static void gs4i_stokes_check(gs4i_stokes_look *look, gs4_real v, gs4_real least, const char *what,
+                              const char *accepted)
+{
+    if (v >= least && v < GS4I_HUGE) return;
+    look->fault = what;
+    look->accepted = accepted;
+    look->value = (double)v;
+}
+
+static void gs4i_stokes_look_plane(int z, void *context)
+{
+    static const char *const at_least_0 = "; it must be 0 or a finite number above that is not "
+                                          "absurdly large";
+    gs4i_stokes *s = (gs4i_stokes *)context;
+    gs4i_stokes_look *look = &s->system.look[z];
+    int at[3], c;
+    size_t i;
+    memset(look, 0, sizeof *look);
+    for (c = 0; c < 3; c++) GS4I_STOKES_PLANE(s, 1 << c, z, at, i)
+        {
+            if (s->face[c][i] != GS4I_STOKES_UNKNOWN) continue;
+            gs4i_stokes_check(look, s->mass[c][i], GS4I_TINY, "mass[] of an unknown face holds ",
+                              "; it must be above 0 and not absurdly large");
+            if (s->open[c]) gs4i_stokes_check(look, s->open[c][i], 0, "open[] holds ", at_least_0);
+            look->mass += (double)s->mass[c][i];
+            look->faces++;
+        }
+    GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i)
+    {
+        if (s->kind[i] != GS4_CELL_LIQUID) continue;
+        gs4i_stokes_check(look, s->viscosity[i], 0, "viscosity[] holds ", at_least_0);
+        if (s->compliance)
+            gs4i_stokes_check(look, s->compliance[i], 0, "compliance[] holds ", at_least_0);
+    }
+}
+
+/* T, once all values are looked at. */
+static int gs4i_stokes_choose_unit(gs4i_stokes *s)
+{
+    gs4i_stokes_system *y = &s->system;
+    double mass = 0, faces = 0;
+    int z, exponent = 0;
+    for (z = 0; z <= s->box->size[2]; z++) {
+        const gs4i_stokes_look *look = &y->look[z];
+        mass += look->mass;
+        faces += look->faces;
+        if (!look->fault) continue;
+        s->fault = look->fault;
+        s->fault_value = look->value;
+        s->accepted = look->accepted;
+        return GS4_ERROR_ARGUMENT;
+    }
+    frexp(faces > 0 ? mass / faces : 1, &exponent);
+    y->h = (double)s->h;
+    y->mass_unit = ldexp(1, exponent);
+    return GS4_OK;
+}
+
+static void gs4i_stokes_run(gs4i_stokes *s, gs4_task_fn task, int filling)
+{
+    gs4i_stokes_task t;
+    t.s = s;
+    t.filling = filling;
+    gs4i_parallel_for(s->tasks, s->box->size[2] + 1, task, &t);
+}
+
+/* Room in the box, before anything is counted. */
+static int gs4i_stokes_reserve_maps(gs4i_stokes *s)
+{
+    gs4i_stokes_system *y = &s->system;
+    const size_t planes = (size_t)s->box->size[2] + 1;
+    char *base = NULL;
+    int laid, c;
+    for (laid = 0; laid < 2; laid++) {
+        size_t used = 0;
+        for (c = 0; c < 4; c++)
+            y->number[c] = (int32_t *)gs4i_carve(
+                base, &used, gs4i_box_count(s->box, c < 3 ? 1 << c : GS4I_AT_CELL), 4);
+        y->counts = (int32_t *)gs4i_carve(base, &used, planes * GS4I_STOKES_COUNTS, 4);
+        y->look = (gs4i_stokes_look *)gs4i_carve(base, &used, planes, sizeof *y->look);
+        if (!laid && !gs4i_scratch_reserve(s->memory, &y->maps, used, 0)) return GS4_ERROR_MEMORY;
+        base = (char *)y->maps.data;
+    }
+    memset(y->counts, 0, planes * GS4I_STOKES_COUNTS * sizeof *y->counts);
+    return GS4_OK;
+}
+
+/* Of each face and cell; number 0 is all zeros. */
+static int gs4i_stokes_reserve_numbered(gs4i_stokes *s)
+{
+    gs4i_stokes_system *y = &s->system;
+    const size_t f = (size_t)y->faces, p = (size_t)y->cells, real = sizeof(gs4_real);
+    char *base = NULL;
+    int laid;
+    for (laid = 0; laid < 2; laid++) {
+        size_t used = 0;
+        y->mass = (gs4_real *)gs4i_carve(base, &used, f, real);
+        y->share = (gs4_real *)gs4i_carve(base, &used, f, real);
+        y->face_rows = (gs4i_link(*)[6])gs4i_carve(base, &used, f, sizeof *y->face_rows);
+        y->face_cells = (int32_t(*)[2])gs4i_carve(base, &used, f, sizeof *y->face_cells);
+        y->compliance = (gs4_real *)gs4i_carve(base, &used, p, real);
+        y->viscosity = (gs4_real *)gs4i_carve(base, &used, p, real);
+        y->cell_faces = (int32_t(*)[6])gs4i_carve(base, &used, p, sizeof *y->cell_faces);
+        y->pocket = (int32_t *)gs4i_carve(base, &used, p, 4);
+        if (!laid && !gs4i_scratch_reserve(s->memory, &y->numbered, used, 0))
+            return GS4_ERROR_MEMORY;
+        base = (char *)y->numbered.data;
+        if (laid) memset(base, 0, used);
+    }
+    return GS4_OK;
+}
+
+static int gs4i_stokes_reserve_rows(gs4i_stokes *s)
+{
+    gs4i_stokes_system *y = &s->system;
+    const size_t n = (size_t)y->rows;
+    char *base = NULL;
+    int laid;
+    for (laid = 0; laid < 2; laid++) {
+        size_t used = 0;
+        y->stress = (double *)gs4i_carve(base, &used, n, sizeof(double));
+        y->weight = (gs4_real *)gs4i_carve(base, &used, n, sizeof(gs4_real));
+        y->given = (gs4_real *)gs4i_carve(base, &used, n, sizeof(gs4_real));
+        y->row_faces = (gs4i_link(*)[4])gs4i_carve(base, &used, n, sizeof *y->row_faces);
+        if (!laid && !gs4i_scratch_reserve(s->memory, &y->linked, used, 0)) return GS4_ERROR_MEMORY;
+        base = (char *)y->linked.data;
+    }
+    y->weight[0] = y->given[0] = 0;
+    memset(y->row_faces[0], 0, sizeof y->row_faces[0]);
+    return GS4_OK;
+}
+
+static int gs4i_stokes_reserve_vectors(gs4i_stokes *s)
+{
+    gs4i_stokes_system *y = &s->system;
+    const size_t n = (size_t)y->all, tasks = (n + GS4I_STOKES_CHUNK - 1) / GS4I_STOKES_CHUNK;
+    char *base = NULL;
+    int laid;
+    for (laid = 0; laid < 2; laid++) {
+        double **const vectors[4] = { &y->x, &y->b, &y->r, &y->z };
+        size_t used = 0;
+        int k;
+        for (k = 0; k < 4; k++) *vectors[k] = (double *)gs4i_carve(base, &used, n, sizeof(double));
+        y->sums = (double *)gs4i_carve(base, &used, tasks, sizeof(double));
+        y->inverse = (float *)gs4i_carve(base, &used, n, sizeof(float));
+        y->pocket_sum = (double *)gs4i_carve(base, &used, (size_t)y->pockets + 1, sizeof(double));
+        y->pocket_cells = (double *)gs4i_carve(base, &used, (size_t)y->pockets + 1, sizeof(double));
+        y->basis =
+            (gs4_real *)gs4i_carve(base, &used, n * (GS4I_STOKES_RESTART + 1), sizeof(gs4_real));
+        if (!laid && !gs4i_scratch_reserve(s->memory, &y->vectors, used, 0))
+            return GS4_ERROR_MEMORY;
+        base = (char *)y->vectors.data;
+    }
+    return GS4_OK;
+}
+
+/* --- products --------------------------------------------------------------------------------- */
+
+typedef struct gs4i_stokes_product {
+    gs4i_stokes *s;
+    const double *in;
+    double *out;
+    int affine; /* with what is given: out = b' - A' in */
+} gs4i_stokes_product;
+
+#define GS4I_STOKES_RANGE(index, count, begin, end)  \
+    const int32_t begin = (index)*GS4I_STOKES_CHUNK, \
+                  end = begin + GS4I_STOKES_CHUNK < (count) ? begin + GS4I_STOKES_CHUNK : (count)
+
+static int gs4i_stokes_tasks(int32_t count)
+{
+    return (int)((count + GS4I_STOKES_CHUNK - 1) / GS4I_STOKES_CHUNK);
+}
+
+GS4I_INLINE double gs4i_linked(const double *v, gs4i_link link)
+{
+    return (double)(1 + (int)(link & 1)) * v[link >> 1];
+}
+
+/* W' times the rows. */
+static void gs4i_stokes_stress_task(int index, void *context)
+{
+    const gs4i_stokes_product *t = (const gs4i_stokes_product *)context;
+    const gs4i_stokes_system *y = &t->s->system;
+    GS4I_STOKES_RANGE(index, y->rows, begin, end);
+    int32_t r;
+    for (r = begin; r < end; r++) {
+        const gs4i_link *k = y->row_faces[r];
+        const double rate = (gs4i_linked(t->in, k[0]) - gs4i_linked(t->in, k[1]))
+                            + (gs4i_linked(t->in, k[2]) - gs4i_linked(t->in, k[3]));
+        y->stress[r] = (double)y->weight[r] * (t->affine ? rate + (double)y->given[r] : rate);
+    }
+}
+
+/* Faces: M' u + D^T stress - B^T p; cells: B u + C' p. */
+static void gs4i_stokes_face_task(int index, void *context)
+{
+    const gs4i_stokes_product *t = (const gs4i_stokes_product *)context;
+    const gs4i_stokes_system *y = &t->s->system;
+    const double *p = t->in + y->faces;
+    GS4I_STOKES_RANGE(index, y->faces, begin, end);
+    int32_t f;
+    for (f = begin; f < end; f++) {
+        const gs4i_link *k = y->face_rows[f];
+        const double force = (gs4i_linked(y->stress, k[0]) - gs4i_linked(y->stress, k[1]))
+                             + ((gs4i_linked(y->stress, k[2]) - gs4i_linked(y->stress, k[3]))
+                                + (gs4i_linked(y->stress, k[4]) - gs4i_linked(y->stress, k[5])));
+        const double push = (double)y->share[f] * (p[y->face_cells[f][0]] - p[y->face_cells[f][1]]);
+        const double sum = (double)y->mass[f] * t->in[f] + force - push;
+        t->out[f] = t->affine ? y->b[f] - sum : sum;
+    }
+}
+
+static void gs4i_stokes_cell_task(int index, void *context)
+{
+    const gs4i_stokes_product *t = (const gs4i_stokes_product *)context;
+    const gs4i_stokes_system *y = &t->s->system;
+    const double *u = t->in;
+    GS4I_STOKES_RANGE(index, y->cells, begin, end);
+    int32_t c;
+    for (c = begin; c < end; c++) {
+        const int32_t *f = y->cell_faces[c];
+        const double flow =
+            (((double)y->share[f[1]] * u[f[1]] - (double)y->share[f[0]] * u[f[0]])
+             + ((double)y->share[f[3]] * u[f[3]] - (double)y->share[f[2]] * u[f[2]]))
+            + ((double)y->share[f[5]] * u[f[5]] - (double)y->share[f[4]] * u[f[4]]);
+        const double sum = flow + (double)y->compliance[c] * u[y->faces + c];
+        t->out[y->faces + c] = t->affine ? y->b[y->faces + c] - sum : sum;
+    }
+}
+
+/* out = A' in, or the residual b' - A' in with what is given; not in place. */
+static void gs4i_stokes_apply(gs4i_stokes *s, const double *in, double *out, int affine)
+{
+    const gs4i_stokes_system *y = &s->system;
+    gs4i_stokes_product t;
+    t.s = s;
+    t.in = in;
+    t.out = out;
+    t.affine = affine;
+    gs4i_parallel_for(s->tasks, gs4i_stokes_tasks(y->rows), gs4i_stokes_stress_task, &t);
+    gs4i_parallel_for(s->tasks, gs4i_stokes_tasks(y->faces), gs4i_stokes_face_task, &t);
+    gs4i_parallel_for(s->tasks, gs4i_stokes_tasks(y->cells), gs4i_stokes_cell_task, &t);
+}
+
+/* --- the preconditioner ----------------------------------------------------------------------- */
+
+/* 1 / diagonal of A'; of C' + B A^-1 B^T. */
+static void gs4i_stokes_diagonals(gs4i_stokes *s)
+{
+    gs4i_stokes_system *y = &s->system;
+    int32_t f, c;
+    int k;
+    for (f = 1; f < y->faces; f++) {
+        double sum = (double)y->mass[f];
+        for (k = 0; k < 6; k++) {
+            const gs4i_link link = y->face_rows[f][k];
+            sum += (link & 1 ? 4 : 1) * (double)y->weight[link >> 1];
+        }
+        y->inverse[f] = (float)(1 / sum);
+    }
+    y->inverse[0] = y->inverse[y->faces] = 0;
+    for (c = 1; c < y->cells; c++) {
+        double sum = (double)y->compliance[c];
+        for (k = 0; k < 6; k++) {
+            const int32_t face = y->cell_faces[c][k];
+            sum += (double)y->share[face] * (double)y->share[face] * (double)y->inverse[face];
+        }
+        y->inverse[y->faces + c] = sum > 0 ? (float)(1 / sum) : 0;
+    }
+}
+
+/* z about A'^-1 r. */
+static void gs4i_stokes_precondition(gs4i_stokes *s)
+{
+    gs4i_stokes_system *y = &s->system;
+    int32_t i;
+    for (i = 0; i < y->all; i++) y->z[i] = (double)y->inverse[i] * y->r[i];
+    gs4i_stokes_take_means(y, y->z + y->faces);
+}
+
+/* --- GMRES ------------------------------------------------------------------------------------ *
+ *
+ * Saad & Schultz 1986, preconditioned from the right, restarted; modified Gram-Schmidt. */
+
+typedef struct gs4i_stokes_sum {
+    gs4i_stokes *s;
+    const double *a, *b; /* a may be NULL: then `basis` is in its place */
+    const gs4_real *basis;
+    double *to, scale;
+} gs4i_stokes_sum;
+
+static void gs4i_stokes_dot_task(int index, void *context)
+{
+    const gs4i_stokes_sum *t = (const gs4i_stokes_sum *)context;
+    const gs4i_stokes_system *y = &t->s->system;
+    GS4I_STOKES_RANGE(index, y->all, begin, end);
+    double sum[4] = { 0, 0, 0, 0 };
+    int32_t i;
+    for (i = begin; i < end; i++) sum[i & 3] += (t->a ? t->a[i] : (double)t->basis[i]) * t->b[i];
+    y->sums[index] = (sum[0] + sum[1]) + (sum[2] + sum[3]);
+}
+
+static double gs4i_stokes_dot(gs4i_stokes *s, const double *a, const gs4_real *basis,
+                              const double *b)
+{
+    const int tasks = gs4i_stokes_tasks(s->system.all);
+    gs4i_stokes_sum t;
+    double sum = 0;
+    int k;
+    memset(&t, 0, sizeof t);
+    t.s = s;
+    t.a = a;
+    t.basis = basis;
+    t.b = b;
+    gs4i_parallel_for(s->tasks, tasks, gs4i_stokes_dot_task, &t);
+    for (k = 0; k < tasks; k++) sum += s->system.sums[k];
+    return sum;
+}
+
+/* to += scale a */
+static void gs4i_stokes_add_task(int index, void *context)
+{
+    const gs4i_stokes_sum *t = (const gs4i_stokes_sum *)context;
+    GS4I_STOKES_RANGE(index, t->s->system.all, begin, end);
+    int32_t i;
+    for (i = begin; i < end; i++) t->to[i] += t->scale * (double)t->basis[i];
+}
+
+static void gs4i_stokes_add(gs4i_stokes *s, double *to, double scale, const gs4_real *a)
+{
+    gs4i_stokes_sum t;
+    memset(&t, 0, sizeof t);
+    t.s = s;
+    t.basis = a;
+    t.to = to;
+    t.scale = scale;
+    gs4i_parallel_for(s->tasks, gs4i_stokes_tasks(s->system.all), gs4i_stokes_add_task, &t);
+}
+
+static gs4_real *gs4i_stokes_basis(const gs4i_stokes_system *y, int k)
+{
+    return y->basis + (size_t)k * (size_t)y->all;
+}
+
+/* Basis k = scale r, and r = that. */
+static void gs4i_stokes_store_basis(gs4i_stokes *s, int k, double scale)
+{
+    gs4i_stokes_system *y = &s->system;
+    gs4_real *v = gs4i_stokes_basis(y, k);
+    int32_t i;
+    for (i = 0; i < y->all; i++) {
+        v[i] = GS4I_C(scale * y->r[i]);
+        y->r[i] = (double)v[i];
+    }
+}
+
+/* The least squares problem of a cycle: Givens rotations, R, right-hand side. */
+typedef struct gs4i_stokes_squares {
+    double R[GS4I_STOKES_RESTART][GS4I_STOKES_RESTART + 1], c[GS4I_STOKES_RESTART],
+        s[GS4I_STOKES_RESTART], g[GS4I_STOKES_RESTART + 1];
+} gs4i_stokes_squares;
+
+/* Column k is there: turns its last entry to 0; gives the residual. */
+static double gs4i_stokes_rotate(gs4i_stokes_squares *q, int k)
+{
+    double *h = q->R[k], size;
+    int i;
+    for (i = 0; i < k; i++) {
+        const double t = q->c[i] * h[i] + q->s[i] * h[i + 1];
+        h[i + 1] = q->c[i] * h[i + 1] - q->s[i] * h[i];
+        h[i] = t;
+    }
+    size = sqrt(h[k] * h[k] + h[k + 1] * h[k + 1]);
+    q->c[k] = size > 0 ? h[k] / size : 1;
+    q->s[k] = size > 0 ? h[k + 1] / size : 0;
+    h[k] = size;
+    q->g[k + 1] = -q->s[k] * q->g[k];
+    q->g[k] *= q->c[k];
+    return fabs(q->g[k + 1]);
+}
+
+/* r = sum of the basis with the coefficients that make the residual least. */
+static void gs4i_stokes_combine(gs4i_stokes *s, gs4i_stokes_squares *q, int n)
+{
+    gs4i_stokes_system *y = &s->system;
+    int k, j;
+    memset(y->r, 0, (size_t)y->all * sizeof *y->r);
+    for (k = n - 1; k >= 0; k--) {
+        for (j = k + 1; j < n; j++) q->g[k] -= q->R[j][k] * q->g[j];
+        q->g[k] = q->R[k][k] > 0 ? q->g[k] / q->R[k][k] : 0;
+    }
+    for (k = 0; k < n; k++) gs4i_stokes_add(s, y->r, q->g[k], gs4i_stokes_basis(y, k));
+}
+
+/* A cycle from the residual in r, of size `norm`: z is what to add to x. */
+static void gs4i_stokes_cycle(gs4i_stokes *s, double norm, double goal)
+{
+    gs4i_stokes_system *y = &s->system;
+    gs4i_stokes_squares q;
+    double left = norm, size = norm;
+    int k, j;
+    q.g[0] = norm;
+    for (k = 0; k < GS4I_STOKES_RESTART && left > goal && s->iterations < s->max_iterations; k++) {
+        gs4i_stokes_store_basis(s, k, 1 / size);
+        gs4i_stokes_precondition(s);
+        gs4i_stokes_apply(s, y->z, y->r, 0);
+        for (j = 0; j <= k; j++) {
+            q.R[k][j] = gs4i_stokes_dot(s, NULL, gs4i_stokes_basis(y, j), y->r);
+            gs4i_stokes_add(s, y->r, -q.R[k][j], gs4i_stokes_basis(y, j));
+        }
+        size = sqrt(gs4i_stokes_dot(s, y->r, NULL, y->r));
+        q.R[k][k + 1] = size;
+        s->iterations++;
+        left = gs4i_stokes_rotate(&q, k);
+        if (!(size > 1e-14 * q.R[k][k])) {
+            k++;
+            break;
+        }
+    }
+    gs4i_stokes_combine(s, &q, k);
+    gs4i_stokes_precondition(s);
+}
+
+static int gs4i_stokes_fault(gs4i_stokes *s, const char *what, double value, const char *accepted)
+{
+    s->fault = what;
+    s->fault_value = value;
+    s->accepted = accepted;
+    return GS4_ERROR_ARGUMENT;
+}
+
+/* Everything that depends on the matrix. */
+static int gs4i_stokes_setup(gs4i_stokes *s)
+{
+    gs4i_stokes_system *y = &s->system;
+    int k;
+    s->fault = NULL;
+    if (gs4i_stokes_reserve_maps(s) != GS4_OK) return GS4_ERROR_MEMORY;
+    gs4i_parallel_for(s->tasks, s->box->size[2] + 1, gs4i_stokes_look_plane, s);
+    GS4I_TRY(gs4i_stokes_choose_unit(s));
+    gs4i_stokes_run(s, gs4i_stokes_number_plane, 0);
+    y->faces = 1;
+    for (k = 0; k < GS4I_STOKES_COLOURS; k++) {
+        y->colour[k] = y->faces;
+        y->faces = gs4i_stokes_sum_counts(s, k, y->faces);
+    }
+    y->colour[k] = y->faces;
+    y->cells = gs4i_stokes_sum_counts(s, GS4I_STOKES_CELLS, 1);
+    y->all = y->faces + y->cells;
+    if (gs4i_stokes_reserve_numbered(s) != GS4_OK) return GS4_ERROR_MEMORY;
+    gs4i_stokes_run(s, gs4i_stokes_number_plane, 1);
+    gs4i_parallel_for(s->tasks, s->box->size[2] + 1, gs4i_stokes_join_plane, s);
+    gs4i_stokes_run(s, gs4i_stokes_row_plane, GS4I_STOKES_COUNT);
+    y->rows = gs4i_stokes_sum_counts(s, GS4I_STOKES_ROWS, 1);
+    if (gs4i_stokes_reserve_rows(s) != GS4_OK) return GS4_ERROR_MEMORY;
+    gs4i_stokes_run(s, gs4i_stokes_row_plane, GS4I_STOKES_LINK);
+    gs4i_stokes_find_pockets(s);
+    if (gs4i_stokes_reserve_vectors(s) != GS4_OK) return GS4_ERROR_MEMORY;
+    gs4i_stokes_diagonals(s);
+    return GS4_OK;
+}
+
+static void gs4i_stokes_free(gs4i_stokes *s)
+{
+    gs4i_stokes_system *y = &s->system;
+    gs4i_release(s->memory, &y->maps);
+    gs4i_release(s->memory, &y->numbered);
+    gs4i_release(s->memory, &y->linked);
+    gs4i_release(s->memory, &y->vectors);
+}
+
+/* --- solving ---------------------------------------------------------------------------------- */
+
+/* What flows into a cell through given faces, over h^2. */
+static double gs4i_stokes_inflow(const gs4i_stokes *s, const int at[3])
+{
+    gs4_real flow[6] = { 0, 0, 0, 0, 0, 0 };
+    size_t i;
+    int q;
+    for (q = 0; q < 6; q++)
+        if (gs4i_stokes_entry(s, 1 << q / 2, at, q / 2, q & 1, &i)
+            && s->face[q / 2][i] == GS4I_STOKES_GIVEN)
+            flow[q] = (s->open[q / 2] ? s->open[q / 2][i] : 1) * s->u[q / 2][i];
+    return (double)((flow[0] - flow[1]) + (flow[2] - flow[3]) + (flow[4] - flow[5]));
+}
+
+/* b' and the guess of a plane; what given faces add to rows is apart, to cells not. */
+static void gs4i_stokes_load_plane(int z, void *context)
+{
+    gs4i_stokes *s = (gs4i_stokes *)context;
+    gs4i_stokes_system *y = &s->system;
+    double *b = y->b + y->faces, *p = y->x + y->faces;
+    int at[3], c;
+    size_t i;
+    for (c = 0; c < 3; c++) GS4I_STOKES_PLANE(s, 1 << c, z, at, i)
+        {
+            const int32_t f = y->number[c][i];
+            if (!f) continue;
+            y->b[f] = (double)s->rhs[c][i] / y->mass_unit;
+            y->x[f] = (double)s->u[c][i];
+        }
+    GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i)
+    {
+        const int32_t n = y->number[3][i];
+        if (!n) continue;
+        b[n] = (double)s->rhs_p[i] * y->h + gs4i_stokes_inflow(s, at);
+        p[n] = (double)s->p[i] / (y->mass_unit * y->h);
+    }
+}
+
+static void gs4i_stokes_store_plane(int z, void *context)
+{
+    gs4i_stokes *s = (gs4i_stokes *)context;
+    const gs4i_stokes_system *y = &s->system;
+    const double *p = y->x + y->faces;
+    int at[3], c;
+    size_t i;
+    for (c = 0; c < 3; c++) GS4I_STOKES_PLANE(s, 1 << c, z, at, i)
+    if (y->number[c][i]) s->u[c][i] = GS4I_C(y->x[y->number[c][i]]);
+    GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i)
+    if (y->number[3][i]) s->p[i] = GS4I_C(p[y->number[3][i]] * (y->mass_unit * y->h));
+}
+
+/* r = b' - A' v; its size. */
+static double gs4i_stokes_residual(gs4i_stokes *s, const double *v)
+{
+    gs4i_stokes_system *y = &s->system;
+    gs4i_stokes_apply(s, v, y->r, 1);
+    return sqrt(gs4i_stokes_dot(s, y->r, NULL, y->r));
+}
+
+/* From the guess in x; gives its residual, and in *size that of 0. The worse of both is dropped. */
+static double gs4i_stokes_begin(gs4i_stokes *s, double *size)
+{
+    gs4i_stokes_system *y = &s->system;
+    double norm;
+    y->x[0] = y->x[y->faces] = y->b[0] = y->b[y->faces] = 0;
+    gs4i_stokes_run(s, gs4i_stokes_row_plane, GS4I_STOKES_GIVE);
+    gs4i_parallel_for(s->tasks, s->box->size[2] + 1, gs4i_stokes_load_plane, s);
+    s->removed_mean = gs4i_stokes_take_means(y, y->b + y->faces) / y->h;
+    gs4i_stokes_take_means(y, y->x + y->faces);
+    memset(y->z, 0, (size_t)y->all * sizeof *y->z);
+    *size = gs4i_stokes_residual(s, y->z);
+    norm = gs4i_stokes_residual(s, y->x);
+    if (norm < *size) return norm;
+    memset(y->x, 0, (size_t)y->all * sizeof *y->x);
+    return gs4i_stokes_residual(s, y->x);
+}
+
+/* Cycles until the true residual is `goal`; it is what the last one left. x never gets worse. */
+static gs4i_outcome gs4i_stokes_iterate(gs4i_stokes *s, double goal, double *norm)
+{
+    gs4i_stokes_system *y = &s->system;
+    while (*norm > goal) {
+        const double before = *norm;
+        double after, *t = y->x;
+        int32_t i;
+        if (s->iterations >= s->max_iterations) return GS4I_LIMIT;
+        gs4i_stokes_cycle(s, before, goal);
+        for (i = 0; i < y->all; i++) y->z[i] += y->x[i];
+        after = gs4i_stokes_residual(s, y->z);
+        if (!(after < before)) return GS4I_STAGNATED;
+        *norm = after;
+        y->x = y->z;
+        y->z = t;
+        if (after > 0.9 * before && s->iterations < s->max_iterations) return GS4I_STAGNATED;
+    }
+    return GS4I_CONVERGED;
+}
+
+/* For the matrix that was set up: GS4_OK, or GS4_ERROR_NOT_CONVERGED with the best iterate there
+ * was, or GS4_ERROR_ARGUMENT where a right-hand side or a guess is not finite. */
+static int gs4i_stokes_find(gs4i_stokes *s)
+{
+    gs4i_stokes_system *y = &s->system;
+    gs4i_outcome end;
+    double size, norm;
+    s->iterations = 0;
+    s->residual = 0;
+    s->pockets = y->pockets;
+    s->fault = NULL;
+    norm = gs4i_stokes_begin(s, &size);
+    if (!(size <= DBL_MAX))
+        return gs4i_stokes_fault(s, "the size of the right-hand side is ", size,
+                                 "; rhs, rhs_p and what is given of u must be finite");
+    end = gs4i_stokes_iterate(s, s->tolerance * size, &norm);
+    gs4i_stokes_take_means(y, y->x + y->faces);
+    gs4i_parallel_for(s->tasks, s->box->size[2] + 1, gs4i_stokes_store_plane, s);
+    s->residual = size > 0 ? norm / size : 0;
+    if (norm <= s->tolerance * size) return GS4_OK;
+    s->fault = gs4i_ends[end][0];
+    s->accepted = gs4i_ends[end][1];
+    return GS4_ERROR_NOT_CONVERGED;
+}
+
+/* Both. GS4_ERROR_MEMORY and GS4_ERROR_ARGUMENT (`fault` says what) leave u and p as they were. */
+static int gs4i_stokes_solve(gs4i_stokes *s)
+{
+    const int result = gs4i_stokes_setup(s);
+    return result == GS4_OK ? gs4i_stokes_find(s) : result;
 }
 
 /* ==== [[particles]] the store, and how it is sorted by block =================================== *
@@ -22990,6 +24168,11 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_SQRT
 #undef GS4I_STICKY_REACH
 #undef GS4I_STORE
+#undef GS4I_STOKES_LENGTH
+#undef GS4I_STOKES_PLANE
+#undef GS4I_STOKES_RANGE
+#undef GS4I_STOKES_SPRAY
+#undef GS4I_STOKES_STIFFEST
 #undef GS4I_STRIP
 #undef GS4I_STRONG
 #undef GS4I_SUM

@@ -20,6 +20,7 @@
 #include "test_stress.c"
 #include "test_yield.c"
 #include "test_poisson.c"
+#include "test_stokes.c"
 #include "test_symmetry.c"
 #include "test_contact.c"
 #include "test_partitioned.c"
@@ -109,6 +110,7 @@ int main(int count, char **values)
     run_stress();
     run_yield();
     run_poisson();
+    run_stokes();
     run_symmetry();
     run_contact();
     run_partitioned();

@@ -1,0 +1,518 @@
+/* Velocity and pressure in one solve: against a dense solve from the definition, identities of the
+ * strain, each wall alone, failures. Run all with run_stokes(). */
+
+enum {
+    STOK_ROOM = 1024,
+    STOK_DENSE = 640
+};
+
+/* A random domain: cells, what its faces are, coefficients. */
+typedef struct stok_case {
+    gs4i_box box;
+    gs4i_tasks tasks;
+    gs4i_memory memory;
+    gs4i_stokes s;
+    uint64_t random;
+    uint8_t kind[STOK_ROOM], face[3][STOK_ROOM];
+    gs4_real mass[3][STOK_ROOM], open[3][STOK_ROOM], viscosity[STOK_ROOM], compliance[STOK_ROOM];
+    gs4_real rhs[3][STOK_ROOM], rhs_p[STOK_ROOM], u[3][STOK_ROOM], p[STOK_ROOM];
+    gs4_real normal[3][STOK_ROOM], shear[3][STOK_ROOM], force[3][STOK_ROOM];
+} stok_case;
+
+static double stok_random(stok_case *k)
+{
+    k->random = k->random * 6364136223846793005u + 1442695040888963407u;
+    return (double)(k->random >> 11) / 9007199254740992.0;
+}
+
+static int stok_kind(const stok_case *k, int x, int y, int z)
+{
+    if (x < 0 || y < 0 || z < 0 || x >= k->box.size[0] || y >= k->box.size[1]
+        || z >= k->box.size[2])
+        return GS4_CELL_SOLID;
+    return k->kind[gs4i_box_index(&k->box, GS4I_AT_CELL, x, y, z)];
+}
+
+/* From the kinds of its two cells. Within walls odd and even, at random or all `mirror`. */
+static void stok_set_faces(stok_case *k, int mirror)
+{
+    int c, at[3], z;
+    size_t i;
+    for (c = 0; c < 3; c++)
+        for (z = 0; z < k->box.size[2] + (c == 2); z++)
+            GS4I_BOX_PLANE(&k->box, 1 << c, z, at, i) {
+                const int a = stok_kind(k, at[0] - (c == 0), at[1] - (c == 1), at[2] - (c == 2)),
+                          b = stok_kind(k, at[0], at[1], at[2]);
+                k->face[c][i] = GS4I_STOKES_NONE;
+                if (a == GS4_CELL_LIQUID || b == GS4_CELL_LIQUID)
+                    k->face[c][i] = GS4I_STOKES_UNKNOWN;
+                if (a == GS4_CELL_SOLID || b == GS4_CELL_SOLID) k->face[c][i] = GS4I_STOKES_GIVEN;
+                if (a == GS4_CELL_SOLID && b == GS4_CELL_SOLID)
+                    k->face[c][i] = (uint8_t)(mirror                 ? mirror
+                                              : stok_random(k) < 0.5 ? GS4I_STOKES_ODD
+                                                                     : GS4I_STOKES_EVEN);
+                k->mass[c][i] = (gs4_real)(1 + stok_random(k));
+                k->open[c][i] = (gs4_real)(0.5 + 0.5 * stok_random(k));
+                k->rhs[c][i] = (gs4_real)(stok_random(k) - 0.5);
+                k->u[c][i] =
+                    k->face[c][i] == GS4I_STOKES_UNKNOWN ? 0 : (gs4_real)(stok_random(k) - 0.5);
+            }
+}
+
+/* n x (n + 1) x (n - 1) cells; mu up to 20 and as low as 20/contrast, compliance if `finite`. */
+static stok_case *stok_make(int n, uint64_t seed, double contrast, int finite)
+{
+    stok_case *k = (stok_case *)calloc(1, sizeof *k);
+    size_t i;
+    int a;
+    if (!k) exit(3);
+    k->random = seed;
+    k->memory.hook.alloc_fn = gs4i_default_alloc;
+    k->memory.hook.free_fn = gs4i_default_free;
+    for (a = 0; a < 3; a++) k->box.size[a] = n + (a == 1) - (a == 2);
+    for (i = 0; i < gs4i_box_count(&k->box, GS4I_AT_CELL); i++) {
+        const double v = stok_random(k);
+        k->kind[i] = (uint8_t)(v < 0.12   ? GS4_CELL_SOLID
+                               : v < 0.27 ? GS4_CELL_AIR
+                                          : GS4_CELL_LIQUID);
+        k->viscosity[i] = (gs4_real)(20 * pow(contrast, -stok_random(k)));
+        k->compliance[i] = finite ? (gs4_real)stok_random(k) : 0;
+        k->rhs_p[i] = (gs4_real)(stok_random(k) - 0.5);
+    }
+    k->s.box = &k->box;
+    k->s.tasks = &k->tasks;
+    k->s.memory = &k->memory;
+    k->s.h = 0.5;
+    k->s.kind = k->kind;
+    k->s.viscosity = k->viscosity;
+    k->s.compliance = finite ? k->compliance : NULL;
+    k->s.rhs_p = k->rhs_p;
+    k->s.p = k->p;
+    k->s.tolerance = 1e-10;
+    k->s.max_iterations = 3000;
+    for (a = 0; a < 3; a++) {
+        k->s.end[a] = k->box.size[a];
+        k->s.face[a] = k->face[a];
+        k->s.mass[a] = k->mass[a];
+        k->s.open[a] = finite ? k->open[a] : NULL;
+        k->s.rhs[a] = k->rhs[a];
+        k->s.u[a] = k->u[a];
+    }
+    stok_set_faces(k, 0);
+    return k;
+}
+
+static void stok_free(stok_case *k)
+{
+    gs4i_stokes_free(&k->s);
+    CHECK(k->memory.bytes == 0);
+    free(k);
+}
+
+/* --- the oracle: the matrix from the definition, solved by elimination ------------------------ */
+
+typedef struct stok_dense {
+    int n;
+    int face[3][STOK_ROOM], cell[STOK_ROOM]; /* 1 + number */
+    double A[STOK_DENSE][STOK_DENSE + 1];    /* right-hand side last */
+} stok_dense;
+
+/* One row of strain as weight (sum of c u - given)^2 / 2 in the energy. */
+static void stok_add_row(stok_dense *d, const int *n, const double *c, int terms, double given,
+                         double weight)
+{
+    int i, j;
+    for (i = 0; i < terms; i++)
+        for (j = 0; j < terms && n[i]; j++)
+            if (n[j]) d->A[n[i] - 1][n[j] - 1] += weight * c[i] * c[j];
+    for (i = 0; i < terms; i++)
+        if (n[i]) d->A[n[i] - 1][d->n] += weight * c[i] * given;
+}
+
+/* A difference (u at `up` - u at `low`)/h along a row: mirror images in walls, given values. */
+static int stok_difference(const stok_case *k, const stok_dense *d, int c, const int up[3],
+                           const int low[3], int *n, double *f, double *given)
+{
+    const double h = (double)k->s.h;
+    size_t i[2];
+    int q, mirror = -1;
+    for (q = 0; q < 2; q++) {
+        const int *at = q ? low : up;
+        int a;
+        for (a = 0; a < 3; a++)
+            if (at[a] < 0 || at[a] >= k->box.size[a] + (a == c)) return 0;
+        i[q] = gs4i_box_index(&k->box, 1 << c, at[0], at[1], at[2]);
+        if (k->face[c][i[q]] == GS4I_STOKES_NONE) return 0;
+        if (k->face[c][i[q]] >= GS4I_STOKES_ODD) mirror = q;
+    }
+    for (q = 0; q < 2; q++) {
+        const double sign = (q ? -1 : 1) / h;
+        const int is_odd = mirror >= 0 && k->face[c][i[mirror]] == GS4I_STOKES_ODD;
+        const double times = mirror < 0 ? 1 : is_odd ? 2 : 0;
+        n[q] = d->face[c][i[q]];
+        f[q] = sign * times;
+        if (!n[q]) *given -= f[q] * (double)k->u[c][i[q]];
+    }
+    return 1;
+}
+
+static void stok_add_edge(const stok_case *k, stok_dense *d, int e, const int at[3])
+{
+    const int a = (e + 1) % 3, b = (e + 2) % 3;
+    int n[4], q, liquid = 0, solids = 0, kinds[4], low_a[3], low_b[3];
+    double f[4], given = 0, compliance = 0;
+    for (q = 0; q < 4; q++) {
+        int p[3];
+        memcpy(p, at, sizeof p);
+        p[a] -= q & 1;
+        p[b] -= q >> 1;
+        kinds[q] = stok_kind(k, p[0], p[1], p[2]);
+        solids += kinds[q] == GS4_CELL_SOLID;
+        if (kinds[q] != GS4_CELL_LIQUID) continue;
+        liquid++;
+        compliance +=
+            1 / (double)k->viscosity[gs4i_box_index(&k->box, GS4I_AT_CELL, p[0], p[1], p[2])];
+    }
+    if (!liquid || (liquid == 2 && kinds[0] == kinds[3] && kinds[1] == kinds[2] && !solids)) return;
+    memcpy(low_a, at, sizeof low_a);
+    memcpy(low_b, at, sizeof low_b);
+    low_a[a]--;
+    low_b[b]--;
+    if (stok_difference(k, d, a, at, low_b, n, f, &given)
+        && stok_difference(k, d, b, at, low_a, n + 2, f + 2, &given))
+        stok_add_row(d, n, f, 4, given, liquid / compliance * liquid / 4);
+}
+
+static void stok_number(const stok_case *k, stok_dense *d)
+{
+    int c;
+    size_t i;
+    for (c = 0; c < 3; c++)
+        for (i = 0; i < gs4i_box_count(&k->box, 1 << c); i++)
+            if (k->face[c][i] == GS4I_STOKES_UNKNOWN) d->face[c][i] = ++d->n;
+    for (i = 0; i < gs4i_box_count(&k->box, GS4I_AT_CELL); i++)
+        if (k->kind[i] == GS4_CELL_LIQUID) d->cell[i] = ++d->n;
+}
+
+static void stok_add_cell(const stok_case *k, stok_dense *d, const int at[3], size_t cell)
+{
+    const double h = (double)k->s.h;
+    const int m = d->cell[cell] - 1;
+    size_t face[6];
+    int q;
+    gs4i_box_faces_of(&k->box, at, face);
+    d->A[m][d->n] += (double)k->rhs_p[cell];
+    d->A[m][m] += k->s.compliance ? (double)k->compliance[cell] : 0;
+    for (q = 0; q < 6; q++) {
+        const int n = d->face[q / 2][face[q]];
+        const double share = k->s.open[0] ? (double)k->open[q / 2][face[q]] : 1,
+                     flow = (q & 1 ? share : -share) / h;
+        if (!n) {
+            d->A[m][d->n] -= flow * (double)k->u[q / 2][face[q]];
+            continue;
+        }
+        d->A[m][n - 1] += flow;
+        d->A[n - 1][m] -= flow;
+    }
+    for (q = 0; q < 3; q++) {
+        int n[2];
+        double f[2], given = 0;
+        n[0] = d->face[q][face[2 * q + 1]];
+        n[1] = d->face[q][face[2 * q]];
+        f[0] = 1 / h;
+        f[1] = -1 / h;
+        if (!n[0]) given -= f[0] * (double)k->u[q][face[2 * q + 1]];
+        if (!n[1]) given -= f[1] * (double)k->u[q][face[2 * q]];
+        stok_add_row(d, n, f, 2, given, 2 * (double)k->viscosity[cell]);
+    }
+}
+
+/* Gauss-Jordan with row pivots; the solution is in the last column. */
+static void stok_eliminate(stok_dense *d)
+{
+    int i, j, m;
+    for (i = 0; i < d->n; i++) {
+        int best = i;
+        for (j = i; j < d->n; j++)
+            if (fabs(d->A[j][i]) > fabs(d->A[best][i])) best = j;
+        for (m = 0; m <= d->n; m++) {
+            const double t = d->A[i][m];
+            d->A[i][m] = d->A[best][m];
+            d->A[best][m] = t;
+        }
+        for (j = 0; j < d->n; j++) {
+            const double f = d->A[j][i] / d->A[i][i];
+            if (j == i || f == 0) continue;
+            for (m = i; m <= d->n; m++) d->A[j][m] -= f * d->A[i][m];
+        }
+    }
+    for (i = 0; i < d->n; i++) d->A[i][d->n] /= d->A[i][i];
+}
+
+static stok_dense *stok_solve_dense(const stok_case *k)
+{
+    stok_dense *d = (stok_dense *)calloc(1, sizeof *d);
+    int c, at[3], z;
+    size_t i;
+    if (!d) exit(3);
+    stok_number(k, d);
+    if (d->n > STOK_DENSE) exit(4);
+    for (c = 0; c < 3; c++)
+        for (i = 0; i < gs4i_box_count(&k->box, 1 << c); i++)
+            if (d->face[c][i]) {
+                const int m = d->face[c][i] - 1;
+                d->A[m][m] += (double)k->mass[c][i];
+                d->A[m][d->n] += (double)k->rhs[c][i];
+            }
+    for (z = 0; z <= k->box.size[2]; z++) {
+        if (z < k->box.size[2])
+            GS4I_BOX_PLANE(&k->box, GS4I_AT_CELL, z, at, i)
+                if (d->cell[i]) stok_add_cell(k, d, at, i);
+        for (c = 0; c < 3; c++) {
+            if (c == 2 && z == k->box.size[2]) continue;
+            GS4I_BOX_PLANE(&k->box, 7 ^ 1 << c, z, at, i) stok_add_edge(k, d, c, at);
+        }
+    }
+    stok_eliminate(d);
+    return d;
+}
+
+static void stok_compare(const stok_case *k, const stok_dense *d)
+{
+    double above = 0, below = 0, above_p = 0, below_p = 0;
+    int c;
+    size_t i;
+    for (c = 0; c < 3; c++)
+        for (i = 0; i < gs4i_box_count(&k->box, 1 << c); i++)
+            if (d->face[c][i]) {
+                const double x = d->A[d->face[c][i] - 1][d->n];
+                above += ((double)k->u[c][i] - x) * ((double)k->u[c][i] - x);
+                below += x * x;
+            }
+    for (i = 0; i < gs4i_box_count(&k->box, GS4I_AT_CELL); i++)
+        if (d->cell[i]) {
+            const double x = d->A[d->cell[i] - 1][d->n];
+            above_p += ((double)k->p[i] - x) * ((double)k->p[i] - x);
+            below_p += x * x;
+        }
+    /* the tolerance times the condition; in float, coefficients and solution are rounded */
+    CHECK_CLOSE(sqrt(above / below), 0, sizeof(gs4_real) == 8 ? 1e-7 : 1e-5);
+    CHECK_CLOSE(sqrt(above_p / below_p), 0, sizeof(gs4_real) == 8 ? 1e-7 : 1e-5);
+}
+
+static void test_stokes_agrees_with_dense(void)
+{
+    static const double contrasts[] = { 1, 1000 };
+    int q, solved = 0;
+    for (q = 0; q < 12; q++) {
+        stok_case *k = stok_make(4 + q % 2, (uint64_t)q + 7, contrasts[q / 2 % 2], q / 4 % 2);
+        stok_dense *d;
+        CHECK_RESULT(NULL, gs4i_stokes_solve(&k->s), GS4_OK);
+        if (!k->s.pockets) { /* there p is not unique */
+            d = stok_solve_dense(k);
+            stok_compare(k, d);
+            free(d);
+            solved++;
+        }
+        stok_free(k);
+    }
+    CHECK(solved >= 6);
+}
+
+/* --- identities ------------------------------------------------------------------------------- */
+
+/* Products are symmetric, energy is positive, B^T is the transpose of B. */
+static void test_stokes_symmetry(void)
+{
+    int q;
+    for (q = 0; q < 6; q++) {
+        stok_case *k = stok_make(5, (uint64_t)q + 90, 1000, q & 1);
+        gs4i_stokes_system *y = &k->s.system;
+        double *v[4], ab = 0, ba = 0, aa = 0, bp = 0, pb = 0;
+        int n, i;
+        CHECK_RESULT(NULL, gs4i_stokes_setup(&k->s), GS4_OK);
+        n = y->all;
+        for (i = 0; i < 4; i++) {
+            int j;
+            v[i] = (double *)calloc((size_t)n, sizeof *v[i]);
+            for (j = 1; j < y->faces && i < 2; j++) v[i][j] = stok_random(k) - 0.5;
+        }
+        for (i = 0; i < 2; i++) gs4i_stokes_apply(&k->s, v[i], v[2 + i], 0);
+        for (i = 1; i < y->faces; i++) {
+            ab += v[0][i] * v[3][i];
+            ba += v[1][i] * v[2][i];
+            aa += v[0][i] * v[2][i] - (double)y->mass[i] * v[0][i] * v[0][i];
+        }
+        CHECK_CLOSE(ab / ba, 1, 1e-11);
+        CHECK(aa > 0);
+        /* q (B u) = - u (-B^T q) */
+        memset(v[1], 0, (size_t)n * sizeof *v[1]);
+        for (i = y->faces + 1; i < n; i++) v[1][i] = stok_random(k) - 0.5;
+        gs4i_stokes_apply(&k->s, v[1], v[3], 0);
+        for (i = 1; i < y->faces; i++) bp -= v[0][i] * v[3][i];
+        for (i = y->faces + 1; i < n; i++) pb += v[1][i] * v[2][i];
+        CHECK_CLOSE(bp / pb, 1, 1e-11);
+        for (i = 0; i < 4; i++) free(v[i]);
+        stok_free(k);
+    }
+}
+
+/* All is liquid but for what `solid` says: a bit for each side of the box with a layer of solid,
+ * air on the other sides. */
+static void stok_block(stok_case *k, int solid, int mirror)
+{
+    int at[3], z, a;
+    size_t i;
+    for (z = 0; z < k->box.size[2]; z++)
+        GS4I_BOX_PLANE(&k->box, GS4I_AT_CELL, z, at, i) {
+            k->kind[i] = GS4_CELL_LIQUID;
+            for (a = 0; a < 6; a++)
+                if (at[a / 2] == (a & 1 ? k->box.size[a / 2] - 1 : 0) && !(solid >> a & 1))
+                    k->kind[i] = GS4_CELL_AIR;
+            for (a = 0; a < 6; a++)
+                if (at[a / 2] == (a & 1 ? k->box.size[a / 2] - 1 : 0) && (solid >> a & 1))
+                    k->kind[i] = GS4_CELL_SOLID;
+        }
+    stok_set_faces(k, mirror);
+}
+
+/* u = v + w x r at faces. */
+static void stok_set_motion(stok_case *k, const double v[3], const double w[3])
+{
+    const double h = (double)k->s.h;
+    int c, at[3], z, a;
+    size_t i;
+    for (c = 0; c < 3; c++)
+        for (z = 0; z < k->box.size[2] + (c == 2); z++)
+            GS4I_BOX_PLANE(&k->box, 1 << c, z, at, i) {
+                double r[3];
+                for (a = 0; a < 3; a++) r[a] = h * (at[a] + (a == c ? 0 : 0.5));
+                k->u[c][i] = (gs4_real)(v[c] + w[(c + 1) % 3] * r[(c + 2) % 3]
+                                        - w[(c + 2) % 3] * r[(c + 1) % 3]);
+            }
+}
+
+/* Free liquid that moves as a rigid body is not strained; stress neither pushes nor turns it. */
+static void test_stokes_rigid(void)
+{
+    static const double v[3] = { 0.5, -0.25, 0.125 }, w[3] = { 1, -2, 0.5 };
+    stok_case *k = stok_make(6, 5, 1, 0);
+    gs4_real *normal[3], *shear[3], *force[3];
+    double push[6] = { 0, 0, 0, 0, 0, 0 };
+    int a, b, at[3], z;
+    size_t i;
+    stok_block(k, 0, GS4I_STOKES_ODD);
+    stok_set_motion(k, v, w);
+    for (a = 0; a < 3; a++) {
+        normal[a] = k->normal[a];
+        shear[a] = k->shear[a];
+        force[a] = k->force[a];
+    }
+    gs4i_stokes_rates(&k->s, normal, shear);
+    for (a = 0; a < 3; a++)
+        for (i = 0; i < STOK_ROOM; i++) {
+            CHECK_CLOSE(normal[a][i], 0, 0);
+            CHECK_CLOSE(shear[a][i], 0, 0); /* all numbers are multiples of 1/16 */
+            normal[a][i] = (gs4_real)(stok_random(k) - 0.5);
+            shear[a][i] = (gs4_real)(stok_random(k) - 0.5);
+        }
+    gs4i_stokes_add_forces(&k->s, normal, shear, -1, force);
+    for (a = 0; a < 3; a++)
+        for (z = 0; z < k->box.size[2] + (a == 2); z++)
+            GS4I_BOX_PLANE(&k->box, 1 << a, z, at, i) {
+                push[a] += (double)force[a][i];
+                for (b = 0; b < 3; b++) /* torque e_b . (r x e_a) f */
+                    if (b != a)
+                        push[3 + b] += (b == (a + 1) % 3 ? 1 : -1) * (double)force[a][i]
+                                       * (at[3 - a - b] + 0.5);
+            }
+    for (a = 0; a < 6; a++) CHECK_CLOSE(push[a], 0, sizeof(gs4_real) == 8 ? 1e-12 : 1e-4);
+    stok_free(k);
+}
+
+/* Each wall alone, along both directions: liquid that moves past a wall at rest. At the wall the
+ * rate is 2 u/h where it sticks, 0 where it slips. */
+static void test_stokes_walls(void)
+{
+    int side, along, mirror, e, at[3], z, count;
+    size_t i;
+    for (side = 0; side < 6; side++)
+        for (along = 1; along < 3; along++)
+            for (mirror = GS4I_STOKES_ODD; mirror <= GS4I_STOKES_EVEN; mirror++) {
+                stok_case *k = stok_make(5, 5, 1, 0);
+                const int a = side / 2, c = (a + along) % 3,
+                          plane = side & 1 ? k->box.size[a] - 1 : 1;
+                double v[3] = { 0, 0, 0 }, w[3] = { 0, 0, 0 };
+                gs4_real *normal[3], *shear[3];
+                int b;
+                stok_block(k, 1 << side, mirror);
+                v[c] = 1;
+                stok_set_motion(k, v, w);
+                for (b = 0; b < 3; b++) {
+                    normal[b] = k->normal[b];
+                    shear[b] = k->shear[b];
+                    for (i = 0; i < STOK_ROOM; i++)
+                        if (k->face[b][i] != GS4I_STOKES_UNKNOWN) k->u[b][i] = 0;
+                }
+                gs4i_stokes_rates(&k->s, normal, shear);
+                e = 3 - a - c;
+                for (count = z = 0; z < k->box.size[2] + (e != 2); z++)
+                    GS4I_BOX_PLANE(&k->box, 7 ^ 1 << e, z, at, i) {
+                        const int inside = at[c] > 1 && at[c] < k->box.size[c] - 1 && at[e] > 0
+                                           && at[e] < k->box.size[e] - 1;
+                        if (at[a] != plane || !inside) continue;
+                        count++;
+                        CHECK_CLOSE(shear[e][i],
+                                    mirror == GS4I_STOKES_EVEN ? 0
+                                    : side & 1                 ? -4
+                                                               : 4,
+                                    1e-6);
+                    }
+                CHECK(count > 0);
+                stok_free(k);
+            }
+}
+
+static void stok_backwards(int count, gs4_task_fn task, void *context, void *user)
+{
+    (void)user;
+    while (count > 0) task(--count, context);
+}
+
+/* The same bits whatever the order of tasks; failures are told. */
+static void test_stokes_failures(void)
+{
+    stok_case *k = stok_make(6, 3, 10, 0), *m = stok_make(6, 3, 10, 0);
+    const gs4_real mass = k->mass[0][0];
+    size_t i;
+    m->tasks.parallel_for = stok_backwards;
+    CHECK_RESULT(NULL, gs4i_stokes_solve(&k->s), GS4_OK);
+    CHECK_RESULT(NULL, gs4i_stokes_solve(&m->s), GS4_OK);
+    CHECK(memcmp(k->u, m->u, sizeof k->u) == 0 && memcmp(k->p, m->p, sizeof k->p) == 0);
+    /* the solution as a guess; then none of it, and two iterations */
+    CHECK_RESULT(NULL, gs4i_stokes_solve(&k->s), GS4_OK);
+    CHECK(sizeof(gs4_real) == 4 || k->s.iterations <= 1);
+    for (i = 0; i < STOK_ROOM; i++) k->p[i] = 0;
+    k->s.max_iterations = 2;
+    CHECK_RESULT(NULL, gs4i_stokes_solve(&k->s), GS4_ERROR_NOT_CONVERGED);
+    CHECK(k->s.iterations == 2 && k->s.residual > 1e-10 && k->s.residual < 1);
+    CHECK(strstr(k->s.accepted, "max_iterations") != NULL);
+    for (i = 0; i < STOK_ROOM; i++) k->mass[0][i] = 0;
+    CHECK_RESULT(NULL, gs4i_stokes_solve(&k->s), GS4_ERROR_ARGUMENT);
+    CHECK(strstr(k->s.fault, "mass") != NULL);
+    for (i = 0; i < STOK_ROOM; i++) k->mass[0][i] = mass;
+    for (i = 0; i < STOK_ROOM; i++) k->rhs[1][i] = (gs4_real)NAN;
+    CHECK_RESULT(NULL, gs4i_stokes_solve(&k->s), GS4_ERROR_ARGUMENT);
+    for (i = 0; i < STOK_ROOM; i++) CHECK(gs4i_finite(k->u[1][i]));
+    stok_free(k);
+    stok_free(m);
+}
+
+static void run_stokes(void)
+{
+    RUN(test_stokes_agrees_with_dense);
+    RUN(test_stokes_symmetry);
+    RUN(test_stokes_rigid);
+    RUN(test_stokes_walls);
+    RUN(test_stokes_failures);
+}

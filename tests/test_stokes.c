@@ -6,6 +6,12 @@ enum {
     STOK_DENSE = 640
 };
 
+/* All entries i, at at[], of a place in the plane z. */
+#define STOK_PLANE(box, place, z, at, i)                                  \
+    for (at[2] = (z), at[1] = 0, i = gs4i_box_index(box, place, 0, 0, z); \
+         at[1] < gs4i_box_length(box, place, 1); at[1]++)                 \
+        for (at[0] = 0; at[0] < gs4i_box_length(box, place, 0); at[0]++, i++)
+
 /* A random domain: cells, what its faces are, coefficients. */
 typedef struct stok_case {
     gs4i_box box;
@@ -39,8 +45,8 @@ static void stok_set_faces(stok_case *k, int mirror)
     int c, at[3], z;
     size_t i;
     for (c = 0; c < 3; c++)
-        for (z = 0; z < k->box.size[2] + (c == 2); z++)
-            GS4I_BOX_PLANE(&k->box, 1 << c, z, at, i) {
+        for (z = 0; z < k->box.size[2] + (c == 2); z++) STOK_PLANE(&k->box, 1 << c, z, at, i)
+            {
                 const int a = stok_kind(k, at[0] - (c == 0), at[1] - (c == 1), at[2] - (c == 2)),
                           b = stok_kind(k, at[0], at[1], at[2]);
                 k->face[c][i] = GS4I_STOKES_NONE;
@@ -265,12 +271,11 @@ static stok_dense *stok_solve_dense(const stok_case *k)
                 d->A[m][d->n] += (double)k->rhs[c][i];
             }
     for (z = 0; z <= k->box.size[2]; z++) {
-        if (z < k->box.size[2])
-            GS4I_BOX_PLANE(&k->box, GS4I_AT_CELL, z, at, i)
-                if (d->cell[i]) stok_add_cell(k, d, at, i);
+        if (z < k->box.size[2]) STOK_PLANE(&k->box, GS4I_AT_CELL, z, at, i)
+        if (d->cell[i]) stok_add_cell(k, d, at, i);
         for (c = 0; c < 3; c++) {
             if (c == 2 && z == k->box.size[2]) continue;
-            GS4I_BOX_PLANE(&k->box, 7 ^ 1 << c, z, at, i) stok_add_edge(k, d, c, at);
+            STOK_PLANE(&k->box, 7 ^ 1 << c, z, at, i) stok_add_edge(k, d, c, at);
         }
     }
     stok_eliminate(d);
@@ -363,8 +368,8 @@ static void stok_block(stok_case *k, int solid, int mirror)
 {
     int at[3], z, a;
     size_t i;
-    for (z = 0; z < k->box.size[2]; z++)
-        GS4I_BOX_PLANE(&k->box, GS4I_AT_CELL, z, at, i) {
+    for (z = 0; z < k->box.size[2]; z++) STOK_PLANE(&k->box, GS4I_AT_CELL, z, at, i)
+        {
             k->kind[i] = GS4_CELL_LIQUID;
             for (a = 0; a < 6; a++)
                 if (at[a / 2] == (a & 1 ? k->box.size[a / 2] - 1 : 0) && !(solid >> a & 1))
@@ -383,8 +388,8 @@ static void stok_set_motion(stok_case *k, const double v[3], const double w[3])
     int c, at[3], z, a;
     size_t i;
     for (c = 0; c < 3; c++)
-        for (z = 0; z < k->box.size[2] + (c == 2); z++)
-            GS4I_BOX_PLANE(&k->box, 1 << c, z, at, i) {
+        for (z = 0; z < k->box.size[2] + (c == 2); z++) STOK_PLANE(&k->box, 1 << c, z, at, i)
+            {
                 double r[3];
                 for (a = 0; a < 3; a++) r[a] = h * (at[a] + (a == c ? 0 : 0.5));
                 k->u[c][i] = (gs4_real)(v[c] + w[(c + 1) % 3] * r[(c + 2) % 3]
@@ -418,8 +423,8 @@ static void test_stokes_rigid(void)
         }
     gs4i_stokes_add_forces(&k->s, normal, shear, -1, force);
     for (a = 0; a < 3; a++)
-        for (z = 0; z < k->box.size[2] + (a == 2); z++)
-            GS4I_BOX_PLANE(&k->box, 1 << a, z, at, i) {
+        for (z = 0; z < k->box.size[2] + (a == 2); z++) STOK_PLANE(&k->box, 1 << a, z, at, i)
+            {
                 push[a] += (double)force[a][i];
                 for (b = 0; b < 3; b++) /* torque e_b . (r x e_a) f */
                     if (b != a)
@@ -457,7 +462,8 @@ static void test_stokes_walls(void)
                 gs4i_stokes_rates(&k->s, normal, shear);
                 e = 3 - a - c;
                 for (count = z = 0; z < k->box.size[2] + (e != 2); z++)
-                    GS4I_BOX_PLANE(&k->box, 7 ^ 1 << e, z, at, i) {
+                    STOK_PLANE(&k->box, 7 ^ 1 << e, z, at, i)
+                    {
                         const int inside = at[c] > 1 && at[c] < k->box.size[c] - 1 && at[e] > 0
                                            && at[e] < k->box.size[e] - 1;
                         if (at[a] != plane || !inside) continue;

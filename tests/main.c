@@ -30,6 +30,7 @@
 #include "test_partitioned_periodic.c"
 #include "test_partitioned_flows.c"
 #include "test_partitioned_exact.c"
+#include "test_semi_implicit.c"
 #include "test_mesh.c"
 #include "test_reference.c"
 
@@ -120,6 +121,7 @@ int main(int count, char **values)
     run_partitioned_periodic();
     run_partitioned_flows();
     run_partitioned_exact();
+    run_semi_implicit();
     run_mesh();
     RUN_ONCE(test_reference);
     RUN_ONCE(test_stability);

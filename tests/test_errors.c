@@ -733,7 +733,7 @@ static void test_errors_half_hooks(void)
     d = err_desc();
     d.integrator = GS4_INTEGRATOR_BACKWARD_EULER;
     CHECK(gs4_create(&d, &sim) == GS4_ERROR_ARGUMENT && strstr(gs4_last_error(NULL), "integrator"));
-    d.scheme = GS4_SEMI_IMPLICIT;
+    d.scheme = (gs4_scheme)(GS4_SEMI_IMPLICIT + 1);
     CHECK(gs4_create(&d, &sim) == GS4_ERROR_ARGUMENT && strstr(gs4_last_error(NULL), "scheme"));
     d = err_desc();
     d.rho_inf = 0;

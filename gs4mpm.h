@@ -24561,6 +24561,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_MAX_STEPS
 #undef GS4I_MIXING
 #undef GS4I_MORE_SWEEPS
+#undef GS4I_LEAST_VISCOSITY
 #undef GS4I_MOST_CORRECTION
 #undef GS4I_FIT_TOLERANCE
 #undef GS4I_FIT_ITERATIONS

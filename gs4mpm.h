@@ -30,10 +30,11 @@
  *         return 0;
  *     }
  *
- * WHAT IT DOES NOT DO, YET. Refused with a sentence: with the semi-implicit scheme all but Newtonian
- * liquids, of any viscosity law, without heat, and all but sticky colliders, emitters and walls that
- * stick, slip, are open or periodic; with both implicit schemes friction of separating colliders. It
- * has no surface tension, no two-way coupling to colliders, no domain beyond 3992^3 cells.
+ * WHAT IT DOES NOT DO, YET. Refused with a sentence: with the semi-implicit scheme all but
+ * Newtonian liquids, of any viscosity law, without heat, and all but sticky colliders, emitters and
+ * walls that stick, slip, are open or periodic; with both implicit schemes friction of separating
+ * colliders. It has no surface tension, no two-way coupling to colliders, no domain beyond 3992^3
+ * cells.
  *
  * MAP. Sections carry a tag; grep -n '^/. ==== ' gs4mpm.h is the table of contents. A section uses
  * only sections above it.
@@ -60,7 +61,7 @@
  *                                                    [[explicit]]  the scheme: S3 to S7
  *                                                    [[staggered]] velocities on faces
  *                                                    [[partitioned]] the scheme with a projection
- *                                                    [[implicit]]  the scheme with one solve for all
+ *                                                    [[implicit]]  the scheme with one solve
  *                                                    [[conduction]] heat from node to node
  *                                                    [[scene]]     what is given to it; emitters
  *                                                    [[step]]      one step: gs4i_make_step
@@ -276,16 +277,16 @@
  * let go of in a step they hold again only where that would enter by a twentieth of a cell. They
  * have no friction yet. A step more than four times as long as the last starts its rates anew.
  *
- * THE SEMI-IMPLICIT SCHEME has viscosity in the same solve, so that no step follows that either; all
- * else is as in the partitioned one:
+ * THE SEMI-IMPLICIT SCHEME has viscosity in the same solve, so that no step follows that either;
+ * all else is as in the partitioned one:
  *     w rho (u~ - v**)/s = w rho g - grad p + div 2 mu D~,   v** = v_i - s ag
  *     p + s K div u~ = -K (J** - 1);   div u~ = 0 where K is infinite
  * mu is that of the stage's grad v_i, and cells have the mean of 1/mu: between layers of Couette
- * flow, 1 : 1000, the stress is within 2 % wherever they meet. No stress acts on a free surface. What
- * strains in cells at surfaces is taken from the nearest inside, so that modes of viscous spheres of
- * 8 cells decay within 1 %. In steps of 100 times the explicit limit Poiseuille flow is within 0.3 %
- * at 8 cells. This version's solver takes many iterations (viscous_iterations) where s mu/(rho h^2)
- * is above some 100; a step that does not converge is refused.
+ * flow, 1 : 1000, the stress is within 2 % wherever they meet. No stress acts on a free surface.
+ * What strains in cells at surfaces is taken from the nearest inside, so that modes of viscous
+ * spheres of 8 cells decay within 1 %. In steps of 100 times the explicit limit Poiseuille flow is
+ * within 0.3 % at 8 cells. This version's solver takes many iterations (viscous_iterations) where s
+ * mu/(rho h^2) is above some 100; a step that does not converge is refused.
  *
  * Symplectic Euler, the fast tier: one affine scatter with stress and one gather (MLS-MPM, APIC),
  * first order.
@@ -956,8 +957,8 @@ typedef struct gs4_stats {
      * -1 where it is not known: in callbacks, after an edit out of the grid, out of memory. */
     double occupied_volume;
     double max_speed, min_volume_ratio, max_volume_ratio, min_temperature, max_temperature;
-    /* of the last solves; the explicit scheme solves for heat alone; viscous are those for velocity
-     * and pressure together */
+    /* of the last solves; the explicit scheme solves for heat alone; viscous: for velocity and
+     * pressure together */
     int pressure_iterations, viscous_iterations, heat_iterations, elastic_iterations;
     double solver_residual; /* finite, the largest; of a step that was refused, too */
     /* So far: particles whose stress needed substeps; whose stretch had to be bounded, of liquids
@@ -18373,7 +18374,7 @@ static double gs4i_stable_partitioned_dt(const gs4_sim *sim, double c, double nu
     return dt;
 }
 
-/* ==== [[implicit]] the semi-implicit scheme: one solve for velocity and pressure ================ *
+/* ==== [[implicit]] the semi-implicit scheme: one solve for velocity and pressure =============== *
  *
  * The grid and the rest of the step are those of [[partitioned]]. Viscosity is in the solve:
  *
@@ -18547,12 +18548,12 @@ static void gs4i_describe_stokes(gs4_sim *sim)
     }
 }
 
-/* Edges at surfaces have no row where a face beyond would be in it. What they would count, n/4, goes
- * to rows nearby: else shear stress that a slanting surface has along the axes is missing in a layer
- * of half a cell, and a sphere of 8 cells turns in itself 9 % too long. So the strain of a row goes
- * on as far as the material does; where the surface lies along the axes that is of second order, as
- * shear vanishes there. Three passes: n/4; - (ring + share) of each of those that take it, the
- * nearest: 1, 2 or 3 steps along axes away; the sums. */
+/* Edges at surfaces have no row where a face beyond would be in it. What they would count, n/4,
+ * goes to rows nearby: else shear stress that a slanting surface has along the axes is missing in a
+ * layer of half a cell, and a sphere of 8 cells turns in itself 9 % too long. So the strain of a
+ * row goes on as far as the material does; where the surface lies along the axes that is of second
+ * order, as shear vanishes there. Three passes: n/4; - (ring + share) of each of those that take
+ * it, the nearest: 1, 2 or 3 steps along axes away; the sums. */
 static int gs4i_edge_ring(int n, int step[3])
 {
     step[0] = n % 3 - 1;
@@ -24680,8 +24681,8 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  * Emitters: the velocity of a filling is relative to the emitter, which travels from its start on.
  * Densities: the stable step of GS4 sees heavy particles among light ones, default speeds of sound
  * the densest material. J may be up to 256, before 16.
- * New: the partitioned scheme, for liquids of any bulk modulus; checkpoints know the scheme. New: the
- * semi-implicit scheme, for Newtonian liquids of any viscosity; gs4_stats has viscous_iterations.
+ * New: the partitioned scheme, for liquids of any bulk modulus; checkpoints know the scheme.
+ * New: the semi-implicit scheme, for Newtonian liquids; gs4_stats has viscous_iterations.
  * Coulomb friction holds without a creep. New: poses, gs4_advance_within, gs4_set_gravity,
  * gs4_set_viscosity, gs4_remove_particles; Herschel-Bulkley liquids and presets of such, with which
  * gs4_material has new members: checkpoints written before cannot be read. A step that gs4_advance

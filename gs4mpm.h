@@ -918,9 +918,9 @@ typedef enum gs4_field {
     GS4_FIELD_LIQUID_FRACTION, /* 0 to 1 */
     GS4_FIELD_FLUX,            /* q_NL, W/m^2 */
     GS4_FIELD_MASS,
-    /* Pa, of the solve of an implicit scheme, at the stage of the last step; 0 before a first step and
-     * where no liquid is near. In a pool at rest, particles laid evenly, it is within 0.05 % of rho
-     * g times the depth. With GS4_EXPLICIT there is none: (3) says it of J. */
+    /* Pa, of the solve of an implicit scheme, at the stage of the last step; 0 before a first
+     * step and where no liquid is near. In a pool at rest, particles laid evenly, it is within
+     * 0.05 % of rho g times the depth. With GS4_EXPLICIT there is none: (3) says it of J. */
     GS4_FIELD_PRESSURE
 } gs4_field;
 

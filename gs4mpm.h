@@ -6579,12 +6579,13 @@ static void gs4i_stokes_rates_plane(int z, void *context)
     gs4i_stokes_row row;
     int at[3], a, e;
     size_t i, face[2];
-    for (a = 0; a < 3; a++) GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i)
-    t->normal[a][i] = gs4i_stokes_normal(s, a, at, face)
-                          ? inv_h * (s->u[a][face[0]] - s->u[a][face[1]])
-                          : GS4I_C(0);
-    for (e = 0; e < 3; e++) GS4I_STOKES_PLANE(s, 7 ^ 1 << e, z, at, i)
-        {
+    for (a = 0; a < 3; a++)
+        GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i)
+            t->normal[a][i] = gs4i_stokes_normal(s, a, at, face)
+                                  ? inv_h * (s->u[a][face[0]] - s->u[a][face[1]])
+                                  : GS4I_C(0);
+    for (e = 0; e < 3; e++)
+        GS4I_STOKES_PLANE(s, 7 ^ 1 << e, z, at, i) {
             gs4_real sum[4];
             int k;
             t->shear[e][i] = 0;
@@ -6597,8 +6598,8 @@ static void gs4i_stokes_rates_plane(int z, void *context)
         }
 }
 
-static void gs4i_stokes_rates(const gs4i_stokes *s, gs4_real *const normal[3],
-                              gs4_real *const shear[3])
+static inline void gs4i_stokes_rates(const gs4i_stokes *s, gs4_real *const normal[3],
+                                     gs4_real *const shear[3])
 {
     gs4i_stokes_strain t;
     t.s = s;
@@ -6620,8 +6621,8 @@ static void gs4i_stokes_forces_plane(int z, void *context)
     gs4i_stokes_row row;
     int at[3], c, q;
     size_t i, from, face[2];
-    for (c = 0; c < 3; c++) GS4I_STOKES_PLANE(s, 1 << c, z, at, i)
-        {
+    for (c = 0; c < 3; c++)
+        GS4I_STOKES_PLANE(s, 1 << c, z, at, i) {
             gs4_real sum[6] = { 0, 0, 0, 0, 0, 0 };
             if (s->face[c][i] != GS4I_STOKES_UNKNOWN) continue;
             for (q = 0; q < 6; q++) {
@@ -6646,9 +6647,9 @@ static void gs4i_stokes_forces_plane(int z, void *context)
         }
 }
 
-static void gs4i_stokes_add_forces(const gs4i_stokes *s, gs4_real *const normal[3],
-                                   gs4_real *const shear[3], gs4_real scale,
-                                   gs4_real *const force[3])
+static inline void gs4i_stokes_add_forces(const gs4i_stokes *s, gs4_real *const normal[3],
+                                          gs4_real *const shear[3], gs4_real scale,
+                                          gs4_real *const force[3])
 {
     gs4i_stokes_strain t;
     t.s = s;
@@ -6686,8 +6687,8 @@ static void gs4i_stokes_number_plane(int z, void *context)
     int32_t *count = y->counts + (size_t)z * GS4I_STOKES_COUNTS;
     int at[3], c;
     size_t i;
-    for (c = 0; c < 3; c++) GS4I_STOKES_PLANE(s, 1 << c, z, at, i)
-        {
+    for (c = 0; c < 3; c++)
+        GS4I_STOKES_PLANE(s, 1 << c, z, at, i) {
             int32_t n;
             y->number[c][i] = 0;
             if (s->face[c][i] != GS4I_STOKES_UNKNOWN) continue;
@@ -6697,8 +6698,7 @@ static void gs4i_stokes_number_plane(int z, void *context)
             y->mass[n] = GS4I_C((double)s->mass[c][i] / y->mass_unit);
             y->share[n] = s->open[c] ? s->open[c][i] : 1;
         }
-    GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i)
-    {
+    GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i) {
         int32_t n;
         y->number[3][i] = 0;
         if (s->kind[i] != GS4_CELL_LIQUID) continue;
@@ -6736,8 +6736,7 @@ static void gs4i_stokes_join_plane(int z, void *context)
     gs4i_stokes_system *y = &s->system;
     int at[3], c, q;
     size_t i, to;
-    GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i)
-    {
+    GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i) {
         const int32_t n = y->number[3][i];
         if (!n) continue;
         for (q = 0; q < 6; q++)
@@ -6745,8 +6744,8 @@ static void gs4i_stokes_join_plane(int z, void *context)
                 gs4i_stokes_entry(s, 1 << q / 2, at, q / 2, q & 1, &to) ? y->number[q / 2][to] : 0;
         y->viscosity[n] = GS4I_C(gs4i_stokes_cut_viscosity(s, at, i, y->cell_faces[n]));
     }
-    for (c = 0; c < 3; c++) GS4I_STOKES_PLANE(s, 1 << c, z, at, i)
-        {
+    for (c = 0; c < 3; c++)
+        GS4I_STOKES_PLANE(s, 1 << c, z, at, i) {
             const int32_t n = y->number[c][i];
             for (q = 0; q < 2 && n; q++)
                 y->face_cells[n][q] =
@@ -6826,8 +6825,8 @@ static void gs4i_stokes_row_plane(int z, void *context)
     gs4i_stokes_terms row;
     int at[3], q, k;
     size_t i;
-    for (q = 0; q < 6; q++) GS4I_STOKES_PLANE(s, q < 3 ? GS4I_AT_CELL : 7 ^ 1 << (q - 3), z, at, i)
-        {
+    for (q = 0; q < 6; q++)
+        GS4I_STOKES_PLANE(s, q < 3 ? GS4I_AT_CELL : 7 ^ 1 << (q - 3), z, at, i) {
             if (!gs4i_stokes_find_row(s, q, at, &row)) continue;
             if (t->filling == GS4I_STOKES_LINK) gs4i_stokes_fill_row(y, &row, q, n);
             if (t->filling == GS4I_STOKES_GIVE) {
@@ -6927,8 +6926,8 @@ static void gs4i_stokes_look_plane(int z, void *context)
     int at[3], c;
     size_t i;
     memset(look, 0, sizeof *look);
-    for (c = 0; c < 3; c++) GS4I_STOKES_PLANE(s, 1 << c, z, at, i)
-        {
+    for (c = 0; c < 3; c++)
+        GS4I_STOKES_PLANE(s, 1 << c, z, at, i) {
             if (s->face[c][i] != GS4I_STOKES_UNKNOWN) continue;
             gs4i_stokes_check(look, s->mass[c][i], GS4I_TINY, "mass[] of an unknown face holds ",
                               "; it must be above 0 and not absurdly large");
@@ -6936,8 +6935,7 @@ static void gs4i_stokes_look_plane(int z, void *context)
             look->mass += (double)s->mass[c][i];
             look->faces++;
         }
-    GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i)
-    {
+    GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i) {
         if (s->kind[i] != GS4_CELL_LIQUID) continue;
         gs4i_stokes_check(look, s->viscosity[i], 0, "viscosity[] holds ", at_least_0);
         if (s->compliance)
@@ -7404,15 +7402,14 @@ static void gs4i_stokes_load_plane(int z, void *context)
     double *b = y->b + y->faces, *p = y->x + y->faces;
     int at[3], c;
     size_t i;
-    for (c = 0; c < 3; c++) GS4I_STOKES_PLANE(s, 1 << c, z, at, i)
-        {
+    for (c = 0; c < 3; c++)
+        GS4I_STOKES_PLANE(s, 1 << c, z, at, i) {
             const int32_t f = y->number[c][i];
             if (!f) continue;
             y->b[f] = (double)s->rhs[c][i] / y->mass_unit;
             y->x[f] = (double)s->u[c][i];
         }
-    GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i)
-    {
+    GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i) {
         const int32_t n = y->number[3][i];
         if (!n) continue;
         b[n] = (double)s->rhs_p[i] * y->h + gs4i_stokes_inflow(s, at);
@@ -7427,10 +7424,11 @@ static void gs4i_stokes_store_plane(int z, void *context)
     const double *p = y->x + y->faces;
     int at[3], c;
     size_t i;
-    for (c = 0; c < 3; c++) GS4I_STOKES_PLANE(s, 1 << c, z, at, i)
-    if (y->number[c][i]) s->u[c][i] = GS4I_C(y->x[y->number[c][i]]);
+    for (c = 0; c < 3; c++)
+        GS4I_STOKES_PLANE(s, 1 << c, z, at, i)
+            if (y->number[c][i]) s->u[c][i] = GS4I_C(y->x[y->number[c][i]]);
     GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i)
-    if (y->number[3][i]) s->p[i] = GS4I_C(p[y->number[3][i]] * (y->mass_unit * y->h));
+        if (y->number[3][i]) s->p[i] = GS4I_C(p[y->number[3][i]] * (y->mass_unit * y->h));
 }
 
 /* r = b' - A' v; its size. */
@@ -18577,8 +18575,8 @@ static void gs4i_count_strain_edges(int z, void *context)
     gs4i_stokes_row row;
     int e, at[3];
     size_t i;
-    for (e = 0; e < 3; e++) GS4I_STOKES_PLANE(k, 7 ^ 1 << e, z, at, i)
-        {
+    for (e = 0; e < 3; e++)
+        GS4I_STOKES_PLANE(k, 7 ^ 1 << e, z, at, i) {
             f->has_row[e][i] = gs4i_stokes_edge(k, e, at, &row) != 0;
             gs4i_stokes_edge_cells(k, e, at, &row);
             f->edge[e][i] = GS4I_C(0.25) * GS4I_C(row.liquid);
@@ -18591,8 +18589,8 @@ static void gs4i_share_edges(int z, void *context)
     const gs4i_stokes *k = &f->stokes;
     int e, at[3], step[3], n;
     size_t i, to;
-    for (e = 0; e < 3; e++) GS4I_STOKES_PLANE(k, 7 ^ 1 << e, z, at, i)
-        {
+    for (e = 0; e < 3; e++)
+        GS4I_STOKES_PLANE(k, 7 ^ 1 << e, z, at, i) {
             int count[4] = { 0, 0, 0, 0 }, ring = 1;
             if (f->has_row[e][i] || !(f->edge[e][i] > 0)) continue;
             for (n = 0; n < 27; n++) {
@@ -18611,8 +18609,8 @@ static void gs4i_sum_edges(int z, void *context)
     const gs4i_stokes *k = &f->stokes;
     int e, at[3], step[3], n;
     size_t i, to;
-    for (e = 0; e < 3; e++) GS4I_STOKES_PLANE(k, 7 ^ 1 << e, z, at, i)
-        {
+    for (e = 0; e < 3; e++)
+        GS4I_STOKES_PLANE(k, 7 ^ 1 << e, z, at, i) {
             gs4_real sum = 0;
             if (!f->has_row[e][i]) continue;
             for (n = 0; n < 27; n++) {

@@ -655,7 +655,7 @@ static void files_check_ply(const gs4_sim *sim, const char *path)
     CHECK(found && vertices == gs4_get_stats((gs4_sim *)(uintptr_t)sim).particles);
     for (i = 0; i < columns; i++)
         for (k = 0; k < i; k++) CHECK(strcmp(c[i].name, c[k].name) != 0);
-    CHECK(columns == (files_warm ? 30 : 10) + (sim->desc.scheme == GS4_PARTITIONED)
+    CHECK(columns == (files_warm ? 30 : 10) + (sim->desc.scheme != GS4_EXPLICIT)
           && !strcmp(c[0].name, "x") && !strcmp(c[3].name, "vx") && !strcmp(c[5].name, "vz"));
     if (found)
         files_compare(sim, (unsigned char *)end + 1,
@@ -691,8 +691,8 @@ static void files_check_npy(const gs4_sim *sim, const char *path)
     p = strstr((char *)data + 10, "'shape': (");
     CHECK(p && sscanf(p, "'shape': (%d,)", &shape) == 1
           && shape == gs4_get_stats((gs4_sim *)(uintptr_t)sim).particles);
-    CHECK(columns == (files_warm ? 11 : 6) + (sim->desc.scheme == GS4_PARTITIONED)
-          && c[0].numbers == 3 && c[1].numbers == 3 && c[2].numbers == 1);
+    CHECK(columns == (files_warm ? 11 : 6) + (sim->desc.scheme != GS4_EXPLICIT) && c[0].numbers == 3
+          && c[1].numbers == 3 && c[2].numbers == 1);
     files_compare(sim, data + head, size - head, c, columns);
     free(data);
 }

@@ -660,7 +660,8 @@ static void test_partitioned_moduli(void)
 
 /* --- the rest --------------------------------------------------------------------------------- */
 
-/* Everything that the scheme has, along every axis and in every mirror. */
+/* Everything that the scheme has, along every axis and in every mirror; of the semi-implicit one
+ * that is liquids that stick, and walls that do not let go. */
 static void symmetry_partitioned(symmetry_world *w, int n)
 {
     static const int walls[4][6] = {
@@ -688,17 +689,20 @@ static void symmetry_partitioned(symmetry_world *w, int n)
         d.air_is_isothermal = n & 1;
         d.ambient_temperature = 40;
     }
-    d.scheme = GS4_PARTITIONED;
+    d.scheme = partitioned_scheme;
+    d.solver_max_iterations = partitioned_iterations;
     d.sharp_gradients = 0;
     d.solver_tolerance = (gs4_real)(sizeof(gs4_real) == 8 ? 1e-12 : 1e-8);
     for (i = 0; i < 6; i++) {
         d.walls[i] = (gs4_wall)walls[n % 4][i];
+        if (d.walls[i] == GS4_WALL_SEPARATE && d.scheme == GS4_SEMI_IMPLICIT)
+            d.walls[i] = GS4_WALL_SLIP;
         d.wall_is_isothermal[i] = n >= 8 && d.walls[i] != GS4_WALL_OPEN && i % 2 == n / 4 % 2;
         d.wall_temperature[i] = (gs4_real)(d.wall_is_isothermal[i] ? 5 : 0);
     }
     memset(&c, 0, sizeof c);
     c.shape = symmetry_body(GS4_SHAPE_SPHERE);
-    c.contact = n & 1 ? GS4_WALL_SLIP : GS4_WALL_STICK;
+    c.contact = n & 1 && d.scheme != GS4_SEMI_IMPLICIT ? GS4_WALL_SLIP : GS4_WALL_STICK;
     c.velocity = at(0.2, 0.3, -0.2);
     c.angular_velocity = at(1, -2, 1.5);
     c.is_isothermal = n >= 8;
@@ -738,7 +742,7 @@ static gs4_sim *partitioned_splash(int threads)
 }
 
 /* The same bits for any number of threads, and from a checkpoint; frames have its pressure. */
-static void test_partitioned_bits(void)
+static void partitioned_check_bits(void)
 {
     gs4_sim *a = partitioned_splash(1), *b = partitioned_splash(1);
     CHECK_RESULT(a, gs4_advance(a, (gs4_real)0.1), GS4_OK);
@@ -768,6 +772,59 @@ static void test_partitioned_bits(void)
     gs4_destroy(a);
     gs4_destroy(b);
 }
+
+static void test_partitioned_bits(void) { partitioned_check_bits(); }
+
+/* Every allocation refused once, and all from it on: the step is refused, its state is as before,
+ * and the next step is as if nothing had been. */
+static uint64_t partitioned_scenario(files_memory *m, long fail_at, int from_there_on)
+{
+    gs4_sim_desc d = partitioned_cube(8);
+    const gs4_material material = partitioned_liquid(5);
+    gs4_fill f = scene_fill(at(0.5, -2, 0.3));
+    gs4_sim *sim;
+    uint64_t hash;
+    int step;
+    memset(m, 0, sizeof *m);
+    m->fail_at = -1;
+    d.gravity = at(0, -10, 0);
+    d.allocator.alloc_fn = files_alloc;
+    d.allocator.free_fn = files_free;
+    d.allocator.user = m;
+    CHECK_RESULT(NULL, gs4_create(&d, &sim), GS4_OK);
+    f.material = gs4_add_material(sim, &material);
+    gs4_add_particles(sim, gs4_sphere(at(0.45, 0.4, 0.5), (gs4_real)0.3), &f);
+    m->calls = 0;
+    m->fail_at = fail_at;
+    m->from_there_on = from_there_on;
+    for (step = 0; step < 2; step++) {
+        const uint64_t before = gs4_state_hash(sim);
+        if (gs4_step(sim, (gs4_real)0.002) == GS4_OK) continue;
+        CHECK(fail_at >= 0 && gs4_last_error(sim)[0] && gs4_state_hash(sim) == before);
+        m->fail_at = -1;
+        CHECK_RESULT(sim, gs4_step(sim, (gs4_real)0.002), GS4_OK);
+    }
+    hash = gs4_state_hash(sim);
+    CHECK(gs4_get_stats(sim).memory_bytes == m->bytes);
+    gs4_destroy(sim);
+    CHECK(m->live == 0 && m->bytes == 0 && m->wrong == 0);
+    return hash;
+}
+
+static void partitioned_check_memory(void)
+{
+    files_memory m;
+    const uint64_t reference = partitioned_scenario(&m, -1, 0);
+    const long calls = m.calls;
+    long k;
+    CHECK(calls > 20);
+    for (k = 0; k < calls; k++) {
+        CHECK(partitioned_scenario(&m, k, 0) == reference);
+        CHECK(partitioned_scenario(&m, k, 1) == reference);
+    }
+}
+
+static void test_partitioned_memory(void) { partitioned_check_memory(); }
 
 /* What moves and turns in a closed box that is full takes no room: it stirs, at rest at first. The
  * integral of velocity over the box is that of x_i u n over its walls, 0: liquid and body move as
@@ -1103,6 +1160,7 @@ static void run_partitioned(void)
     RUN_FULL(test_partitioned_stirs);
     RUN(test_partitioned_piston);
     RUN_ONCE(test_partitioned_bits);
+    RUN_FULL_ONCE(test_partitioned_memory);
     RUN(test_partitioned_not_converged);
     RUN_FULL_ONCE(test_partitioned_channel);
     RUN(test_partitioned_refusals);

@@ -456,6 +456,32 @@ static void test_semi_refusals(void)
     gs4_destroy(sim);
 }
 
+/* --- the rest of a scheme --------------------------------------------------------------------- */
+
+static void semi_check(void (*check)(void))
+{
+    partitioned_scheme = GS4_SEMI_IMPLICIT;
+    partitioned_iterations = 20000;
+    check();
+    partitioned_scheme = GS4_PARTITIONED;
+    partitioned_iterations = 0;
+}
+
+static void semi_check_symmetry(void)
+{
+    int n;
+    for (n = 0; n < 8; n++) symmetry_check("semi-implicit", symmetry_partitioned, n, 3);
+}
+
+static void test_semi_symmetry(void)
+{
+    if (sizeof(gs4_real) == 8) semi_check(semi_check_symmetry);
+}
+
+static void test_semi_bits(void) { semi_check(partitioned_check_bits); }
+
+static void test_semi_memory(void) { semi_check(partitioned_check_memory); }
+
 static void run_semi_implicit(void)
 {
     RUN_ONCE(test_semi_sphere);
@@ -466,4 +492,7 @@ static void run_semi_implicit(void)
     RUN_ONCE(test_semi_rest);
     RUN(test_semi_order);
     RUN(test_semi_refusals);
+    RUN_ONCE(test_semi_bits);
+    RUN_FULL_ONCE(test_semi_memory);
+    RUN_FULL(test_semi_symmetry);
 }

@@ -31,9 +31,9 @@
  *     }
  *
  * WHAT IT DOES NOT DO, YET. Refused with a sentence: with the semi-implicit scheme all but
- * Newtonian liquids, of any viscosity law, without heat, and all but sticky colliders, emitters and
- * walls that stick, slip, are open or periodic; with both implicit schemes friction of separating
- * colliders. It has no surface tension, no two-way coupling to colliders, no domain beyond 3992^3
+ * Newtonian liquids, of any viscosity law, with or without heat, and all but sticky colliders,
+ * emitters and walls that stick, slip, are open or periodic; with both implicit schemes friction of
+ * separating colliders. It has no surface tension, no two-way coupling to colliders, no domain beyond 3992^3
  * cells.
  *
  * MAP. Sections carry a tag; grep -n '^/. ==== ' gs4mpm.h is the table of contents. A section uses
@@ -18418,10 +18418,11 @@ static void gs4i_scatter_viscosity(int index, void *context)
     const gs4i_frame frame = gs4i_tile_frame(&sim->grid, sim->grid.occupied_block[o]);
     const gs4_real least = GS4I_C(GS4I_LEAST_VISCOSITY) / (integrator->s * integrator->inv_area);
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
+    gs4i_heat_pass heat_pass, *heat = p.with_heat ? &heat_pass : NULL;
     gs4i_number_tile velocity[3], resistance;
     gs4i_response r;
     int c;
-    gs4i_begin_response(&r, sim, &p, integrator, &sim->reports[o], NULL);
+    gs4i_begin_response(&r, sim, &p, integrator, &sim->reports[o], heat);
     for (c = 0; c < 3; c++) gs4i_load_velocity_tile(sim, o, c, velocity[c]);
     memset(resistance, 0, sizeof resistance);
     for (; i < end; i += GS4I_BATCH) {
@@ -18438,6 +18439,7 @@ static void gs4i_scatter_viscosity(int index, void *context)
         gs4i_gradient_lanes(slope.dx, slope.dy, slope.dz, n, L);
         GS4I_BATCH_LOOP(b) J[b] = q.v[3][b] + integrator->before * q.a[3][b];
         gs4i_turn_to_batch(&r, i, n);
+        if (heat) gs4i_load_batch_heat(&r);
         gs4i_stress(&r, L, J, sigma, mu);
         gs4i_check_liquids(r.report, J, mu, p.id + i, n);
         GS4I_BATCH_LOOP(b) {
@@ -18690,9 +18692,49 @@ static int gs4i_find_implicit_velocity(gs4_sim *sim, gs4i_node_pass *nodes)
     return gs4i_solve_stage(sim);
 }
 
+/* Heat of the stage to nodes: stress works in grad u~, which the solve bounds. That of v_i, which
+ * is known before, may be larger by the step over h^2/nu. */
+static void gs4i_scatter_stage_heat(int index, void *context)
+{
+    const gs4i_pass *pass = (const gs4i_pass *)context;
+    gs4_sim *sim = pass->sim;
+    const gs4i_particles p = sim->particles;
+    const int o = pass->blocks[index];
+    const gs4i_frame frame = gs4i_tile_frame(&sim->grid, sim->grid.occupied_block[o]);
+    size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
+    gs4i_heat_pass heat;
+    gs4i_taken_tiles tiles;
+    gs4i_response r;
+    gs4i_load_taken(sim, o, &tiles);
+    gs4i_begin_response(&r, sim, &p, &sim->integrator, &sim->reports[o], &heat);
+    gs4i_clear_heat_tiles(&heat);
+    for (; i < end; i += GS4I_BATCH) {
+        const int n = gs4i_batch_size(i, end);
+        gs4i_batch q;
+        gs4i_stencils s[4];
+        gs4i_gathered slope;
+        gs4i_face_corrections k;
+        gs4i_symmetric sigma;
+        gs4i_lanes J, mu;
+        int b;
+        gs4i_stage_faces(sim, &frame, i, n, &q, s);
+        gs4i_gather_from_faces(sim, &tiles, &q, n, s, &slope, &k);
+        GS4I_BATCH_LOOP(b) J[b] = q.v[3][b] + sim->integrator.before * q.a[3][b];
+        gs4i_turn_to_batch(&r, i, n);
+        gs4i_load_batch_heat(&r);
+        gs4i_stress(&r, k.L, J, sigma, mu);
+        gs4i_heat_of_stress(&r, q.x[3], J, k.L, sigma);
+        gs4i_scatter_heat(sim, &heat, &s[0], n);
+    }
+    gs4i_report_liquids(r.report, &r.seen);
+    gs4i_add_heat(sim, o, &heat);
+}
+
 static int gs4i_accelerate_by_solve(gs4_sim *sim, gs4i_node_pass *nodes)
 {
-    return gs4i_accelerate_faces(sim, nodes, gs4i_find_implicit_velocity);
+    GS4I_TRY(gs4i_accelerate_faces(sim, nodes, gs4i_find_implicit_velocity));
+    if (sim->particles.with_heat) gs4i_scatter(sim, gs4i_scatter_stage_heat);
+    return GS4_OK;
 }
 
 /* Viscosity and sound are in the solve; places of surfaces are not. */
@@ -22690,12 +22732,9 @@ static int gs4i_check_semi_implicit_material(gs4i_error *e, const gs4_material *
     GS4I_TRY(gs4i_require_value(e, m->liquid == GS4_NEWTONIAN, "liquid is ", (int)m->liquid,
                                 "; the semi-implicit scheme of this version has GS4_NEWTONIAN "
                                 "alone; use another scheme"));
-    GS4I_TRY(gs4i_require_value(e, m->solid == GS4_NO_SOLID, "solid is ", (int)m->solid,
-                                "; the semi-implicit scheme of this version has no solids; use "
-                                "another scheme"));
-    return gs4i_require(e, !gs4i_has_heat(m),
-                        "conductivity, can_melt, viscous_heating: the semi-implicit scheme of "
-                        "this version has no heat; use another scheme");
+    return gs4i_require_value(e, m->solid == GS4_NO_SOLID, "solid is ", (int)m->solid,
+                              "; the semi-implicit scheme of this version has no solids; use "
+                              "another scheme");
 }
 
 static GS4I_COLD int gs4i_check_material(gs4i_error *e, const gs4i_scene *scene,

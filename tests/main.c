@@ -105,6 +105,7 @@ int main(int count, char **values)
     RUN_ONCE(test_heat_uneven_steps);
     RUN_FULL(test_heat_draws);
     RUN_ONCE(test_heat_partitioned);
+    RUN_ONCE(test_heat_semi_implicit);
     run_solid();
     run_errors();
     run_files();

@@ -2015,3 +2015,16 @@ static void test_heat_partitioned(void)
     for (i = 0; i < (int)(sizeof full / sizeof full[0]) && TEST_FULL_ONCE; i++) full[i]();
     physics_scheme = GS4_EXPLICIT;
 }
+
+/* And where viscosity is in the solve: what liquids do that it may change. */
+static void test_heat_semi_implicit(void)
+{
+    static void (*const quick[])(void) = { test_heat_walls, test_heat_poured };
+    static void (*const full[])(void) = { test_heat_drifts, test_heat_on_each_wall,
+                                          test_heat_stefan };
+    int i;
+    physics_scheme = GS4_SEMI_IMPLICIT;
+    for (i = 0; i < (int)(sizeof quick / sizeof quick[0]); i++) quick[i]();
+    for (i = 0; i < (int)(sizeof full / sizeof full[0]) && TEST_FULL_ONCE; i++) full[i]();
+    physics_scheme = GS4_EXPLICIT;
+}

@@ -10,14 +10,14 @@ static int physics_run(gs4_sim *sim, double time)
 
 static gs4_scheme physics_scheme; /* of the next scenes */
 
-/* With the partitioned scheme backward Euler stands for symplectic Euler. */
+/* With the implicit schemes backward Euler stands for symplectic Euler. */
 static gs4_sim *physics_create(const gs4_sim_desc *desc, const gs4_material *m)
 {
     gs4_sim_desc d = *desc;
     gs4_sim *sim = NULL;
     int w;
     d.scheme = physics_scheme;
-    if (d.scheme == GS4_PARTITIONED) {
+    if (d.scheme != GS4_EXPLICIT) {
         if (d.integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER)
             d.integrator = GS4_INTEGRATOR_BACKWARD_EULER;
         for (w = 0; w < 6; w++)

@@ -32,9 +32,9 @@
  *
  * WHAT IT DOES NOT DO, YET. Refused with a sentence: with the semi-implicit scheme all but
  * Newtonian liquids, of any viscosity law, with or without heat, and all but sticky colliders,
- * emitters and walls that stick, slip, are open or periodic; with both implicit schemes friction of
- * separating colliders. It has no surface tension, no two-way coupling to colliders, no domain beyond 3992^3
- * cells.
+ * emitters and walls that stick, slip, are open or periodic; with both implicit schemes friction
+ * of separating colliders. It has no surface tension, no two-way coupling to colliders, no domain
+ * beyond 3992^3 cells.
  *
  * MAP. Sections carry a tag; grep -n '^/. ==== ' gs4mpm.h is the table of contents. A section uses
  * only sections above it.

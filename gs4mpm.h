@@ -31,10 +31,9 @@
  *     }
  *
  * WHAT IT DOES NOT DO, YET. Refused with a sentence: with the semi-implicit scheme all but
- * Newtonian liquids, of any viscosity law, with or without heat, and all but sticky colliders,
- * emitters and walls that stick, slip, are open or periodic; with both implicit schemes friction
- * of separating colliders. It has no surface tension, no two-way coupling to colliders, no domain
- * beyond 3992^3 cells.
+ * Newtonian liquids, of any viscosity law, with or without heat, and all but sticky colliders;
+ * with both implicit schemes friction of separating colliders. It has no surface tension, no
+ * two-way coupling to colliders, no domain beyond 3992^3 cells.
  *
  * MAP. Sections carry a tag; grep -n '^/. ==== ' gs4mpm.h is the table of contents. A section uses
  * only sections above it.
@@ -18467,7 +18466,7 @@ static void gs4i_find_viscosities(int z, void *context)
             f->viscosity[i] > 0 ? f->cell[4 * i + GS4I_CELL_FILL] / f->viscosity[i] : GS4I_C(0);
 }
 
-/* What a face is to the solve. Behind a wall it is the image of one before it. */
+/* What a face is to the solve. Behind a wall that holds it is the image of one before it. */
 static uint8_t gs4i_role_of_face(const gs4_sim *sim, int c, const int at[3], size_t face)
 {
     const gs4i_staggered *f = &sim->staggered;
@@ -18478,6 +18477,7 @@ static uint8_t gs4i_role_of_face(const gs4_sim *sim, int c, const int at[3], siz
         const int side = 2 * a + (at[a] >= f->to[a]);
         if (a == c || (at[a] >= f->from[a] && at[a] < f->to[a]) || !gs4i_has_wall(sim, side))
             continue;
+        if (!gs4i_wall_holds(sim, side, 1 << c, at)) return GS4I_STOKES_NONE;
         return gs4i_wall_parity(sim, c, side) < 0 ? GS4I_STOKES_ODD : GS4I_STOKES_EVEN;
     }
     return GS4I_STOKES_NONE;
@@ -22383,18 +22383,6 @@ static int gs4i_check_partitioned(gs4i_error *e, const gs4_sim_desc *d)
     return GS4_OK;
 }
 
-/* What the semi-implicit scheme has not yet. */
-static int gs4i_check_semi_implicit(gs4i_error *e, const gs4_sim_desc *d)
-{
-    int w;
-    for (w = 0; w < 6; w++) {
-        GS4I_TRY(gs4i_require(e, d->walls[w] != GS4_WALL_SEPARATE,
-                              "walls: the semi-implicit scheme of this version has none that "
-                              "separate; use GS4_WALL_SLIP, or GS4_PARTITIONED"));
-    }
-    return GS4_OK;
-}
-
 static int gs4i_check_numerics(gs4i_error *e, const gs4_sim_desc *d)
 {
     GS4I_TRY(gs4i_require_between(e, GS4_EXPLICIT, GS4_SEMI_IMPLICIT, "scheme is ", (int)d->scheme,
@@ -22415,7 +22403,6 @@ static int gs4i_check_numerics(gs4i_error *e, const gs4_sim_desc *d)
                           "scheme has no stable step; rho_inf * rho_inf_spurious must not be above "
                           "0.98"));
     if (d->scheme != GS4_EXPLICIT) GS4I_TRY(gs4i_check_partitioned(e, d));
-    if (d->scheme == GS4_SEMI_IMPLICIT) GS4I_TRY(gs4i_check_semi_implicit(e, d));
     if (d->integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER) GS4I_TRY(gs4i_check_euler(e, d));
     /* infinity is welcome */
     GS4I_TRY(gs4i_require_value(

@@ -661,7 +661,7 @@ static void test_partitioned_moduli(void)
 /* --- the rest --------------------------------------------------------------------------------- */
 
 /* Everything that the scheme has, along every axis and in every mirror; of the semi-implicit one
- * that is liquids that stick, and walls that do not let go. */
+ * that is liquids, and bodies that stick. */
 static void symmetry_partitioned(symmetry_world *w, int n)
 {
     static const int walls[4][6] = {
@@ -695,8 +695,6 @@ static void symmetry_partitioned(symmetry_world *w, int n)
     d.solver_tolerance = (gs4_real)(sizeof(gs4_real) == 8 ? 1e-12 : 1e-8);
     for (i = 0; i < 6; i++) {
         d.walls[i] = (gs4_wall)walls[n % 4][i];
-        if (d.walls[i] == GS4_WALL_SEPARATE && d.scheme == GS4_SEMI_IMPLICIT)
-            d.walls[i] = GS4_WALL_SLIP;
         d.wall_is_isothermal[i] = n >= 8 && d.walls[i] != GS4_WALL_OPEN && i % 2 == n / 4 % 2;
         d.wall_temperature[i] = (gs4_real)(d.wall_is_isothermal[i] ? 5 : 0);
     }

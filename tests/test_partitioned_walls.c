@@ -263,7 +263,8 @@ static void symmetry_partitioned_walls(symmetry_world *w, int n)
         symmetry_box(8, 7, 7, n & 4 ? GS4_INTEGRATOR_BACKWARD_EULER : GS4_INTEGRATOR_GS4);
     int i;
     m.incompressible = !(n & 2);
-    d.scheme = GS4_PARTITIONED;
+    d.scheme = partitioned_scheme;
+    d.solver_max_iterations = partitioned_iterations;
     d.sharp_gradients = 0;
     d.solver_tolerance = (gs4_real)1e-12;
     for (i = 0; i < 6; i++) d.walls[i] = (gs4_wall)walls[n % 4][i];

@@ -485,9 +485,6 @@ static void test_semi_refusals(void)
     d.sharp_gradients = 1;
     semi_refuses(d, "sharp_gradients");
     d = fine;
-    d.walls[3] = GS4_WALL_SEPARATE;
-    semi_refuses(d, "walls");
-    d = fine;
     d.rho_inf = d.rho_inf_spurious = 1;
     semi_refuses(d, "rho_inf_spurious");
     CHECK_RESULT(NULL, gs4_create(&fine, &sim), GS4_OK);
@@ -532,6 +529,18 @@ static void test_semi_flight(void) { semi_check(test_partitioned_flight); }
 
 static void test_semi_sound(void) { semi_check(test_partitioned_sound); }
 
+/* Walls that separate are those of the partitioned scheme; here they hold and let go of liquids
+ * whose viscosity is in the solve, too. */
+static void test_semi_walls_let_go(void) { semi_check(test_partitioned_walls_let_go); }
+
+static void test_semi_walls_slug(void) { semi_check(test_partitioned_walls_slug); }
+
+static void test_semi_walls_rest(void) { semi_check(test_partitioned_walls_rest); }
+
+static void test_semi_walls_symmetry(void) { semi_check(test_partitioned_walls_symmetry); }
+
+static void test_semi_walls_bits(void) { semi_check(test_partitioned_walls_bits); }
+
 static void test_semi_bits(void) { semi_check(partitioned_check_bits); }
 
 static void test_semi_memory(void) { semi_check(partitioned_check_memory); }
@@ -549,6 +558,11 @@ static void run_semi_implicit(void)
     RUN(test_semi_refusals);
     RUN_FULL_ONCE(test_semi_flight);
     RUN_ONCE(test_semi_sound);
+    RUN_FULL_ONCE(test_semi_walls_let_go);
+    RUN_FULL_ONCE(test_semi_walls_slug);
+    RUN_FULL_ONCE(test_semi_walls_rest);
+    RUN_FULL(test_semi_walls_symmetry);
+    RUN_FULL_ONCE(test_semi_walls_bits);
     RUN_ONCE(test_semi_bits);
     RUN_FULL_ONCE(test_semi_memory);
     RUN_FULL(test_semi_symmetry);

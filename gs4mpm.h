@@ -6400,6 +6400,45 @@ typedef struct gs4i_stokes_look {
     double value;
 } gs4i_stokes_look;
 
+enum {
+    GS4I_RIGID_LEVELS = 20,
+    GS4I_RIGID_DENSE = 60,  /* nodes, at most, that are solved by Cholesky */
+    GS4I_RIGID_CHUNK = 128, /* nodes a task */
+    GS4I_RIGID_ROOM = 64    /* blocks of a node that are summed at once */
+};
+
+/* Nodes have numbers from 1 on; those of a block follow each other, and blocks of a colour do.
+ * Node i has the blocks start[i] to start[i + 1] of the matrix, its own first, by columns. */
+typedef struct gs4i_rigid_level {
+    int32_t n, blocks[3], colour[28]; /* nodes, with nobody; blocks of the box along each axis */
+    int32_t *first, *child;           /* its faces, or nodes of the level below */
+    int32_t *start, *to, *parent;     /* parent: in the level above, or 0 */
+    int32_t (*place)[3];              /* its block */
+    float (*A)[36], (*mass)[36], (*inverse)[36], (*b)[6], (*x)[6];
+    gs4i_scratch nodes, edges;
+} gs4i_rigid_level;
+
+/* See MULTIGRID OF RIGID BODIES. */
+typedef struct gs4i_rigid {
+    gs4i_rigid_level level[GS4I_RIGID_LEVELS];
+    int levels;
+    int32_t *parent;         /* of faces: their node, or 0; */
+    int8_t (*arm)[4];        /* twice their place from the centre of its block, their axis */
+    float *u, *r, *stress;   /* of faces; of rows */
+    int32_t *block, *counts; /* while setting up: of faces or nodes; of blocks or nodes */
+    double *factor;          /* of the last level; NULL: it is swept */
+    gs4i_scratch faces, work, square;
+} gs4i_rigid;
+
+/* See SCHUR COMPLEMENT. */
+typedef struct gs4i_schur {
+    gs4i_solver solver;
+    int by_commutator, cycles; /* of both ways the second; cycles of the multigrid for one product */
+    gs4_real *coefficient[3], *diagonal;
+    uint8_t *kind;
+    gs4i_scratch given;
+} gs4i_schur;
+
 typedef struct gs4i_stokes_system {
     double h, mass_unit;                     /* T */
     int32_t faces, rows, cells, all;         /* with nobody; faces and cells together */
@@ -6421,10 +6460,12 @@ typedef struct gs4i_stokes_system {
     gs4_real *weight, *given;
     gs4i_link (*row_faces)[4];
     /* of all, faces, then cells: solution, b', residual or product, what it is of; bases of GMRES;
-     * per row: W' D u */
-    double *x, *b, *r, *z, *stress;
+     * two for S^-1; per row: W' D u */
+    double *x, *b, *r, *z, *t, *q, *stress;
     gs4_real *basis;
-    float *inverse; /* 1 / diagonal of A', and of what pressure meets */
+    float *inverse; /* per face: 1 / diagonal of A' */
+    gs4i_rigid rigid;
+    gs4i_schur schur;
     int32_t pockets;
     double *pocket_sum, *pocket_cells;
     gs4i_scratch maps, numbered, linked, vectors;
@@ -7045,12 +7086,12 @@ static int gs4i_stokes_reserve_vectors(gs4i_stokes *s)
     char *base = NULL;
     int laid;
     for (laid = 0; laid < 2; laid++) {
-        double **const vectors[4] = { &y->x, &y->b, &y->r, &y->z };
+        double **const vectors[6] = { &y->x, &y->b, &y->r, &y->z, &y->t, &y->q };
         size_t used = 0;
         int k;
-        for (k = 0; k < 4; k++) *vectors[k] = (double *)gs4i_carve(base, &used, n, sizeof(double));
+        for (k = 0; k < 6; k++) *vectors[k] = (double *)gs4i_carve(base, &used, n, sizeof(double));
         y->sums = (double *)gs4i_carve(base, &used, tasks, sizeof(double));
-        y->inverse = (float *)gs4i_carve(base, &used, n, sizeof(float));
+        y->inverse = (float *)gs4i_carve(base, &used, (size_t)y->faces, sizeof(float));
         y->pocket_sum = (double *)gs4i_carve(base, &used, (size_t)y->pockets + 1, sizeof(double));
         y->pocket_cells = (double *)gs4i_carve(base, &used, (size_t)y->pockets + 1, sizeof(double));
         y->basis =
@@ -7151,40 +7192,1139 @@ static void gs4i_stokes_apply(gs4i_stokes *s, const double *in, double *out, int
     gs4i_parallel_for(s->tasks, gs4i_stokes_tasks(y->cells), gs4i_stokes_cell_task, &t);
 }
 
-/* --- the preconditioner ----------------------------------------------------------------------- */
+/* --- velocities: multigrid of rigid bodies ---------------------------------------------------- *
+ *
+ * A' resists all motion but that of connected parts as rigid bodies; so those are the coarse
+ * unknowns. The cycle is symmetric, positive definite, and about A'^-1.
+ *
+ * NODES. Faces of a block of 2 x 2 x 2 cells that rows join strongly are a node, with a velocity
+ * and a spin about the centre of the block; a face of axis d is [e_d; r x e_d] of them. Parts that
+ * only come near each other stay apart. Blocks of 2 x 2 x 2 blocks are the next level: a node moves
+ * as v = V + W x r there. What mass holds more than strain stays out: the sweeps solve it.
+ *
+ * COARSE MATRIX. Galerkin's, the strain halved on each level (as faces in [[poisson]]), mass not.
+ *
+ * SMOOTHER. Faces: Gauss-Seidel by colours, two sweeps down, two backward up; W' D u is kept beside
+ * u, and a face changes its six rows as it moves. Nodes: one forward, one backward, by blocks of
+ * six; motions that a node does not have (a face has but one) have no pivot there.
+ *
+ * CYCLE. W among nodes: with V folded sheets take 45 iterations instead of 17. */
 
-/* 1 / diagonal of A'; of C' + B A^-1 B^T. */
-static void gs4i_stokes_diagonals(gs4i_stokes *s)
+#define GS4I_RIGID_STRONG 4e-4 /* K_fg^2 over K_ff K_gg above which faces join; */
+#define GS4I_RIGID_JOINED 1e-4 /* nodes, with traces of their 3 x 3 blocks for velocities */
+#define GS4I_RIGID_PIVOT 1e-6  /* of the diagonal: below is rounding of float */
+
+/* [e_d; r x e_d] of a face. */
+typedef struct gs4i_rigid_face {
+    int entry[3];
+    float value[3];
+} gs4i_rigid_face;
+
+GS4I_INLINE gs4i_rigid_face gs4i_rigid_of(const int8_t arm[4])
 {
-    gs4i_stokes_system *y = &s->system;
-    int32_t f, c;
-    int k;
-    for (f = 1; f < y->faces; f++) {
-        double sum = (double)y->mass[f];
-        for (k = 0; k < 6; k++) {
-            const gs4i_link link = y->face_rows[f][k];
-            sum += (link & 1 ? 4 : 1) * (double)y->weight[link >> 1];
-        }
-        y->inverse[f] = (float)(1 / sum);
+    const int d = arm[3], a = (d + 1) % 3, b = (d + 2) % 3;
+    gs4i_rigid_face t;
+    t.entry[0] = d;
+    t.value[0] = 1;
+    t.entry[1] = 3 + a; /* (r x e_d)_a = r_b */
+    t.value[1] = 0.5f * (float)arm[b];
+    t.entry[2] = 3 + b;
+    t.value[2] = -0.5f * (float)arm[a];
+    return t;
+}
+
+/* From the centre of the block above node i of level l to that of its own, in cells. */
+GS4I_INLINE void gs4i_rigid_arm(const gs4i_rigid *m, int l, int32_t i, double r[3])
+{
+    int a;
+    for (a = 0; a < 3; a++) r[a] = ldexp((double)(m->level[l].place[i][a] & 1) - 0.5, l + 1);
+}
+
+/* K of nodes with arms r and q, by columns, into that of what they hang on: T_r^T K T_q, with
+ * T = [1, -[r]x; 0, 1]. */
+static void gs4i_rigid_move(double K[36], const double r[3], const double q[3])
+{
+    int k, i;
+    for (k = 0; k < 3; k++) {
+        const int b = (k + 1) % 3, c = (k + 2) % 3;
+        for (i = 0; i < 6; i++)
+            K[6 * (3 + k) + i] += q[b] * K[6 * c + i] - q[c] * K[6 * b + i];
     }
-    y->inverse[0] = y->inverse[y->faces] = 0;
-    for (c = 1; c < y->cells; c++) {
-        double sum = (double)y->compliance[c];
-        for (k = 0; k < 6; k++) {
-            const int32_t face = y->cell_faces[c][k];
-            sum += (double)y->share[face] * (double)y->share[face] * (double)y->inverse[face];
-        }
-        y->inverse[y->faces + c] = sum > 0 ? (float)(1 / sum) : 0;
+    for (k = 0; k < 3; k++) {
+        const int b = (k + 1) % 3, c = (k + 2) % 3;
+        for (i = 0; i < 6; i++) K[6 * i + 3 + k] += r[b] * K[6 * i + c] - r[c] * K[6 * i + b];
     }
 }
 
-/* z about A'^-1 r. */
+/* F F^T = A, lower triangles by rows, in place; rows and columns of pivots that are left out
+ * are 0. */
+static void gs4i_rigid_cholesky(double *A, int n)
+{
+    int i, j, k;
+    for (i = 0; i < n; i++) {
+        double *row = A + (size_t)i * (size_t)n;
+        const double least = GS4I_RIGID_PIVOT * row[i];
+        for (j = 0; j <= i; j++) {
+            const double *other = A + (size_t)j * (size_t)n;
+            double sum = row[j];
+            for (k = 0; k < j; k++) sum -= row[k] * other[k];
+            if (j < i)
+                row[j] = other[j] > 0 ? sum / other[j] : 0;
+            else
+                row[i] = sum > least ? sqrt(sum) : 0;
+        }
+    }
+}
+
+/* F F^T y = y */
+static void gs4i_rigid_substitute(const double *F, int n, double *y)
+{
+    int i, j;
+    for (i = 0; i < n; i++) {
+        const double *row = F + (size_t)i * (size_t)n;
+        double sum = y[i];
+        for (j = 0; j < i; j++) sum -= row[j] * y[j];
+        y[i] = row[i] > 0 ? sum / row[i] : 0;
+    }
+    for (i = n - 1; i >= 0; i--) {
+        const double *row = F + (size_t)i * (size_t)n;
+        y[i] = row[i] > 0 ? y[i] / row[i] : 0;
+        for (j = 0; j < i; j++) y[j] -= row[j] * y[i];
+    }
+}
+
+static void gs4i_rigid_invert(const double A[36], float inverse[36])
+{
+    double F[36], y[6];
+    int i, k;
+    memcpy(F, A, sizeof F);
+    gs4i_rigid_cholesky(F, 6);
+    for (i = 0; i < 6; i++) {
+        for (k = 0; k < 6; k++) y[k] = i == k;
+        gs4i_rigid_substitute(F, 6, y);
+        for (k = 0; k < 6; k++) inverse[6 * i + k] = (float)y[k];
+    }
+}
+
+/* --- setup: which faces and nodes join -------------------------------------------------------- */
+
+/* K_ff */
+static double gs4i_stokes_stiffness(const gs4i_stokes_system *y, int32_t f)
+{
+    double sum = 0;
+    int k;
+    for (k = 0; k < 6; k++) {
+        const gs4i_link link = y->face_rows[f][k];
+        sum += (link & 1 ? 4 : 1) * (double)y->weight[link >> 1];
+    }
+    return sum;
+}
+
+static void gs4i_rigid_count_blocks(const gs4i_stokes *s, int32_t blocks[3])
+{
+    int a;
+    for (a = 0; a < 3; a++) blocks[a] = (s->end[a] - s->first[a] + 1) / 2;
+}
+
+/* Faces of a plane: block, arm, themselves as root. They belong to the cell behind, or, where that
+ * is not liquid, to that before. */
+static void gs4i_rigid_place_plane(int z, void *context)
+{
+    const gs4i_stokes *s = (const gs4i_stokes *)context;
+    const gs4i_stokes_system *y = &s->system;
+    const gs4i_rigid *m = &y->rigid;
+    int32_t blocks[3];
+    int at[3], c, a;
+    size_t i;
+    gs4i_rigid_count_blocks(s, blocks);
+    for (c = 0; c < 3; c++)
+        GS4I_STOKES_PLANE(s, 1 << c, z, at, i) {
+            const int32_t f = y->number[c][i];
+            int p[3], before;
+            if (!f) continue;
+            before = !y->face_cells[f][1];
+            for (a = 0; a < 3; a++) p[a] = at[a] - s->first[a];
+            p[c] -= before;
+            if (p[c] < 0) p[c] = s->end[c] - s->first[c] - 1;
+            for (a = 0; a < 3; a++) m->arm[f][a] = (int8_t)(2 * (p[a] & 1) - 1);
+            m->arm[f][c] = (int8_t)(m->arm[f][c] + 2 * before - 1);
+            m->arm[f][3] = (int8_t)c;
+            m->block[f] = ((p[2] >> 1) * blocks[1] + (p[1] >> 1)) * blocks[0] + (p[0] >> 1);
+            m->parent[f] = gs4i_stokes_stiffness(y, f) >= (double)y->mass[f] ? f : 0;
+        }
+}
+
+static void gs4i_rigid_join(int32_t *root, int32_t a, int32_t b)
+{
+    a = gs4i_stokes_root(root, a);
+    b = gs4i_stokes_root(root, b);
+    root[a > b ? a : b] = a > b ? b : a;
+}
+
+static void gs4i_rigid_join_faces(const gs4i_stokes_system *y)
+{
+    const gs4i_rigid *m = &y->rigid;
+    double stiffness[4];
+    int32_t r;
+    int j, k;
+    for (r = 1; r < y->rows; r++)
+        for (j = 0; j < 4; j++) {
+            const gs4i_link *link = y->row_faces[r];
+            const int32_t f = (int32_t)(link[j] >> 1);
+            if (!m->parent[f]) continue;
+            stiffness[j] = gs4i_stokes_stiffness(y, f);
+            for (k = 0; k < j; k++) {
+                const int32_t g = (int32_t)(link[k] >> 1);
+                double K = (double)((1 + (link[j] & 1)) * (1 + (link[k] & 1)));
+                if (!m->parent[g] || m->block[f] != m->block[g]) continue;
+                K *= (double)y->weight[r];
+                if (K * K > GS4I_RIGID_STRONG * stiffness[j] * stiffness[k])
+                    gs4i_rigid_join(m->parent, f, g);
+            }
+        }
+}
+
+/* Trace of the 3 x 3 block for velocities, of strain alone. */
+static double gs4i_rigid_trace(const float A[36], const float *mass)
+{
+    double sum = ((double)A[0] + (double)A[7]) + (double)A[14];
+    return mass ? sum - (((double)mass[0] + (double)mass[7]) + (double)mass[14]) : sum;
+}
+
+/* The same of nodes of a level; is there one that goes on? */
+static int gs4i_rigid_join_nodes(gs4i_rigid *m, int l)
+{
+    gs4i_rigid_level *g = &m->level[l];
+    int32_t i, e, up[3], any = 0;
+    int a;
+    for (a = 0; a < 3; a++) up[a] = (g->blocks[a] + 1) / 2;
+    for (g->parent[0] = 0, i = 1; i < g->n; i++) {
+        const int32_t own = g->start[i], *p = g->place[i];
+        const int stays = gs4i_rigid_trace(g->A[own], g->mass[i]) > gs4i_rigid_trace(g->mass[i], NULL);
+        g->parent[i] = stays ? i : 0;
+        m->block[i] = ((p[2] >> 1) * up[1] + (p[1] >> 1)) * up[0] + (p[0] >> 1);
+        any |= stays;
+    }
+    for (i = 1; i < g->n; i++)
+        for (e = g->start[i] + 1; g->parent[i] && e < g->start[i + 1]; e++) {
+            const int32_t j = g->to[e];
+            const double K = gs4i_rigid_trace(g->A[e], NULL);
+            if (j > i || !g->parent[j] || m->block[i] != m->block[j]) continue;
+            if (K * K > GS4I_RIGID_JOINED * gs4i_rigid_trace(g->A[g->start[i]], g->mass[i])
+                            * gs4i_rigid_trace(g->A[g->start[j]], g->mass[j]))
+                gs4i_rigid_join(g->parent, i, j);
+        }
+    return any;
+}
+
+/* --- setup: a level --------------------------------------------------------------------------- */
+
+/* Along an axis blocks have a colour by parity; the last of an odd number around has its own. */
+static int32_t gs4i_rigid_colour(int colour, int32_t blocks, int periodic, int32_t *end)
+{
+    const int alone = periodic && (blocks & 1);
+    *end = alone && colour < 2 ? blocks - 1 : blocks;
+    return colour < 2 ? colour : alone ? blocks - 1 : blocks;
+}
+
+/* counts[block] roots of members there: into the first number of each block. */
+static void gs4i_rigid_number_blocks(const gs4i_stokes *s, gs4i_rigid_level *g, int32_t *counts)
+{
+    const int *periodic = s->box->periodic;
+    int32_t next = 1, x, y, z, end[3];
+    int c;
+    for (c = 0; c < 27; c++) {
+        g->colour[c] = next;
+        for (z = gs4i_rigid_colour(c / 9, g->blocks[2], periodic[2], &end[2]); z < end[2]; z += 2)
+            for (y = gs4i_rigid_colour(c / 3 % 3, g->blocks[1], periodic[1], &end[1]); y < end[1];
+                 y += 2)
+                for (x = gs4i_rigid_colour(c % 3, g->blocks[0], periodic[0], &end[0]); x < end[0];
+                     x += 2) {
+                    int32_t *count = &counts[(z * g->blocks[1] + y) * g->blocks[0] + x];
+                    const int32_t here = *count;
+                    *count = next;
+                    next += here;
+                }
+    }
+    g->colour[27] = g->n = next;
+}
+
+static int gs4i_rigid_reserve_nodes(gs4i_memory *memory, gs4i_rigid_level *g, int32_t members)
+{
+    const size_t n = (size_t)g->n;
+    char *base = NULL;
+    int laid;
+    for (laid = 0; laid < 2; laid++) {
+        size_t used = 0;
+        g->first = (int32_t *)gs4i_carve(base, &used, n + 2, sizeof(int32_t));
+        g->child = (int32_t *)gs4i_carve(base, &used, (size_t)members, sizeof(int32_t));
+        g->start = (int32_t *)gs4i_carve(base, &used, n + 1, sizeof(int32_t));
+        g->parent = (int32_t *)gs4i_carve(base, &used, n, sizeof(int32_t));
+        g->place = (int32_t(*)[3])gs4i_carve(base, &used, n, sizeof *g->place);
+        g->mass = (float(*)[36])gs4i_carve(base, &used, n, sizeof *g->mass);
+        g->inverse = (float(*)[36])gs4i_carve(base, &used, n, sizeof *g->inverse);
+        g->b = (float(*)[6])gs4i_carve(base, &used, n, sizeof *g->b);
+        g->x = (float(*)[6])gs4i_carve(base, &used, n, sizeof *g->x);
+        if (!laid && !gs4i_scratch_reserve(memory, &g->nodes, used, 0)) return GS4_ERROR_MEMORY;
+        base = (char *)g->nodes.data;
+    }
+    memset(g->first, 0, (n + 2) * sizeof *g->first);
+    return GS4_OK;
+}
+
+/* Numbers of the parts that `root` joins; it becomes the parent of each of n members. */
+static int gs4i_rigid_number(gs4i_stokes *s, gs4i_rigid_level *g, int32_t *root, int32_t n)
+{
+    gs4i_rigid *m = &s->system.rigid;
+    const size_t blocks = (size_t)g->blocks[0] * (size_t)g->blocks[1] * (size_t)g->blocks[2];
+    int32_t i, k;
+    memset(m->counts, 0, blocks * sizeof *m->counts);
+    for (i = 1; i < n; i++)
+        if (root[i]) root[i] = gs4i_stokes_root(root, i);
+    for (i = 1; i < n; i++) m->counts[m->block[i]] += root[i] == i;
+    gs4i_rigid_number_blocks(s, g, m->counts);
+    GS4I_TRY(gs4i_rigid_reserve_nodes(s->memory, g, n));
+    /* a root is before all that it holds; numbers are negative for a while */
+    for (i = 1; i < n; i++) {
+        const int32_t block = m->block[i];
+        if (!root[i]) continue;
+        if (root[i] != i) {
+            root[i] = root[root[i]];
+            continue;
+        }
+        k = m->counts[block]++;
+        root[i] = -k;
+        g->place[k][0] = block % g->blocks[0];
+        g->place[k][1] = block / g->blocks[0] % g->blocks[1];
+        g->place[k][2] = block / g->blocks[0] / g->blocks[1];
+    }
+    for (i = 1; i < n; i++) root[i] = -root[i];
+    /* children in their order */
+    for (i = 1; i < n; i++)
+        if (root[i]) g->first[root[i] + 1]++;
+    for (k = 1; k <= g->n; k++) g->first[k] += g->first[k - 1];
+    for (i = 1; i < n; i++)
+        if (root[i]) g->child[g->first[root[i]]++] = i;
+    for (k = g->n; k > 0; k--) g->first[k] = g->first[k - 1];
+    return GS4_OK;
+}
+
+GS4I_INLINE int32_t gs4i_rigid_see(int32_t *seen, int32_t i, int32_t j, int32_t *to, int32_t n)
+{
+    if (!j || seen[j] == i) return n;
+    seen[j] = i;
+    if (to) to[n] = j;
+    return n + 1;
+}
+
+/* The nodes that each node of level l meets, itself first: counted into `start`, or listed. */
+static int32_t gs4i_rigid_meet(const gs4i_stokes_system *y, int l, int32_t *to)
+{
+    const gs4i_rigid *m = &y->rigid;
+    const gs4i_rigid_level *g = &m->level[l], *under = &m->level[l > 0 ? l - 1 : 0];
+    int32_t *seen = m->counts, n = 0, i, c, e;
+    int q, k;
+    memset(seen, 0, (size_t)g->n * sizeof *seen);
+    g->start[0] = 0;
+    for (i = 1; i < g->n; i++) {
+        g->start[i] = n;
+        n = gs4i_rigid_see(seen, i, i, to, n);
+        for (c = g->first[i]; c < g->first[i + 1]; c++) {
+            const int32_t f = g->child[c];
+            for (q = 0; l == 0 && q < 6; q++)
+                for (k = 0; k < 4; k++)
+                    n = gs4i_rigid_see(
+                        seen, i, m->parent[y->row_faces[y->face_rows[f][q] >> 1][k] >> 1], to, n);
+            for (e = l > 0 ? under->start[f] : 0; l > 0 && e < under->start[f + 1]; e++)
+                n = gs4i_rigid_see(seen, i, under->parent[under->to[e]], to, n);
+        }
+    }
+    g->start[i] = n;
+    return n;
+}
+
+/* Blocks of a node that are summed at once: `count` from number `begin` on. */
+typedef struct gs4i_rigid_sum {
+    int32_t node, begin, count, last;
+    double K[GS4I_RIGID_ROOM][36], mass[36];
+} gs4i_rigid_sum;
+
+/* Where a block with node j is; NULL: not among these. */
+GS4I_INLINE double *gs4i_rigid_block(const gs4i_rigid_level *g, gs4i_rigid_sum *t, int32_t j)
+{
+    if (g->to[t->last] != j)
+        for (t->last = g->start[t->node]; g->to[t->last] != j; t->last++) {
+        }
+    return t->last >= t->begin && t->last < t->begin + t->count ? t->K[t->last - t->begin] : NULL;
+}
+
+static void gs4i_rigid_add_faces(const gs4i_stokes_system *y, gs4i_rigid_sum *t)
+{
+    const gs4i_rigid *m = &y->rigid;
+    const gs4i_rigid_level *g = &m->level[0];
+    int32_t c;
+    int q, k, a, b;
+    for (c = g->first[t->node]; c < g->first[t->node + 1]; c++) {
+        const int32_t f = g->child[c];
+        const gs4i_rigid_face v = gs4i_rigid_of(m->arm[f]);
+        for (a = 0; a < 9; a++)
+            t->mass[6 * v.entry[a / 3] + v.entry[a % 3]] +=
+                (double)y->mass[f] * (double)(v.value[a / 3] * v.value[a % 3]);
+        for (q = 0; q < 6; q++) {
+            const gs4i_link row = y->face_rows[f][q];
+            for (k = 0; k < 4; k++) {
+                const gs4i_link other = y->row_faces[row >> 1][k];
+                const int32_t j = m->parent[other >> 1];
+                const double half =
+                    0.5 * (double)((1 + (int)(row & 1)) * (1 + (int)(other & 1)));
+                double *K = j ? gs4i_rigid_block(g, t, j) : NULL, W;
+                gs4i_rigid_face w;
+                if (!K) continue;
+                w = gs4i_rigid_of(m->arm[other >> 1]);
+                W = ((q + k) & 1 ? -half : half) * (double)y->weight[row >> 1];
+                for (b = 0; b < 3; b++)
+                    for (a = 0; a < 3; a++)
+                        K[6 * w.entry[b] + v.entry[a]] += W * (double)(v.value[a] * w.value[b]);
+            }
+        }
+    }
+}
+
+static void gs4i_rigid_add_nodes(const gs4i_rigid *m, int l, gs4i_rigid_sum *t)
+{
+    const gs4i_rigid_level *g = &m->level[l], *under = &m->level[l - 1];
+    int32_t c, e;
+    int k;
+    for (c = g->first[t->node]; c < g->first[t->node + 1]; c++) {
+        const int32_t i = g->child[c];
+        double r[3], v[36];
+        gs4i_rigid_arm(m, l - 1, i, r);
+        for (k = 0; k < 36; k++) v[k] = (double)under->mass[i][k];
+        gs4i_rigid_move(v, r, r);
+        for (k = 0; k < 36; k++) t->mass[k] += v[k];
+        for (e = under->start[i]; e < under->start[i + 1]; e++) {
+            const int32_t j = under->parent[under->to[e]];
+            double *K = j ? gs4i_rigid_block(g, t, j) : NULL, q[3];
+            if (!K) continue;
+            for (k = 0; k < 36; k++) v[k] = 0.5 * (double)under->A[e][k];
+            for (k = 0; k < 36 && under->to[e] == i; k++) v[k] -= 0.5 * (double)under->mass[i][k];
+            gs4i_rigid_arm(m, l - 1, under->to[e], q);
+            gs4i_rigid_move(v, r, q);
+            for (k = 0; k < 36; k++) K[k] += v[k];
+        }
+    }
+}
+
+typedef struct gs4i_rigid_task {
+    gs4i_stokes *s;
+    int level, colour, backward;
+} gs4i_rigid_task;
+
+static void gs4i_rigid_fill_task(int index, void *context)
+{
+    const gs4i_rigid_task *task = (const gs4i_rigid_task *)context;
+    const gs4i_stokes_system *y = &task->s->system;
+    const int l = task->level;
+    const gs4i_rigid_level *g = &y->rigid.level[l];
+    int32_t i = 1 + index * GS4I_RIGID_CHUNK, b;
+    const int32_t end = i + GS4I_RIGID_CHUNK < g->n ? i + GS4I_RIGID_CHUNK : g->n;
+    gs4i_rigid_sum t;
+    int k;
+    for (; i < end; i++)
+        for (t.begin = g->start[i]; t.begin < g->start[i + 1]; t.begin += t.count) {
+            t.node = i;
+            t.last = g->start[i];
+            t.count = g->start[i + 1] - t.begin;
+            if (t.count > GS4I_RIGID_ROOM) t.count = GS4I_RIGID_ROOM;
+            memset(t.K, 0, (size_t)t.count * sizeof t.K[0]);
+            memset(t.mass, 0, sizeof t.mass);
+            if (l == 0)
+                gs4i_rigid_add_faces(y, &t);
+            else
+                gs4i_rigid_add_nodes(&y->rigid, l, &t);
+            for (k = 0; k < 36 && t.begin == g->start[i]; k++) {
+                t.K[0][k] += t.mass[k];
+                g->mass[i][k] = (float)t.mass[k];
+            }
+            if (t.begin == g->start[i]) gs4i_rigid_invert(t.K[0], g->inverse[i]);
+            for (b = 0; b < t.count; b++)
+                for (k = 0; k < 36; k++) g->A[t.begin + b][k] = (float)t.K[b][k];
+        }
+}
+
+/* Level l of n members, in m->block, that `root` joins. */
+static int gs4i_rigid_build_level(gs4i_stokes *s, int l, int32_t *root, int32_t n)
+{
+    gs4i_rigid *m = &s->system.rigid;
+    gs4i_rigid_level *g = &m->level[l];
+    gs4i_rigid_task t;
+    size_t used = 0;
+    int32_t edges;
+    if (gs4i_rigid_number(s, g, root, n) != GS4_OK) return GS4_ERROR_MEMORY;
+    edges = gs4i_rigid_meet(&s->system, l, NULL);
+    gs4i_carve(NULL, &used, (size_t)edges, sizeof *g->A);
+    gs4i_carve(NULL, &used, (size_t)edges, sizeof *g->to);
+    if (!gs4i_scratch_reserve(s->memory, &g->edges, used, 0)) return GS4_ERROR_MEMORY;
+    used = 0;
+    g->A = (float(*)[36])gs4i_carve((char *)g->edges.data, &used, (size_t)edges, sizeof *g->A);
+    g->to = (int32_t *)gs4i_carve((char *)g->edges.data, &used, (size_t)edges, sizeof *g->to);
+    gs4i_rigid_meet(&s->system, l, g->to);
+    t.s = s;
+    t.level = l;
+    t.colour = t.backward = 0;
+    gs4i_parallel_for(s->tasks, (g->n - 1 + GS4I_RIGID_CHUNK - 1) / GS4I_RIGID_CHUNK,
+                      gs4i_rigid_fill_task, &t);
+    memset(g->x[0], 0, sizeof g->x[0]);
+    m->levels = l + 1;
+    return GS4_OK;
+}
+
+/* Of the last level, if it is small. */
+static int gs4i_rigid_factorize(gs4i_stokes *s)
+{
+    gs4i_rigid *m = &s->system.rigid;
+    const gs4i_rigid_level *g = &m->level[m->levels - 1];
+    const size_t n = 6 * ((size_t)g->n - 1);
+    int32_t i, e;
+    int k;
+    m->factor = NULL;
+    if (g->n - 1 > GS4I_RIGID_DENSE) return GS4_OK;
+    if (!gs4i_scratch_reserve(s->memory, &m->square, n * n * sizeof(double), 0))
+        return GS4_ERROR_MEMORY;
+    m->factor = (double *)m->square.data;
+    memset(m->factor, 0, n * n * sizeof(double));
+    for (i = 1; i < g->n; i++)
+        for (e = g->start[i]; e < g->start[i + 1]; e++)
+            for (k = 0; k < 36; k++)
+                m->factor[(6 * (size_t)(i - 1) + (size_t)(k % 6)) * n
+                          + 6 * (size_t)(g->to[e] - 1) + (size_t)(k / 6)] = (double)g->A[e][k];
+    gs4i_rigid_cholesky(m->factor, (int)n);
+    return GS4_OK;
+}
+
+static int gs4i_rigid_reserve(gs4i_stokes *s, size_t blocks)
+{
+    gs4i_stokes_system *y = &s->system;
+    gs4i_rigid *m = &y->rigid;
+    const size_t n = (size_t)y->faces;
+    char *base = NULL;
+    int laid;
+    for (laid = 0; laid < 2; laid++) {
+        size_t used = 0;
+        m->parent = (int32_t *)gs4i_carve(base, &used, n, sizeof(int32_t));
+        m->arm = (int8_t(*)[4])gs4i_carve(base, &used, n, sizeof *m->arm);
+        m->u = (float *)gs4i_carve(base, &used, n, sizeof(float));
+        m->r = (float *)gs4i_carve(base, &used, n, sizeof(float));
+        m->stress = (float *)gs4i_carve(base, &used, (size_t)y->rows, sizeof(float));
+        if (!laid && !gs4i_scratch_reserve(s->memory, &m->faces, used, 0)) return GS4_ERROR_MEMORY;
+        base = (char *)m->faces.data;
+    }
+    for (base = NULL, laid = 0; laid < 2; laid++) {
+        size_t used = 0;
+        m->block = (int32_t *)gs4i_carve(base, &used, n, sizeof(int32_t));
+        m->counts = (int32_t *)gs4i_carve(base, &used, n > blocks ? n : blocks, sizeof(int32_t));
+        if (!laid && !gs4i_scratch_reserve(s->memory, &m->work, used, 0)) return GS4_ERROR_MEMORY;
+        base = (char *)m->work.data;
+    }
+    m->parent[0] = 0;
+    m->u[0] = m->r[0] = m->stress[0] = 0;
+    return GS4_OK;
+}
+
+/* All levels; none where nothing is viscous. */
+static int gs4i_rigid_setup(gs4i_stokes *s)
+{
+    gs4i_stokes_system *y = &s->system;
+    gs4i_rigid *m = &y->rigid;
+    int32_t *blocks = m->level[0].blocks, *root, n = y->faces, f;
+    int l, a, any = 0;
+    m->levels = 0;
+    gs4i_rigid_count_blocks(s, blocks);
+    if (y->rows == 1) return GS4_OK;
+    if (gs4i_rigid_reserve(s, (size_t)blocks[0] * (size_t)blocks[1] * (size_t)blocks[2]) != GS4_OK)
+        return GS4_ERROR_MEMORY;
+    root = m->parent;
+    gs4i_parallel_for(s->tasks, s->box->size[2] + 1, gs4i_rigid_place_plane, s);
+    gs4i_rigid_join_faces(y);
+    for (f = 1; f < n; f++) any |= root[f] != 0;
+    for (l = 0; any && l < GS4I_RIGID_LEVELS; l++) {
+        gs4i_rigid_level *g = &m->level[l];
+        if (gs4i_rigid_build_level(s, l, root, n) != GS4_OK) return GS4_ERROR_MEMORY;
+        root = g->parent;
+        n = g->n;
+        any = n - 1 > GS4I_RIGID_DENSE && l + 1 < GS4I_RIGID_LEVELS
+              && (g->blocks[0] > 1 || g->blocks[1] > 1 || g->blocks[2] > 1)
+              && gs4i_rigid_join_nodes(m, l);
+        for (a = 0; any && a < 3; a++) g[1].blocks[a] = (g->blocks[a] + 1) / 2;
+    }
+    return m->levels ? gs4i_rigid_factorize(s) : GS4_OK;
+}
+
+/* --- the cycle -------------------------------------------------------------------------------- */
+
+/* D^T of the stress in V, at a face. */
+GS4I_INLINE float gs4i_rigid_force(const float *stress, const gs4i_link k[6])
+{
+    const float t[6] = {
+        (float)(1 + (k[0] & 1)) * stress[k[0] >> 1], (float)(1 + (k[1] & 1)) * stress[k[1] >> 1],
+        (float)(1 + (k[2] & 1)) * stress[k[2] >> 1], (float)(1 + (k[3] & 1)) * stress[k[3] >> 1],
+        (float)(1 + (k[4] & 1)) * stress[k[4] >> 1], (float)(1 + (k[5] & 1)) * stress[k[5] >> 1]
+    };
+    return (t[0] - t[1]) + ((t[2] - t[3]) + (t[4] - t[5]));
+}
+
+GS4I_INLINE float gs4i_rigid_residual(const gs4i_stokes_system *y, int32_t f)
+{
+    const gs4i_rigid *m = &y->rigid;
+    return (m->r[f] - (float)y->mass[f] * m->u[f]) - gs4i_rigid_force(m->stress, y->face_rows[f]);
+}
+
+/* A sweep of one colour. */
+static void gs4i_rigid_faces_task(int index, void *context)
+{
+    const gs4i_rigid_task *t = (const gs4i_rigid_task *)context;
+    const gs4i_stokes_system *y = &t->s->system;
+    const gs4i_rigid *m = &y->rigid;
+    int32_t f = y->colour[t->colour] + index * GS4I_STOKES_CHUNK, end = y->colour[t->colour + 1];
+    int q;
+    if (f + GS4I_STOKES_CHUNK < end) end = f + GS4I_STOKES_CHUNK;
+    for (; f < end; f++) {
+        const gs4i_link *k = y->face_rows[f];
+        const float du = gs4i_rigid_residual(y, f) * y->inverse[f];
+        m->u[f] += du;
+        for (q = 0; q < 6; q++) {
+            const float rate = (q & 1 ? -1.0f : 1.0f) * (float)(1 + (k[q] & 1)) * du;
+            if (k[q]) m->stress[k[q] >> 1] += (float)y->weight[k[q] >> 1] * rate;
+        }
+    }
+}
+
+static void gs4i_rigid_sweep_faces(gs4i_stokes *s, int backward)
+{
+    const int32_t *colour = s->system.colour;
+    gs4i_rigid_task t;
+    int q;
+    t.s = s;
+    t.level = 0;
+    t.backward = backward;
+    for (q = 0; q < 2 * GS4I_STOKES_COLOURS; q++) {
+        const int c = q % GS4I_STOKES_COLOURS;
+        t.colour = backward ? GS4I_STOKES_COLOURS - 1 - c : c;
+        gs4i_parallel_for(s->tasks, gs4i_stokes_tasks(colour[t.colour + 1] - colour[t.colour]),
+                          gs4i_rigid_faces_task, &t);
+    }
+}
+
+/* W' D u */
+static void gs4i_rigid_stress_task(int index, void *context)
+{
+    const gs4i_stokes_system *y = &((const gs4i_stokes *)context)->system;
+    const gs4i_rigid *m = &y->rigid;
+    GS4I_STOKES_RANGE(index, y->rows, begin, end);
+    int32_t r;
+    for (r = begin; r < end; r++) {
+        const gs4i_link *k = y->row_faces[r];
+        const float rate = ((float)(1 + (k[0] & 1)) * m->u[k[0] >> 1]
+                            - (float)(1 + (k[1] & 1)) * m->u[k[1] >> 1])
+                           + ((float)(1 + (k[2] & 1)) * m->u[k[2] >> 1]
+                              - (float)(1 + (k[3] & 1)) * m->u[k[3] >> 1]);
+        m->stress[r] = (float)y->weight[r] * rate;
+    }
+}
+
+#define GS4I_RIGID_RANGE(index, g, begin, end)              \
+    const int32_t begin = 1 + (index)*GS4I_RIGID_CHUNK,     \
+                  end = begin + GS4I_RIGID_CHUNK < (g)->n ? begin + GS4I_RIGID_CHUNK : (g)->n
+
+/* b of the first level: residuals of faces. */
+static void gs4i_rigid_restrict_faces(int index, void *context)
+{
+    const gs4i_stokes_system *y = &((const gs4i_stokes *)context)->system;
+    const gs4i_rigid *m = &y->rigid;
+    const gs4i_rigid_level *g = &m->level[0];
+    GS4I_RIGID_RANGE(index, g, begin, end);
+    int32_t i, c;
+    int a;
+    for (i = begin; i < end; i++) {
+        memset(g->b[i], 0, sizeof g->b[i]);
+        for (c = g->first[i]; c < g->first[i + 1]; c++) {
+            const gs4i_rigid_face v = gs4i_rigid_of(m->arm[g->child[c]]);
+            const float r = gs4i_rigid_residual(y, g->child[c]);
+            for (a = 0; a < 3; a++) g->b[i][v.entry[a]] += v.value[a] * r;
+        }
+    }
+}
+
+static void gs4i_rigid_prolong_faces(int index, void *context)
+{
+    const gs4i_stokes_system *y = &((const gs4i_stokes *)context)->system;
+    const gs4i_rigid *m = &y->rigid;
+    GS4I_STOKES_RANGE(index, y->faces, begin, end);
+    int32_t f;
+    for (f = begin; f < end; f++) {
+        const float *x = m->level[0].x[m->parent[f]];
+        const gs4i_rigid_face v = gs4i_rigid_of(m->arm[f]);
+        if (!m->parent[f]) continue;
+        m->u[f] += v.value[0] * x[v.entry[0]]
+                   + (v.value[1] * x[v.entry[1]] + v.value[2] * x[v.entry[2]]);
+    }
+}
+
+/* b - A x of node i. */
+GS4I_INLINE void gs4i_rigid_node_residual(const gs4i_rigid_level *g, int32_t i, float r[6])
+{
+    int32_t e;
+    int c, k;
+    memcpy(r, g->b[i], 6 * sizeof *r);
+    for (e = g->start[i]; e < g->start[i + 1]; e++) {
+        const float *A = g->A[e], *x = g->x[g->to[e]];
+        for (c = 0; c < 6; c++)
+            for (k = 0; k < 6; k++) r[k] -= A[6 * c + k] * x[c];
+    }
+}
+
+GS4I_INLINE void gs4i_rigid_relax(const gs4i_rigid_level *g, int32_t i)
+{
+    float r[6], x[6] = { 0, 0, 0, 0, 0, 0 };
+    int c, k;
+    gs4i_rigid_node_residual(g, i, r);
+    for (c = 0; c < 6; c++)
+        for (k = 0; k < 6; k++) x[k] += g->inverse[i][6 * c + k] * r[c];
+    for (k = 0; k < 6; k++) g->x[i][k] += x[k];
+}
+
+/* The first node at or after i whose block is another than that of the node before it. */
+static int32_t gs4i_rigid_cut(const gs4i_rigid_level *g, int32_t i, int32_t end)
+{
+    while (i > 1 && i < end && memcmp(g->place[i], g->place[i - 1], sizeof g->place[i]) == 0) i++;
+    return i < end ? i : end;
+}
+
+/* A sweep of one colour of blocks; nodes of a block may meet, those of two do not. */
+static void gs4i_rigid_nodes_task(int index, void *context)
+{
+    const gs4i_rigid_task *t = (const gs4i_rigid_task *)context;
+    const gs4i_rigid_level *g = &t->s->system.rigid.level[t->level];
+    const int32_t last = g->colour[t->colour + 1],
+                  begin = g->colour[t->colour] + index * GS4I_RIGID_CHUNK;
+    const int32_t from = gs4i_rigid_cut(g, begin, last),
+                  to = gs4i_rigid_cut(g, begin + GS4I_RIGID_CHUNK, last);
+    int32_t i;
+    if (t->backward)
+        for (i = to - 1; i >= from; i--) gs4i_rigid_relax(g, i);
+    else
+        for (i = from; i < to; i++) gs4i_rigid_relax(g, i);
+}
+
+static void gs4i_rigid_sweep_nodes(gs4i_stokes *s, int l, int backward)
+{
+    const int32_t *colour = s->system.rigid.level[l].colour;
+    gs4i_rigid_task t;
+    int c;
+    t.s = s;
+    t.level = l;
+    t.backward = backward;
+    for (c = 0; c < 27; c++) {
+        int32_t n;
+        t.colour = backward ? 26 - c : c;
+        n = colour[t.colour + 1] - colour[t.colour];
+        gs4i_parallel_for(s->tasks, (n + GS4I_RIGID_CHUNK - 1) / GS4I_RIGID_CHUNK,
+                          gs4i_rigid_nodes_task, &t);
+    }
+}
+
+/* b of level l: residuals of the level below. */
+static void gs4i_rigid_restrict_nodes(int index, void *context)
+{
+    const gs4i_rigid_task *t = (const gs4i_rigid_task *)context;
+    const gs4i_rigid *m = &t->s->system.rigid;
+    const gs4i_rigid_level *g = &m->level[t->level], *under = g - 1;
+    GS4I_RIGID_RANGE(index, g, begin, end);
+    int32_t i, c;
+    int k;
+    for (i = begin; i < end; i++) {
+        memset(g->b[i], 0, sizeof g->b[i]);
+        for (c = g->first[i]; c < g->first[i + 1]; c++) {
+            float f[6];
+            double r[3];
+            gs4i_rigid_arm(m, t->level - 1, g->child[c], r);
+            gs4i_rigid_node_residual(under, g->child[c], f);
+            for (k = 0; k < 3; k++)
+                f[3 + k] += (float)r[(k + 1) % 3] * f[(k + 2) % 3]
+                            - (float)r[(k + 2) % 3] * f[(k + 1) % 3];
+            for (k = 0; k < 6; k++) g->b[i][k] += f[k];
+        }
+    }
+}
+
+static void gs4i_rigid_prolong_nodes(int index, void *context)
+{
+    const gs4i_rigid_task *t = (const gs4i_rigid_task *)context;
+    const gs4i_rigid *m = &t->s->system.rigid;
+    const gs4i_rigid_level *up = &m->level[t->level], *g = up - 1;
+    GS4I_RIGID_RANGE(index, g, begin, end);
+    int32_t i;
+    int k;
+    for (i = begin; i < end; i++) {
+        const float *x = up->x[g->parent[i]];
+        double r[3];
+        if (!g->parent[i]) continue;
+        gs4i_rigid_arm(m, t->level - 1, i, r);
+        for (k = 0; k < 3; k++) {
+            g->x[i][k] += x[k]
+                          + (x[3 + (k + 1) % 3] * (float)r[(k + 2) % 3]
+                             - x[3 + (k + 2) % 3] * (float)r[(k + 1) % 3]);
+            g->x[i][3 + k] += x[3 + k];
+        }
+    }
+}
+
+static void gs4i_rigid_solve_dense(gs4i_rigid *m)
+{
+    const gs4i_rigid_level *g = &m->level[m->levels - 1];
+    const int n = 6 * (g->n - 1);
+    double y[6 * GS4I_RIGID_DENSE];
+    int i;
+    for (i = 0; i < n; i++) y[i] = (double)g->b[1 + i / 6][i % 6];
+    gs4i_rigid_substitute(m->factor, n, y);
+    for (i = 0; i < n; i++) g->x[1 + i / 6][i % 6] = (float)y[i];
+}
+
+static int gs4i_rigid_node_tasks(const gs4i_rigid_level *g)
+{
+    return (g->n - 1 + GS4I_RIGID_CHUNK - 1) / GS4I_RIGID_CHUNK;
+}
+
+/* x of level l improved; W where the next level is much smaller, else levels add up. */
+static void gs4i_rigid_visit(gs4i_stokes *s, int l)
+{
+    gs4i_rigid *m = &s->system.rigid;
+    gs4i_rigid_level *g = &m->level[l];
+    const int last = l == m->levels - 1;
+    gs4i_rigid_task t;
+    int q;
+    if (last && m->factor) {
+        gs4i_rigid_solve_dense(m);
+        return;
+    }
+    for (q = 0; q < (last ? 4 : 1); q++) gs4i_rigid_sweep_nodes(s, l, 0);
+    if (!last) {
+        const int exact = l + 1 == m->levels - 1 && m->factor;
+        t.s = s;
+        t.level = l + 1;
+        t.colour = t.backward = 0;
+        gs4i_parallel_for(s->tasks, gs4i_rigid_node_tasks(g + 1), gs4i_rigid_restrict_nodes, &t);
+        memset(g[1].x, 0, (size_t)g[1].n * sizeof *g[1].x);
+        for (q = 0; q < (exact || g[1].n > 0.7 * g->n ? 1 : 2); q++) gs4i_rigid_visit(s, l + 1);
+        gs4i_parallel_for(s->tasks, gs4i_rigid_node_tasks(g), gs4i_rigid_prolong_nodes, &t);
+    }
+    for (q = 0; q < (last ? 4 : 1); q++) gs4i_rigid_sweep_nodes(s, l, 1);
+}
+
+/* u about A'^-1 r. */
+static void gs4i_rigid_cycle(gs4i_stokes *s)
+{
+    gs4i_stokes_system *y = &s->system;
+    gs4i_rigid *m = &y->rigid;
+    gs4i_rigid_level *g = &m->level[0];
+    memset(m->u, 0, (size_t)y->faces * sizeof *m->u);
+    memset(m->stress, 0, (size_t)y->rows * sizeof *m->stress);
+    gs4i_rigid_sweep_faces(s, 0);
+    if (m->levels) {
+        gs4i_parallel_for(s->tasks, gs4i_rigid_node_tasks(g), gs4i_rigid_restrict_faces, s);
+        memset(g->x, 0, (size_t)g->n * sizeof *g->x);
+        gs4i_rigid_visit(s, 0);
+        if (m->levels > 1) gs4i_rigid_visit(s, 0);
+        gs4i_parallel_for(s->tasks, gs4i_stokes_tasks(y->faces), gs4i_rigid_prolong_faces, s);
+        gs4i_parallel_for(s->tasks, gs4i_stokes_tasks(y->rows), gs4i_rigid_stress_task, s);
+    }
+    gs4i_rigid_sweep_faces(s, 1);
+}
+
+/* --- pressure: the Schur complement ----------------------------------------------------------- *
+ *
+ * SCHUR COMPLEMENT S = C' + B A'^-1 B^T. V is a cycle of [[poisson]] for B Q^-1 B^T, one of two:
+ *
+ *     Cahouet & Chabard 1988: Q = M', and with d = 1 + 2 mu' C'
+ *         S^-1 r = d^-1 V d^-1 r + (2 mu'/d) r,   V for B Q^-1 B^T + C'/d
+ *     the commutator of Elman, Howle, Shadid, Shuttleworth & Tuminaro 2006: Q = diag A',
+ *         S^-1 r = V B Q^-1 A' Q^-1 B^T V r
+ *
+ * The first does not mind the number of cells; it fails at jumps of mu, in narrow rooms, and is
+ * slow on sticky floors. There the second is taken, which needs C' = 0, with two cycles each beyond
+ * 64^3 cells. Closed pockets lose their means before and after V. Of what goes around periodic axes
+ * the cycle knows nothing. */
+
+/* What the second way is for. */
+static int gs4i_schur_wants_commutator(const gs4i_stokes_system *y)
+{
+    int32_t i;
+    int k;
+    for (i = 1; i < y->cells; i++)
+        if (y->compliance[i] > 0) return 0;
+    if (y->pockets) return 1;
+    for (i = 1; i < y->faces; i++) {
+        const int32_t *c = y->face_cells[i];
+        if (!c[0] || !c[1]) continue;
+        if (y->viscosity[c[0]] > 10 * y->viscosity[c[1]]
+            || y->viscosity[c[1]] > 10 * y->viscosity[c[0]])
+            return 1;
+    }
+    for (i = 1; i < y->faces; i++)
+        for (k = 0; k < 6; k++)
+            if (y->face_rows[i][k] & 1) return 1;
+    return 0;
+}
+
+static gs4_real gs4i_schur_d(const gs4i_stokes_system *y, int32_t c)
+{
+    return 1 + 2 * y->viscosity[c] * y->compliance[c];
+}
+
+static size_t gs4i_schur_entry(const gs4i_stokes *s, const int at[3], int axis)
+{
+    const size_t x = (size_t)(s->end[0] - s->first[0] + (axis == 0)),
+                 y = (size_t)(s->end[1] - s->first[1] + (axis == 1));
+    return ((size_t)(at[2] - s->first[2]) * y + (size_t)(at[1] - s->first[1])) * x
+           + (size_t)(at[0] - s->first[0]);
+}
+
+/* The matrix of V in a plane. */
+static void gs4i_schur_pose_plane(int z, void *context)
+{
+    gs4i_stokes *s = (gs4i_stokes *)context;
+    const gs4i_stokes_system *y = &s->system;
+    const gs4i_schur *m = &y->schur;
+    int at[3], c;
+    size_t i;
+    for (c = 0; c < 3; c++)
+        GS4I_STOKES_PLANE(s, 1 << c, z, at, i) {
+            const int32_t f = y->number[c][i];
+            gs4_real share = y->share[f];
+            /* not so little that [[poisson]] refuses it */
+            if (share > 0 && share < GS4I_C(1e-6)) share = GS4I_C(1e-6);
+            m->coefficient[c][gs4i_schur_entry(s, at, c)] =
+                !f ? 0
+                   : share * share
+                         * (m->by_commutator ? (gs4_real)y->inverse[f] : 1 / y->mass[f]);
+        }
+    GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i) {
+        const int32_t n = y->number[3][i];
+        const size_t to = gs4i_schur_entry(s, at, -1);
+        m->kind[to] = s->kind[i];
+        m->diagonal[to] = n ? y->compliance[n] / gs4i_schur_d(y, n) : 0;
+    }
+}
+
+/* Faces that two ends of a periodic axis share are closed, but for a little that holds parts which
+ * nothing else does. */
+static void gs4i_schur_close_ends(gs4i_stokes *s)
+{
+    const gs4i_schur *m = &s->system.schur;
+    const int *first = s->first, *end = s->end;
+    int a, at[3], last[3];
+    for (a = 0; a < 3; a++) {
+        const int b = (a + 1) % 3, c = (a + 2) % 3;
+        if (!s->box->periodic[a]) continue;
+        at[a] = first[a];
+        for (at[c] = first[c]; at[c] < end[c]; at[c]++)
+            for (at[b] = first[b]; at[b] < end[b]; at[b]++) {
+                gs4_real *seam = &m->coefficient[a][gs4i_schur_entry(s, at, a)];
+                memcpy(last, at, sizeof last);
+                last[a] = end[a] - 1;
+                m->diagonal[gs4i_schur_entry(s, at, -1)] += GS4I_C(0.01) * *seam;
+                m->diagonal[gs4i_schur_entry(s, last, -1)] += GS4I_C(0.01) * *seam;
+                *seam = 0;
+            }
+    }
+}
+
+static int gs4i_schur_setup(gs4i_stokes *s)
+{
+    gs4i_schur *m = &s->system.schur;
+    gs4_poisson_desc d;
+    size_t cells = 1;
+    char *base = NULL;
+    int a, laid;
+    memset(&d, 0, sizeof d);
+    for (a = 0; a < 3; a++) {
+        d.cells[a] = s->end[a] - s->first[a];
+        cells *= (size_t)d.cells[a];
+    }
+    for (laid = 0; laid < 2; laid++) {
+        size_t used = 0;
+        for (a = 0; a < 3; a++)
+            m->coefficient[a] = (gs4_real *)gs4i_carve(
+                base, &used, cells / (size_t)d.cells[a] * (size_t)(d.cells[a] + 1),
+                sizeof(gs4_real));
+        m->diagonal = (gs4_real *)gs4i_carve(base, &used, cells, sizeof(gs4_real));
+        m->kind = (uint8_t *)gs4i_carve(base, &used, cells, 1);
+        if (!laid && !gs4i_scratch_reserve(s->memory, &m->given, used, 0)) return GS4_ERROR_MEMORY;
+        base = (char *)m->given.data;
+    }
+    m->by_commutator = gs4i_schur_wants_commutator(&s->system);
+    m->cycles = m->by_commutator && cells > (size_t)64 * 64 * 64 ? 2 : 1;
+    gs4i_parallel_for(s->tasks, s->box->size[2] + 1, gs4i_schur_pose_plane, s);
+    gs4i_schur_close_ends(s);
+    for (a = 0; a < 3; a++) d.coefficient[a] = m->coefficient[a];
+    d.diagonal = m->diagonal;
+    d.kind = m->kind;
+    d.cell_size = 1;
+    d.threads = s->threads;
+    d.parallel_for = s->tasks->parallel_for;
+    m->solver.memory = s->memory;
+    m->solver.tasks = s->tasks;
+    return gs4i_solver_setup(&m->solver, &d);
+}
+
+typedef struct gs4i_schur_task {
+    gs4i_stokes *s;
+    const double *in;
+    double *out;
+    int adds;
+} gs4i_schur_task;
+
+/* Cells of a plane into the two colours of [[poisson]], and back. */
+static void gs4i_schur_load_plane(int z, void *context)
+{
+    const gs4i_schur_task *t = (const gs4i_schur_task *)context;
+    const gs4i_stokes *s = t->s;
+    const gs4i_solver *m = &s->system.schur.solver;
+    int at[3];
+    size_t i;
+    GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i) {
+        const int x = at[0] - s->first[0], y = at[1] - s->first[1], k = z - s->first[2];
+        m->level[0].r[(x + y + k) & 1][gs4i_row_of(&m->level[0], y, k) + (size_t)(x / 2)] =
+            t->in[s->system.number[3][i]] * m->diagonal_unit;
+    }
+}
+
+static void gs4i_schur_store_plane(int z, void *context)
+{
+    const gs4i_schur_task *t = (const gs4i_schur_task *)context;
+    const gs4i_stokes *s = t->s;
+    const gs4i_solver *m = &s->system.schur.solver;
+    int at[3];
+    size_t i;
+    GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i) {
+        const int x = at[0] - s->first[0], y = at[1] - s->first[1], k = z - s->first[2];
+        const int32_t n = s->system.number[3][i];
+        const double v = (double)m->level[0].z[(x + y + k) & 1]
+                                              [gs4i_row_of(&m->level[0], y, k) + (size_t)(x / 2)];
+        if (n) t->out[n] = t->adds ? t->out[n] + v : v;
+    }
+}
+
+static void gs4i_schur_cycle(gs4i_stokes *s, const double *in, double *out, int adds)
+{
+    const gs4i_stokes_system *y = &s->system;
+    gs4i_schur_task t;
+    t.s = s;
+    t.in = in;
+    t.out = out;
+    t.adds = adds;
+    gs4i_parallel_for(s->tasks, s->box->size[2], gs4i_schur_load_plane, &t);
+    gs4i_cycle(&s->system.schur.solver);
+    gs4i_parallel_for(s->tasks, s->box->size[2], gs4i_schur_store_plane, &t);
+    out[0] = 0;
+    gs4i_stokes_take_means(&s->system, out);
+    (void)y;
+}
+
+/* t = Q^-1 B^T z at faces, of z in cells; and what V meets: r + B^T z. */
+static void gs4i_schur_push_task(int index, void *context)
+{
+    const gs4i_stokes_system *y = &((const gs4i_stokes *)context)->system;
+    const double *p = y->z + y->faces;
+    GS4I_STOKES_RANGE(index, y->faces, begin, end);
+    int32_t f;
+    for (f = begin; f < end; f++)
+        y->t[f] = (double)y->inverse[f]
+                  * ((double)y->share[f] * (p[y->face_cells[f][0]] - p[y->face_cells[f][1]]));
+}
+
+static void gs4i_rigid_load_task(int index, void *context)
+{
+    const gs4i_stokes_system *y = &((const gs4i_stokes *)context)->system;
+    const double *p = y->z + y->faces;
+    GS4I_STOKES_RANGE(index, y->faces, begin, end);
+    int32_t f;
+    for (f = begin; f < end; f++) {
+        const double push = (double)y->share[f] * (p[y->face_cells[f][0]] - p[y->face_cells[f][1]]);
+        if (y->rows > 1)
+            y->rigid.r[f] = (float)(y->r[f] + push);
+        else /* V is 1/M' */
+            y->z[f] = (double)y->inverse[f] * (y->r[f] + push);
+    }
+}
+
+static void gs4i_rigid_store_task(int index, void *context)
+{
+    const gs4i_stokes_system *y = &((const gs4i_stokes *)context)->system;
+    GS4I_STOKES_RANGE(index, y->faces, begin, end);
+    int32_t f;
+    for (f = begin; f < end; f++) y->z[f] = (double)y->rigid.u[f];
+}
+
+/* p of z = V q, in cells. */
+static void gs4i_schur_invert(gs4i_stokes *s)
+{
+    gs4i_stokes_system *y = &s->system;
+    double *q = y->q + y->faces, *t = y->t + y->faces, *z = y->z + y->faces;
+    gs4i_stokes_product B;
+    int32_t c;
+    gs4i_stokes_take_means(y, q);
+    gs4i_schur_cycle(s, q, z, 0);
+    if (y->schur.cycles == 1) return;
+    B.s = s;
+    B.in = B.out = y->t;
+    B.affine = 0;
+    gs4i_parallel_for(s->tasks, gs4i_stokes_tasks(y->faces), gs4i_schur_push_task, s);
+    gs4i_parallel_for(s->tasks, gs4i_stokes_tasks(y->cells), gs4i_stokes_cell_task, &B);
+    for (c = 0; c < y->cells; c++) t[c] = q[c] - t[c];
+    gs4i_stokes_take_means(y, t);
+    gs4i_schur_cycle(s, t, z, 1);
+}
+
+/* p of z about S^-1 p of r. */
+static void gs4i_schur_apply(gs4i_stokes *s)
+{
+    gs4i_stokes_system *y = &s->system;
+    double *q = y->q + y->faces, *t = y->t + y->faces, *z = y->z + y->faces;
+    const double *r = y->r + y->faces;
+    gs4i_stokes_product A;
+    int32_t c, f;
+    for (c = 0; c < y->cells; c++) q[c] = r[c] / (double)gs4i_schur_d(y, c);
+    gs4i_schur_invert(s);
+    if (!y->schur.by_commutator) {
+        for (c = 0; c < y->cells; c++)
+            z[c] = (z[c] + 2 * (double)y->viscosity[c] * r[c]) / (double)gs4i_schur_d(y, c);
+        gs4i_stokes_take_means(y, z);
+        return;
+    }
+    gs4i_parallel_for(s->tasks, gs4i_stokes_tasks(y->faces), gs4i_schur_push_task, s);
+    memset(t, 0, (size_t)y->cells * sizeof *t);
+    A.s = s;
+    A.in = y->t;
+    A.out = y->q;
+    A.affine = 0;
+    gs4i_parallel_for(s->tasks, gs4i_stokes_tasks(y->rows), gs4i_stokes_stress_task, &A);
+    gs4i_parallel_for(s->tasks, gs4i_stokes_tasks(y->faces), gs4i_stokes_face_task, &A);
+    for (f = 0; f < y->faces; f++) y->q[f] *= (double)y->inverse[f];
+    A.in = A.out = y->q;
+    gs4i_parallel_for(s->tasks, gs4i_stokes_tasks(y->cells), gs4i_stokes_cell_task, &A);
+    gs4i_schur_invert(s);
+}
+
+/* z about A^-1 r, by [A', -B^T; 0, S]. */
 static void gs4i_stokes_precondition(gs4i_stokes *s)
 {
     gs4i_stokes_system *y = &s->system;
-    int32_t i;
-    for (i = 0; i < y->all; i++) y->z[i] = (double)y->inverse[i] * y->r[i];
-    gs4i_stokes_take_means(y, y->z + y->faces);
+    gs4i_schur_apply(s);
+    gs4i_parallel_for(s->tasks, gs4i_stokes_tasks(y->faces), gs4i_rigid_load_task, s);
+    if (y->rows == 1) return;
+    gs4i_rigid_cycle(s);
+    gs4i_parallel_for(s->tasks, gs4i_stokes_tasks(y->faces), gs4i_rigid_store_task, s);
 }
 
 /* --- GMRES ------------------------------------------------------------------------------------ *
@@ -7342,6 +8482,7 @@ static int gs4i_stokes_fault(gs4i_stokes *s, const char *what, double value, con
 static int gs4i_stokes_setup(gs4i_stokes *s)
 {
     gs4i_stokes_system *y = &s->system;
+    int32_t f;
     int k;
     s->fault = NULL;
     if (gs4i_stokes_reserve_maps(s) != GS4_OK) return GS4_ERROR_MEMORY;
@@ -7365,17 +8506,30 @@ static int gs4i_stokes_setup(gs4i_stokes *s)
     gs4i_stokes_run(s, gs4i_stokes_row_plane, GS4I_STOKES_LINK);
     gs4i_stokes_find_pockets(s);
     if (gs4i_stokes_reserve_vectors(s) != GS4_OK) return GS4_ERROR_MEMORY;
-    gs4i_stokes_diagonals(s);
-    return GS4_OK;
+    y->inverse[0] = 0;
+    for (f = 1; f < y->faces; f++)
+        y->inverse[f] = (float)(1 / ((double)y->mass[f] + gs4i_stokes_stiffness(y, f)));
+    GS4I_TRY(gs4i_rigid_setup(s));
+    return gs4i_schur_setup(s);
 }
 
 static void gs4i_stokes_free(gs4i_stokes *s)
 {
     gs4i_stokes_system *y = &s->system;
+    int k;
     gs4i_release(s->memory, &y->maps);
     gs4i_release(s->memory, &y->numbered);
     gs4i_release(s->memory, &y->linked);
     gs4i_release(s->memory, &y->vectors);
+    gs4i_release(s->memory, &y->rigid.faces);
+    gs4i_release(s->memory, &y->rigid.work);
+    gs4i_release(s->memory, &y->rigid.square);
+    for (k = 0; k < GS4I_RIGID_LEVELS; k++) {
+        gs4i_release(s->memory, &y->rigid.level[k].nodes);
+        gs4i_release(s->memory, &y->rigid.level[k].edges);
+    }
+    gs4i_release(s->memory, &y->schur.given);
+    if (y->schur.solver.memory) gs4i_solver_free(&y->schur.solver);
 }
 
 /* --- solving ---------------------------------------------------------------------------------- */

@@ -6414,7 +6414,8 @@ typedef struct gs4i_rigid_level {
     int32_t *first, *child;           /* its faces, or nodes of the level below */
     int32_t *start, *to, *parent;     /* parent: in the level above, or 0 */
     int32_t (*place)[3];              /* its block */
-    float (*A)[36], (*mass)[36], (*inverse)[36], (*b)[6], (*x)[6];
+    float (*A)[36], (*mass)[36], (*inverse)[36];
+    double (*b)[6], (*x)[6];
     gs4i_scratch nodes, edges;
 } gs4i_rigid_level;
 
@@ -6424,7 +6425,6 @@ typedef struct gs4i_rigid {
     int levels;
     int32_t *parent;         /* of faces: their node, or 0; */
     int8_t (*arm)[4];        /* twice their place from the centre of its block, their axis */
-    float *u, *r, *stress;   /* of faces; of rows */
     int32_t *block, *counts; /* while setting up: of faces or nodes; of blocks or nodes */
     double *factor;          /* of the last level; NULL: it is swept */
     gs4i_scratch faces, work, square;
@@ -7141,6 +7141,15 @@ static void gs4i_stokes_stress_task(int index, void *context)
     }
 }
 
+/* D^T of the stress at a face. */
+GS4I_INLINE double gs4i_stokes_force(const gs4i_stokes_system *y, int32_t f)
+{
+    const gs4i_link *k = y->face_rows[f];
+    return (gs4i_linked(y->stress, k[0]) - gs4i_linked(y->stress, k[1]))
+           + ((gs4i_linked(y->stress, k[2]) - gs4i_linked(y->stress, k[3]))
+              + (gs4i_linked(y->stress, k[4]) - gs4i_linked(y->stress, k[5])));
+}
+
 /* Faces: M' u + D^T stress - B^T p; cells: B u + C' p. */
 static void gs4i_stokes_face_task(int index, void *context)
 {
@@ -7150,10 +7159,7 @@ static void gs4i_stokes_face_task(int index, void *context)
     GS4I_STOKES_RANGE(index, y->faces, begin, end);
     int32_t f;
     for (f = begin; f < end; f++) {
-        const gs4i_link *k = y->face_rows[f];
-        const double force = (gs4i_linked(y->stress, k[0]) - gs4i_linked(y->stress, k[1]))
-                             + ((gs4i_linked(y->stress, k[2]) - gs4i_linked(y->stress, k[3]))
-                                + (gs4i_linked(y->stress, k[4]) - gs4i_linked(y->stress, k[5])));
+        const double force = gs4i_stokes_force(y, f);
         const double push = (double)y->share[f] * (p[y->face_cells[f][0]] - p[y->face_cells[f][1]]);
         const double sum = (double)y->mass[f] * t->in[f] + force - push;
         t->out[f] = t->affine ? y->b[f] - sum : sum;
@@ -7217,7 +7223,7 @@ static void gs4i_stokes_apply(gs4i_stokes *s, const double *in, double *out, int
 /* [e_d; r x e_d] of a face. */
 typedef struct gs4i_rigid_face {
     int entry[3];
-    float value[3];
+    double value[3];
 } gs4i_rigid_face;
 
 GS4I_INLINE gs4i_rigid_face gs4i_rigid_of(const int8_t arm[4])
@@ -7227,9 +7233,9 @@ GS4I_INLINE gs4i_rigid_face gs4i_rigid_of(const int8_t arm[4])
     t.entry[0] = d;
     t.value[0] = 1;
     t.entry[1] = 3 + a; /* (r x e_d)_a = r_b */
-    t.value[1] = 0.5f * (float)arm[b];
+    t.value[1] = 0.5 * (double)arm[b];
     t.entry[2] = 3 + b;
-    t.value[2] = -0.5f * (float)arm[a];
+    t.value[2] = -0.5 * (double)arm[a];
     return t;
 }
 
@@ -7463,8 +7469,8 @@ static int gs4i_rigid_reserve_nodes(gs4i_memory *memory, gs4i_rigid_level *g, in
         g->place = (int32_t(*)[3])gs4i_carve(base, &used, n, sizeof *g->place);
         g->mass = (float(*)[36])gs4i_carve(base, &used, n, sizeof *g->mass);
         g->inverse = (float(*)[36])gs4i_carve(base, &used, n, sizeof *g->inverse);
-        g->b = (float(*)[6])gs4i_carve(base, &used, n, sizeof *g->b);
-        g->x = (float(*)[6])gs4i_carve(base, &used, n, sizeof *g->x);
+        g->b = (double(*)[6])gs4i_carve(base, &used, n, sizeof *g->b);
+        g->x = (double(*)[6])gs4i_carve(base, &used, n, sizeof *g->x);
         if (!laid && !gs4i_scratch_reserve(memory, &g->nodes, used, 0)) return GS4_ERROR_MEMORY;
         base = (char *)g->nodes.data;
     }
@@ -7713,9 +7719,6 @@ static int gs4i_rigid_reserve(gs4i_stokes *s, size_t blocks)
         size_t used = 0;
         m->parent = (int32_t *)gs4i_carve(base, &used, n, sizeof(int32_t));
         m->arm = (int8_t(*)[4])gs4i_carve(base, &used, n, sizeof *m->arm);
-        m->u = (float *)gs4i_carve(base, &used, n, sizeof(float));
-        m->r = (float *)gs4i_carve(base, &used, n, sizeof(float));
-        m->stress = (float *)gs4i_carve(base, &used, (size_t)y->rows, sizeof(float));
         if (!laid && !gs4i_scratch_reserve(s->memory, &m->faces, used, 0)) return GS4_ERROR_MEMORY;
         base = (char *)m->faces.data;
     }
@@ -7727,7 +7730,6 @@ static int gs4i_rigid_reserve(gs4i_stokes *s, size_t blocks)
         base = (char *)m->work.data;
     }
     m->parent[0] = 0;
-    m->u[0] = m->r[0] = m->stress[0] = 0;
     return GS4_OK;
 }
 
@@ -7762,21 +7764,10 @@ static int gs4i_rigid_setup(gs4i_stokes *s)
 
 /* --- the cycle -------------------------------------------------------------------------------- */
 
-/* D^T of the stress in V, at a face. */
-GS4I_INLINE float gs4i_rigid_force(const float *stress, const gs4i_link k[6])
+/* r - A' u at a face, with r in y->q and u in y->z. */
+GS4I_INLINE double gs4i_rigid_residual(const gs4i_stokes_system *y, int32_t f)
 {
-    const float t[6] = {
-        (float)(1 + (k[0] & 1)) * stress[k[0] >> 1], (float)(1 + (k[1] & 1)) * stress[k[1] >> 1],
-        (float)(1 + (k[2] & 1)) * stress[k[2] >> 1], (float)(1 + (k[3] & 1)) * stress[k[3] >> 1],
-        (float)(1 + (k[4] & 1)) * stress[k[4] >> 1], (float)(1 + (k[5] & 1)) * stress[k[5] >> 1]
-    };
-    return (t[0] - t[1]) + ((t[2] - t[3]) + (t[4] - t[5]));
-}
-
-GS4I_INLINE float gs4i_rigid_residual(const gs4i_stokes_system *y, int32_t f)
-{
-    const gs4i_rigid *m = &y->rigid;
-    return (m->r[f] - (float)y->mass[f] * m->u[f]) - gs4i_rigid_force(m->stress, y->face_rows[f]);
+    return (y->q[f] - (double)y->mass[f] * y->z[f]) - gs4i_stokes_force(y, f);
 }
 
 /* A sweep of one colour. */
@@ -7784,17 +7775,16 @@ static void gs4i_rigid_faces_task(int index, void *context)
 {
     const gs4i_rigid_task *t = (const gs4i_rigid_task *)context;
     const gs4i_stokes_system *y = &t->s->system;
-    const gs4i_rigid *m = &y->rigid;
     int32_t f = y->colour[t->colour] + index * GS4I_STOKES_CHUNK, end = y->colour[t->colour + 1];
     int q;
     if (f + GS4I_STOKES_CHUNK < end) end = f + GS4I_STOKES_CHUNK;
     for (; f < end; f++) {
         const gs4i_link *k = y->face_rows[f];
-        const float du = gs4i_rigid_residual(y, f) * y->inverse[f];
-        m->u[f] += du;
+        const double du = gs4i_rigid_residual(y, f) * (double)y->inverse[f];
+        y->z[f] += du;
         for (q = 0; q < 6; q++) {
-            const float rate = (q & 1 ? -1.0f : 1.0f) * (float)(1 + (k[q] & 1)) * du;
-            if (k[q]) m->stress[k[q] >> 1] += (float)y->weight[k[q] >> 1] * rate;
+            const double rate = (double)((q & 1 ? -1 : 1) * (1 + (int)(k[q] & 1))) * du;
+            if (k[q]) y->stress[k[q] >> 1] += (double)y->weight[k[q] >> 1] * rate;
         }
     }
 }
@@ -7815,23 +7805,6 @@ static void gs4i_rigid_sweep_faces(gs4i_stokes *s, int backward)
     }
 }
 
-/* W' D u */
-static void gs4i_rigid_stress_task(int index, void *context)
-{
-    const gs4i_stokes_system *y = &((const gs4i_stokes *)context)->system;
-    const gs4i_rigid *m = &y->rigid;
-    GS4I_STOKES_RANGE(index, y->rows, begin, end);
-    int32_t r;
-    for (r = begin; r < end; r++) {
-        const gs4i_link *k = y->row_faces[r];
-        const float rate = ((float)(1 + (k[0] & 1)) * m->u[k[0] >> 1]
-                            - (float)(1 + (k[1] & 1)) * m->u[k[1] >> 1])
-                           + ((float)(1 + (k[2] & 1)) * m->u[k[2] >> 1]
-                              - (float)(1 + (k[3] & 1)) * m->u[k[3] >> 1]);
-        m->stress[r] = (float)y->weight[r] * rate;
-    }
-}
-
 #define GS4I_RIGID_RANGE(index, g, begin, end)              \
     const int32_t begin = 1 + (index)*GS4I_RIGID_CHUNK,     \
                   end = begin + GS4I_RIGID_CHUNK < (g)->n ? begin + GS4I_RIGID_CHUNK : (g)->n
@@ -7849,7 +7822,7 @@ static void gs4i_rigid_restrict_faces(int index, void *context)
         memset(g->b[i], 0, sizeof g->b[i]);
         for (c = g->first[i]; c < g->first[i + 1]; c++) {
             const gs4i_rigid_face v = gs4i_rigid_of(m->arm[g->child[c]]);
-            const float r = gs4i_rigid_residual(y, g->child[c]);
+            const double r = gs4i_rigid_residual(y, g->child[c]);
             for (a = 0; a < 3; a++) g->b[i][v.entry[a]] += v.value[a] * r;
         }
     }
@@ -7862,34 +7835,35 @@ static void gs4i_rigid_prolong_faces(int index, void *context)
     GS4I_STOKES_RANGE(index, y->faces, begin, end);
     int32_t f;
     for (f = begin; f < end; f++) {
-        const float *x = m->level[0].x[m->parent[f]];
+        const double *x = m->level[0].x[m->parent[f]];
         const gs4i_rigid_face v = gs4i_rigid_of(m->arm[f]);
         if (!m->parent[f]) continue;
-        m->u[f] += v.value[0] * x[v.entry[0]]
+        y->z[f] += v.value[0] * x[v.entry[0]]
                    + (v.value[1] * x[v.entry[1]] + v.value[2] * x[v.entry[2]]);
     }
 }
 
 /* b - A x of node i. */
-GS4I_INLINE void gs4i_rigid_node_residual(const gs4i_rigid_level *g, int32_t i, float r[6])
+GS4I_INLINE void gs4i_rigid_node_residual(const gs4i_rigid_level *g, int32_t i, double r[6])
 {
     int32_t e;
     int c, k;
     memcpy(r, g->b[i], 6 * sizeof *r);
     for (e = g->start[i]; e < g->start[i + 1]; e++) {
-        const float *A = g->A[e], *x = g->x[g->to[e]];
+        const float *A = g->A[e];
+        const double *x = g->x[g->to[e]];
         for (c = 0; c < 6; c++)
-            for (k = 0; k < 6; k++) r[k] -= A[6 * c + k] * x[c];
+            for (k = 0; k < 6; k++) r[k] -= (double)A[6 * c + k] * x[c];
     }
 }
 
 GS4I_INLINE void gs4i_rigid_relax(const gs4i_rigid_level *g, int32_t i)
 {
-    float r[6], x[6] = { 0, 0, 0, 0, 0, 0 };
+    double r[6], x[6] = { 0, 0, 0, 0, 0, 0 };
     int c, k;
     gs4i_rigid_node_residual(g, i, r);
     for (c = 0; c < 6; c++)
-        for (k = 0; k < 6; k++) x[k] += g->inverse[i][6 * c + k] * r[c];
+        for (k = 0; k < 6; k++) x[k] += (double)g->inverse[i][6 * c + k] * r[c];
     for (k = 0; k < 6; k++) g->x[i][k] += x[k];
 }
 
@@ -7945,13 +7919,13 @@ static void gs4i_rigid_restrict_nodes(int index, void *context)
     for (i = begin; i < end; i++) {
         memset(g->b[i], 0, sizeof g->b[i]);
         for (c = g->first[i]; c < g->first[i + 1]; c++) {
-            float f[6];
+            double f[6];
             double r[3];
             gs4i_rigid_arm(m, t->level - 1, g->child[c], r);
             gs4i_rigid_node_residual(under, g->child[c], f);
             for (k = 0; k < 3; k++)
-                f[3 + k] += (float)r[(k + 1) % 3] * f[(k + 2) % 3]
-                            - (float)r[(k + 2) % 3] * f[(k + 1) % 3];
+                f[3 + k] += (double)r[(k + 1) % 3] * f[(k + 2) % 3]
+                            - (double)r[(k + 2) % 3] * f[(k + 1) % 3];
             for (k = 0; k < 6; k++) g->b[i][k] += f[k];
         }
     }
@@ -7966,14 +7940,14 @@ static void gs4i_rigid_prolong_nodes(int index, void *context)
     int32_t i;
     int k;
     for (i = begin; i < end; i++) {
-        const float *x = up->x[g->parent[i]];
+        const double *x = up->x[g->parent[i]];
         double r[3];
         if (!g->parent[i]) continue;
         gs4i_rigid_arm(m, t->level - 1, i, r);
         for (k = 0; k < 3; k++) {
             g->x[i][k] += x[k]
-                          + (x[3 + (k + 1) % 3] * (float)r[(k + 2) % 3]
-                             - x[3 + (k + 2) % 3] * (float)r[(k + 1) % 3]);
+                          + (x[3 + (k + 1) % 3] * (double)r[(k + 2) % 3]
+                             - x[3 + (k + 2) % 3] * (double)r[(k + 1) % 3]);
             g->x[i][3 + k] += x[3 + k];
         }
     }
@@ -7987,7 +7961,7 @@ static void gs4i_rigid_solve_dense(gs4i_rigid *m)
     int i;
     for (i = 0; i < n; i++) y[i] = (double)g->b[1 + i / 6][i % 6];
     gs4i_rigid_substitute(m->factor, n, y);
-    for (i = 0; i < n; i++) g->x[1 + i / 6][i % 6] = (float)y[i];
+    for (i = 0; i < n; i++) g->x[1 + i / 6][i % 6] = (double)y[i];
 }
 
 static int gs4i_rigid_node_tasks(const gs4i_rigid_level *g)
@@ -8025,18 +7999,22 @@ static void gs4i_rigid_visit(gs4i_stokes *s, int l)
 static void gs4i_rigid_cycle(gs4i_stokes *s)
 {
     gs4i_stokes_system *y = &s->system;
-    gs4i_rigid *m = &y->rigid;
-    gs4i_rigid_level *g = &m->level[0];
-    memset(m->u, 0, (size_t)y->faces * sizeof *m->u);
-    memset(m->stress, 0, (size_t)y->rows * sizeof *m->stress);
+    gs4i_rigid_level *g = &y->rigid.level[0];
+    memset(y->z, 0, (size_t)y->faces * sizeof *y->z);
+    memset(y->stress, 0, (size_t)y->rows * sizeof *y->stress);
     gs4i_rigid_sweep_faces(s, 0);
-    if (m->levels) {
+    if (y->rigid.levels) {
+        gs4i_stokes_product D;
         gs4i_parallel_for(s->tasks, gs4i_rigid_node_tasks(g), gs4i_rigid_restrict_faces, s);
         memset(g->x, 0, (size_t)g->n * sizeof *g->x);
         gs4i_rigid_visit(s, 0);
-        if (m->levels > 1) gs4i_rigid_visit(s, 0);
+        if (y->rigid.levels > 1) gs4i_rigid_visit(s, 0);
         gs4i_parallel_for(s->tasks, gs4i_stokes_tasks(y->faces), gs4i_rigid_prolong_faces, s);
-        gs4i_parallel_for(s->tasks, gs4i_stokes_tasks(y->rows), gs4i_rigid_stress_task, s);
+        D.s = s;
+        D.in = y->z;
+        D.out = NULL;
+        D.affine = 0;
+        gs4i_parallel_for(s->tasks, gs4i_stokes_tasks(y->rows), gs4i_stokes_stress_task, &D);
     }
     gs4i_rigid_sweep_faces(s, 1);
 }
@@ -8217,7 +8195,6 @@ static void gs4i_schur_store_plane(int z, void *context)
 
 static void gs4i_schur_cycle(gs4i_stokes *s, const double *in, double *out, int adds)
 {
-    const gs4i_stokes_system *y = &s->system;
     gs4i_schur_task t;
     t.s = s;
     t.in = in;
@@ -8228,10 +8205,9 @@ static void gs4i_schur_cycle(gs4i_stokes *s, const double *in, double *out, int 
     gs4i_parallel_for(s->tasks, s->box->size[2], gs4i_schur_store_plane, &t);
     out[0] = 0;
     gs4i_stokes_take_means(&s->system, out);
-    (void)y;
 }
 
-/* t = Q^-1 B^T z at faces, of z in cells; and what V meets: r + B^T z. */
+/* t = Q^-1 B^T z at faces, of z in cells. */
 static void gs4i_schur_push_task(int index, void *context)
 {
     const gs4i_stokes_system *y = &((const gs4i_stokes *)context)->system;
@@ -8243,7 +8219,8 @@ static void gs4i_schur_push_task(int index, void *context)
                   * ((double)y->share[f] * (p[y->face_cells[f][0]] - p[y->face_cells[f][1]]));
 }
 
-static void gs4i_rigid_load_task(int index, void *context)
+/* What V meets: r + B^T z. */
+static void gs4i_stokes_push_task(int index, void *context)
 {
     const gs4i_stokes_system *y = &((const gs4i_stokes *)context)->system;
     const double *p = y->z + y->faces;
@@ -8251,19 +8228,8 @@ static void gs4i_rigid_load_task(int index, void *context)
     int32_t f;
     for (f = begin; f < end; f++) {
         const double push = (double)y->share[f] * (p[y->face_cells[f][0]] - p[y->face_cells[f][1]]);
-        if (y->rows > 1)
-            y->rigid.r[f] = (float)(y->r[f] + push);
-        else /* V is 1/M' */
-            y->z[f] = (double)y->inverse[f] * (y->r[f] + push);
+        y->q[f] = y->r[f] + push;
     }
-}
-
-static void gs4i_rigid_store_task(int index, void *context)
-{
-    const gs4i_stokes_system *y = &((const gs4i_stokes *)context)->system;
-    GS4I_STOKES_RANGE(index, y->faces, begin, end);
-    int32_t f;
-    for (f = begin; f < end; f++) y->z[f] = (double)y->rigid.u[f];
 }
 
 /* p of z = V q, in cells. */
@@ -8320,11 +8286,13 @@ static void gs4i_schur_apply(gs4i_stokes *s)
 static void gs4i_stokes_precondition(gs4i_stokes *s)
 {
     gs4i_stokes_system *y = &s->system;
+    int32_t f;
     gs4i_schur_apply(s);
-    gs4i_parallel_for(s->tasks, gs4i_stokes_tasks(y->faces), gs4i_rigid_load_task, s);
-    if (y->rows == 1) return;
-    gs4i_rigid_cycle(s);
-    gs4i_parallel_for(s->tasks, gs4i_stokes_tasks(y->faces), gs4i_rigid_store_task, s);
+    gs4i_parallel_for(s->tasks, gs4i_stokes_tasks(y->faces), gs4i_stokes_push_task, s);
+    if (y->rows > 1)
+        gs4i_rigid_cycle(s);
+    else
+        for (y->z[0] = 0, f = 1; f < y->faces; f++) y->z[f] = y->q[f] / (double)y->mass[f];
 }
 
 /* --- GMRES ------------------------------------------------------------------------------------ *

@@ -7217,7 +7217,7 @@ static void gs4i_stokes_apply(gs4i_stokes *s, const double *in, double *out, int
  * CYCLE. W among nodes: with V folded sheets take 45 iterations instead of 17. */
 
 #define GS4I_RIGID_STRONG 4e-4 /* K_fg^2 over K_ff K_gg above which faces join; */
-#define GS4I_RIGID_JOINED 1e-4 /* nodes, with traces of their 3 x 3 blocks for velocities */
+#define GS4I_RIGID_JOINED 1e-6 /* nodes, with traces of their 3 x 3 blocks for velocities */
 #define GS4I_RIGID_PIVOT 1e-6  /* of the diagonal: below is rounding of float */
 
 /* [e_d; r x e_d] of a face. */

@@ -10,7 +10,7 @@
          at[1] < gs4i_box_length(box, place, 1); at[1]++)                 \
         for (at[0] = 0; at[0] < gs4i_box_length(box, place, 0); at[0]++, i++)
 
-static const char *const stokes_names[] = { "blob", "rope",  "sheet",  "pool",
+static const char *const stokes_names[] = { "blob",   "rope",  "sheet",  "pool",
                                             "closed", "rooms", "porous", "spray" };
 enum {
     STOKES_CASES = 8
@@ -37,8 +37,8 @@ static double stokes_random(void)
 /* A folded sheet, three cells thick, on a floor: the distance to a wavy line. */
 static int stokes_in_sheet(double x, double y, double z, double n)
 {
-    const double fold = 0.25 * n * sin(6.28318530718 * 3 * y / n) + 0.5 * n;
-    const double slope = 0.25 * 6.28318530718 * 3 * cos(6.28318530718 * 3 * y / n);
+    const double fold = 0.25 * n * sin(6.28318530718 * 2 * y / n) + 0.5 * n;
+    const double slope = 0.25 * 6.28318530718 * 2 * cos(6.28318530718 * 2 * y / n);
     return y < 0.9 * n && z > 0.15 * n && z < 0.85 * n
            && fabs(x - fold) < 1.5 * sqrt(1 + slope * slope);
 }

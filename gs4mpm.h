@@ -6433,7 +6433,8 @@ typedef struct gs4i_rigid {
 /* See SCHUR COMPLEMENT. */
 typedef struct gs4i_schur {
     gs4i_solver solver;
-    int by_commutator, cycles; /* of both ways the second; cycles of the multigrid for one product */
+    int by_commutator; /* of both ways the second */
+    int cycles;        /* of the multigrid for one product */
     gs4_real *coefficient[3], *diagonal;
     uint8_t *kind;
     gs4i_scratch given;
@@ -7217,7 +7218,7 @@ static void gs4i_stokes_apply(gs4i_stokes *s, const double *in, double *out, int
  * CYCLE. W among nodes: with V folded sheets take 45 iterations instead of 17. */
 
 #define GS4I_RIGID_STRONG 4e-4 /* K_fg^2 over K_ff K_gg above which faces join; */
-#define GS4I_RIGID_JOINED 1e-6 /* nodes, with traces of their 3 x 3 blocks for velocities */
+#define GS4I_RIGID_JOINED 1e-4 /* nodes, with traces of their 3 x 3 blocks for velocities */
 #define GS4I_RIGID_PIVOT 1e-6  /* of the diagonal: below is rounding of float */
 
 /* [e_d; r x e_d] of a face. */
@@ -7253,8 +7254,7 @@ static void gs4i_rigid_move(double K[36], const double r[3], const double q[3])
     int k, i;
     for (k = 0; k < 3; k++) {
         const int b = (k + 1) % 3, c = (k + 2) % 3;
-        for (i = 0; i < 6; i++)
-            K[6 * (3 + k) + i] += q[b] * K[6 * c + i] - q[c] * K[6 * b + i];
+        for (i = 0; i < 6; i++) K[6 * (3 + k) + i] += q[b] * K[6 * c + i] - q[c] * K[6 * b + i];
     }
     for (k = 0; k < 3; k++) {
         const int b = (k + 1) % 3, c = (k + 2) % 3;
@@ -7406,7 +7406,8 @@ static int gs4i_rigid_join_nodes(gs4i_rigid *m, int l)
     for (a = 0; a < 3; a++) up[a] = (g->blocks[a] + 1) / 2;
     for (g->parent[0] = 0, i = 1; i < g->n; i++) {
         const int32_t own = g->start[i], *p = g->place[i];
-        const int stays = gs4i_rigid_trace(g->A[own], g->mass[i]) > gs4i_rigid_trace(g->mass[i], NULL);
+        const int stays =
+            gs4i_rigid_trace(g->A[own], g->mass[i]) > gs4i_rigid_trace(g->mass[i], NULL);
         g->parent[i] = stays ? i : 0;
         m->block[i] = ((p[2] >> 1) * up[1] + (p[1] >> 1)) * up[0] + (p[0] >> 1);
         any |= stays;
@@ -7581,8 +7582,7 @@ static void gs4i_rigid_add_faces(const gs4i_stokes_system *y, gs4i_rigid_sum *t)
             for (k = 0; k < 4; k++) {
                 const gs4i_link other = y->row_faces[row >> 1][k];
                 const int32_t j = m->parent[other >> 1];
-                const double half =
-                    0.5 * (double)((1 + (int)(row & 1)) * (1 + (int)(other & 1)));
+                const double half = 0.5 * (double)((1 + (int)(row & 1)) * (1 + (int)(other & 1)));
                 double *K = j ? gs4i_rigid_block(g, t, j) : NULL, W;
                 gs4i_rigid_face w;
                 if (!K) continue;
@@ -7702,8 +7702,8 @@ static int gs4i_rigid_factorize(gs4i_stokes *s)
     for (i = 1; i < g->n; i++)
         for (e = g->start[i]; e < g->start[i + 1]; e++)
             for (k = 0; k < 36; k++)
-                m->factor[(6 * (size_t)(i - 1) + (size_t)(k % 6)) * n
-                          + 6 * (size_t)(g->to[e] - 1) + (size_t)(k / 6)] = (double)g->A[e][k];
+                m->factor[(6 * (size_t)(i - 1) + (size_t)(k % 6)) * n + 6 * (size_t)(g->to[e] - 1)
+                          + (size_t)(k / 6)] = (double)g->A[e][k];
     gs4i_rigid_cholesky(m->factor, (int)n);
     return GS4_OK;
 }
@@ -7805,8 +7805,8 @@ static void gs4i_rigid_sweep_faces(gs4i_stokes *s, int backward)
     }
 }
 
-#define GS4I_RIGID_RANGE(index, g, begin, end)              \
-    const int32_t begin = 1 + (index)*GS4I_RIGID_CHUNK,     \
+#define GS4I_RIGID_RANGE(index, g, begin, end)          \
+    const int32_t begin = 1 + (index)*GS4I_RIGID_CHUNK, \
                   end = begin + GS4I_RIGID_CHUNK < (g)->n ? begin + GS4I_RIGID_CHUNK : (g)->n
 
 /* b of the first level: residuals of faces. */
@@ -7838,8 +7838,8 @@ static void gs4i_rigid_prolong_faces(int index, void *context)
         const double *x = m->level[0].x[m->parent[f]];
         const gs4i_rigid_face v = gs4i_rigid_of(m->arm[f]);
         if (!m->parent[f]) continue;
-        y->z[f] += v.value[0] * x[v.entry[0]]
-                   + (v.value[1] * x[v.entry[1]] + v.value[2] * x[v.entry[2]]);
+        y->z[f] +=
+            v.value[0] * x[v.entry[0]] + (v.value[1] * x[v.entry[1]] + v.value[2] * x[v.entry[2]]);
     }
 }
 
@@ -8028,16 +8028,14 @@ static void gs4i_rigid_cycle(gs4i_stokes *s)
  *     the commutator of Elman, Howle, Shadid, Shuttleworth & Tuminaro 2006: Q = diag A',
  *         S^-1 r = V B Q^-1 A' Q^-1 B^T V r
  *
- * The first does not mind the number of cells; it fails at jumps of mu, in narrow rooms, and is
- * slow on sticky floors. There the second is taken, which needs C' = 0, with two cycles each beyond
- * 64^3 cells. Closed pockets lose their means before and after V. Of what goes around periodic axes
+ * The first does not mind the number of cells, but jumps of mu and narrow rooms. There the second
+ * is taken, which needs C' = 0, with two cycles each beyond 64^3 cells. Closed pockets lose their means before and after V. Of what goes around periodic axes
  * the cycle knows nothing. */
 
 /* What the second way is for. */
 static int gs4i_schur_wants_commutator(const gs4i_stokes_system *y)
 {
     int32_t i;
-    int k;
     for (i = 1; i < y->cells; i++)
         if (y->compliance[i] > 0) return 0;
     if (y->pockets) return 1;
@@ -8048,9 +8046,6 @@ static int gs4i_schur_wants_commutator(const gs4i_stokes_system *y)
             || y->viscosity[c[1]] > 10 * y->viscosity[c[0]])
             return 1;
     }
-    for (i = 1; i < y->faces; i++)
-        for (k = 0; k < 6; k++)
-            if (y->face_rows[i][k] & 1) return 1;
     return 0;
 }
 
@@ -8083,8 +8078,7 @@ static void gs4i_schur_pose_plane(int z, void *context)
             if (share > 0 && share < GS4I_C(1e-6)) share = GS4I_C(1e-6);
             m->coefficient[c][gs4i_schur_entry(s, at, c)] =
                 !f ? 0
-                   : share * share
-                         * (m->by_commutator ? (gs4_real)y->inverse[f] : 1 / y->mass[f]);
+                   : share * share * (m->by_commutator ? (gs4_real)y->inverse[f] : 1 / y->mass[f]);
         }
     GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i) {
         const int32_t n = y->number[3][i];
@@ -8187,8 +8181,8 @@ static void gs4i_schur_store_plane(int z, void *context)
     GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i) {
         const int x = at[0] - s->first[0], y = at[1] - s->first[1], k = z - s->first[2];
         const int32_t n = s->system.number[3][i];
-        const double v = (double)m->level[0].z[(x + y + k) & 1]
-                                              [gs4i_row_of(&m->level[0], y, k) + (size_t)(x / 2)];
+        const double v = (double)m->level[0]
+                             .z[(x + y + k) & 1][gs4i_row_of(&m->level[0], y, k) + (size_t)(x / 2)];
         if (n) t->out[n] = t->adds ? t->out[n] + v : v;
     }
 }
@@ -25760,6 +25754,10 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_STOKES_LENGTH
 #undef GS4I_STOKES_PLANE
 #undef GS4I_STOKES_RANGE
+#undef GS4I_RIGID_STRONG
+#undef GS4I_RIGID_JOINED
+#undef GS4I_RIGID_PIVOT
+#undef GS4I_RIGID_RANGE
 #undef GS4I_STOKES_SPRAY
 #undef GS4I_STOKES_STIFFEST
 #undef GS4I_STRIP

@@ -49,8 +49,7 @@ static int stokes_in_rope(double x, double y, double z, double n)
     const double dx = x - 0.5 * n, dz = z - 0.5 * n, r = sqrt(dx * dx + dz * dz);
     const double turn = atan2(dz, dx) / 6.28318530718, pitch = 5;
     const double level = y - pitch * turn - pitch * floor((y - pitch * turn) / pitch) - 0.5 * pitch;
-    if (y < 0.4 * n)
-        return (r - 0.2 * n) * (r - 0.2 * n) + level * level < 4.2;
+    if (y < 0.4 * n) return (r - 0.2 * n) * (r - 0.2 * n) + level * level < 4.2;
     return pow(dx - 0.2 * n, 2) + dz * dz < 4.2 && y < 0.95 * n;
 }
 
@@ -80,11 +79,10 @@ static int stokes_kind_at(const char *name, int n, double x, double y, double z)
 /* mu of a cell: "stiff", "soft": ten spheres of 1e6 or 1e-6 times as much; "halves", "smooth". */
 static double stokes_contrast(const char *name, int n, double x, double y, double z)
 {
-    static const double centre[10][3] = {
-        { 0.5, 0.5, 0.5 }, { 0.3, 0.2, 0.3 }, { 0.7, 0.3, 0.2 }, { 0.2, 0.3, 0.8 },
-        { 0.8, 0.2, 0.7 }, { 0.4, 0.6, 0.3 }, { 0.6, 0.1, 0.5 }, { 0.1, 0.1, 0.5 },
-        { 0.3, 0.4, 0.6 }, { 0.7, 0.4, 0.6 }
-    };
+    static const double centre[10][3] = { { 0.5, 0.5, 0.5 }, { 0.3, 0.2, 0.3 }, { 0.7, 0.3, 0.2 },
+                                          { 0.2, 0.3, 0.8 }, { 0.8, 0.2, 0.7 }, { 0.4, 0.6, 0.3 },
+                                          { 0.6, 0.1, 0.5 }, { 0.1, 0.1, 0.5 }, { 0.3, 0.4, 0.6 },
+                                          { 0.7, 0.4, 0.6 } };
     int i;
     if (strcmp(name, "halves") == 0) return x < 0.5 * n ? 1 : 1e-6;
     if (strcmp(name, "smooth") == 0) return pow(10, -4 * x / n);
@@ -109,8 +107,8 @@ static void stokes_set_faces(stokes_case *k, int c)
     const double n = k->box.size[0];
     int at[3], z;
     size_t i;
-    for (z = 0; z < k->box.size[2] + (c == 2); z++)
-        STOK_PLANE(&k->box, 1 << c, z, at, i) {
+    for (z = 0; z < k->box.size[2] + (c == 2); z++) STOK_PLANE(&k->box, 1 << c, z, at, i)
+        {
             const int a = stokes_kind(k, at[0] - (c == 0), at[1] - (c == 1), at[2] - (c == 2)),
                       b = stokes_kind(k, at[0], at[1], at[2]);
             const int liquid = (a == GS4_CELL_LIQUID) + (b == GS4_CELL_LIQUID),
@@ -150,8 +148,8 @@ static stokes_case *stokes_make(const char *name, int n, double mu, const char *
     k->viscosity = (gs4_real *)stokes_alloc(k->cells, sizeof(gs4_real));
     k->p = (gs4_real *)stokes_alloc(k->cells, sizeof(gs4_real));
     k->e = (gs4_real *)stokes_alloc(k->cells, sizeof(gs4_real));
-    for (z = 0; z < n; z++)
-        STOK_PLANE(&k->box, GS4I_AT_CELL, z, at, i) {
+    for (z = 0; z < n; z++) STOK_PLANE(&k->box, GS4I_AT_CELL, z, at, i)
+        {
             const double x = at[0] + 0.5, y = at[1] + 0.5;
             k->kind[i] = (uint8_t)stokes_kind_at(name, n, x, y, z + 0.5);
             k->viscosity[i] = (gs4_real)(mu * stokes_contrast(contrast, n, x, y, z + 0.5));

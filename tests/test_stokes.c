@@ -1,16 +1,12 @@
 /* Velocity and pressure in one solve: against a dense solve from the definition, identities of the
  * strain, each wall alone, failures. Run all with run_stokes(). */
 
+#include "stokes_cases.h"
+
 enum {
     STOK_ROOM = 1024,
     STOK_DENSE = 640
 };
-
-/* All entries i, at at[], of a place in the plane z. */
-#define STOK_PLANE(box, place, z, at, i)                                  \
-    for (at[2] = (z), at[1] = 0, i = gs4i_box_index(box, place, 0, 0, z); \
-         at[1] < gs4i_box_length(box, place, 1); at[1]++)                 \
-        for (at[0] = 0; at[0] < gs4i_box_length(box, place, 0); at[0]++, i++)
 
 /* A random domain: cells, what its faces are, coefficients. */
 typedef struct stok_case {
@@ -514,6 +510,199 @@ static void test_stokes_failures(void)
     stok_free(m);
 }
 
+/* --- the preconditioner ----------------------------------------------------------------------- */
+
+static double stok_dot(const double *a, const double *b, int n)
+{
+    double sum = 0;
+    int i;
+    for (i = 1; i < n; i++) sum += a[i] * b[i];
+    return sum;
+}
+
+/* What the multigrid makes of r. */
+static void stok_cycle(gs4i_stokes *s, const double *r, double *out)
+{
+    const size_t bytes = (size_t)s->system.faces * sizeof(double);
+    memcpy(s->system.q, r, bytes);
+    gs4i_rigid_cycle(s);
+    memcpy(out, s->system.z, bytes);
+}
+
+/* The multigrid of velocities is symmetric and positive on any domain. Its blocks are float, each
+ * summed in its own order. */
+static void test_stokes_cycle_symmetry(void)
+{
+    int q;
+    for (q = 0; q < 8; q++) {
+        stok_case *k = stok_make(8, (uint64_t)q + 31, q & 1 ? 1e6 : 10, q >> 1 & 1);
+        const gs4i_stokes_system *y = &k->s.system;
+        double *v[4];
+        int i, j;
+        for (i = 0; i < STOK_ROOM && q >= 4; i++) k->viscosity[i] *= 1000;
+        CHECK_RESULT(NULL, gs4i_stokes_setup(&k->s), GS4_OK);
+        CHECK(y->rigid.levels > 1);
+        for (i = 0; i < 4; i++) {
+            v[i] = (double *)calloc((size_t)y->faces, sizeof *v[i]);
+            for (j = 1; j < y->faces && i < 2; j++) v[i][j] = stok_random(k) - 0.5;
+        }
+        for (i = 0; i < 2; i++) stok_cycle(&k->s, v[i], v[2 + i]);
+        for (i = 0; i < 2; i++) CHECK(stok_dot(v[i], v[2 + i], y->faces) > 0);
+        CHECK_CLOSE((stok_dot(v[0], v[3], y->faces) - stok_dot(v[1], v[2], y->faces))
+                        / stok_dot(v[0], v[2], y->faces),
+                    0, 1e-6);
+        for (i = 0; i < 4; i++) free(v[i]);
+        stok_free(k);
+    }
+}
+
+/* Nodes of every level give faces any rigid motion of a free body exactly; on every level the strain
+ * of it is 0, so that only its mass is left. */
+static void test_stokes_rigid_nodes(void)
+{
+    static const double v[3] = { 0.5, -0.25, 0.125 }, w[3] = { 1, -2, 0.5 };
+    stok_case *k = stok_make(9, 5, 1, 0);
+    gs4i_rigid *m = &k->s.system.rigid;
+    int32_t i;
+    int c, at[3], z, l, a, count = 0;
+    size_t entry;
+    stok_block(k, 0, GS4I_STOKES_ODD);
+    for (entry = 0; entry < STOK_ROOM; entry++) k->viscosity[entry] = 64;
+    stok_set_motion(k, v, w);
+    CHECK_RESULT(NULL, gs4i_stokes_setup(&k->s), GS4_OK);
+    CHECK(m->levels >= 2);
+    for (l = 0; l < m->levels; l++) {
+        const gs4i_rigid_level *g = &m->level[l];
+        double most = 0;
+        for (i = 1; i < g->n; i++)
+            for (a = 0; a < 3; a++) {
+                const double b = 2 << l;
+                const int d = (a + 1) % 3, e = (a + 2) % 3;
+                g->x[i][a] =
+                    v[a]
+                    + 0.5 * b * (w[d] * (g->place[i][e] + 0.5) - w[e] * (g->place[i][d] + 0.5));
+                g->x[i][3 + a] = 0.5 * w[a]; /* cells of 0.5 m */
+            }
+        for (i = 1; i < g->n; i++) {
+            double r[6];
+            memset(g->b[i], 0, sizeof g->b[i]);
+            gs4i_rigid_node_residual(g, i, r);
+            for (a = 0; a < 36; a++) r[a % 6] += (double)g->mass[i][a] * g->x[i][a / 6];
+            for (a = 0; a < 6; a++)
+                most = fmax(most, fabs(r[a]) / (double)g->A[g->start[i]][7 * a]);
+        }
+        CHECK_BETWEEN(most, 0, 1e-5); /* of what single terms are */
+    }
+    memset(k->s.system.z, 0, (size_t)k->s.system.faces * sizeof(double));
+    for (l = m->levels - 1; l > 0; l--) {
+        gs4i_rigid_task t;
+        t.s = &k->s;
+        t.level = l;
+        t.colour = t.backward = 0;
+        memset(m->level[l - 1].x, 0, (size_t)m->level[l - 1].n * sizeof *m->level[l - 1].x);
+        for (a = 0; a < gs4i_rigid_node_tasks(&m->level[l - 1]); a++)
+            gs4i_rigid_prolong_nodes(a, &t);
+    }
+    for (a = 0; a < gs4i_stokes_tasks(k->s.system.faces); a++) gs4i_rigid_prolong_faces(a, &k->s);
+    for (c = 0; c < 3; c++)
+        for (z = 0; z < k->box.size[2] + (c == 2); z++) STOK_PLANE(&k->box, 1 << c, z, at, entry)
+            {
+                const int32_t f = k->s.system.number[c][entry];
+                if (!f) continue;
+                CHECK(m->parent[f] > 0);
+                CHECK_CLOSE(k->s.system.z[f], (double)k->u[c][entry], 1e-12);
+                count++;
+            }
+    CHECK(count > 1000);
+    stok_free(k);
+}
+
+/* Iterations to 1e-6: at 32 cells at most a fifth more than a prototype took on such domains; where
+ * it did not look, or took more, a fifth more than measured. Less than a third of that would not be
+ * this problem. */
+typedef struct stok_count {
+    const char *name, *contrast;
+    int n, most[4]; /* mu s/(rho h^2) of 1, 1e2, 1e4, 1e7; 0: not tried */
+} stok_count;
+
+static void test_stokes_iterations(void)
+{
+    static const double mu[4] = { 1, 1e2, 1e4, 1e7 };
+    static const stok_count counts[] = {
+        { "blob", "", 16, { 12, 13, 13, 13 } },     { "pool", "", 16, { 15, 20, 23, 28 } },
+        { "closed", "", 16, { 11, 22, 24, 24 } },   { "rope", "", 24, { 13, 23, 0, 0 } },
+        { "sheet", "", 24, { 14, 19, 0, 0 } },      { "spray", "", 16, { 10, 10, 12, 15 } },
+        { "blob", "", 32, { 12, 13, 14, 14 } },     { "pool", "", 32, { 15, 21, 22, 22 } },
+        { "closed", "", 32, { 11, 22, 24, 24 } },   { "rooms", "", 32, { 14, 24, 24, 24 } },
+        { "porous", "", 32, { 19, 16, 24, 27 } },   { "blob", "stiff", 32, { 18, 24, 27, 27 } },
+        { "blob", "soft", 32, { 18, 24, 26, 27 } }, { "blob", "halves", 32, { 16, 24, 25, 27 } }
+    };
+    size_t i;
+    int q;
+    for (i = 0; i < (test_full ? sizeof counts / sizeof counts[0] : 6); i++)
+        for (q = 0; q < 4; q++) {
+            const stok_count *t = &counts[i];
+            stokes_case *k = stokes_make(t->name, t->n, mu[q], t->contrast);
+            if (t->most[q]) {
+                CHECK_RESULT(NULL, gs4i_stokes_solve(&k->s), GS4_OK);
+                if (test_filter[0])
+                    printf("%s %s, %d cells, mu %g: %d iterations\n", t->name, t->contrast, t->n,
+                           mu[q], k->s.iterations);
+                CHECK_BETWEEN(k->s.iterations, t->most[q] / 3, t->most[q]);
+                CHECK_BETWEEN(k->s.residual, 0, 1e-6);
+            }
+            CHECK(stokes_free(k) == 0);
+        }
+}
+
+/* The same bits for any number of threads; memory that is refused anywhere is an error, and none is
+ * lost. */
+static void test_stokes_bits(void)
+{
+    int n, a;
+    for (n = 0; n < 4; n++) {
+        stokes_case *one = stokes_make(stokes_names[2 * n], 16, 1e4, n & 1 ? "soft" : "");
+        const size_t bytes = one->cells * sizeof(gs4_real);
+        CHECK_RESULT(NULL, gs4i_stokes_solve(&one->s), GS4_OK);
+        for (a = 2; a < 4; a++) {
+            stokes_case *more = stokes_make(stokes_names[2 * n], 16, 1e4, n & 1 ? "soft" : "");
+#ifdef GS4_PTHREADS
+            more->tasks.pool = gs4i_pool_create(&more->memory, a - 1);
+#endif
+            more->s.threads = a;
+            CHECK_RESULT(NULL, gs4i_stokes_solve(&more->s), GS4_OK);
+            CHECK(memcmp(one->p, more->p, bytes) == 0);
+            CHECK(memcmp(one->u[0], more->u[0], bytes) == 0);
+#ifdef GS4_PTHREADS
+            gs4i_pool_destroy(&more->memory, more->tasks.pool, a - 1);
+#endif
+            CHECK(stokes_free(more) == 0);
+        }
+        CHECK(stokes_free(one) == 0);
+    }
+}
+
+static int stok_left;
+
+static void *stok_alloc(size_t bytes, size_t alignment, void *user)
+{
+    return stok_left-- > 0 ? gs4i_default_alloc(bytes, alignment, user) : NULL;
+}
+
+static void test_stokes_memory(void)
+{
+    int refused = 0, result;
+    do {
+        stokes_case *k = stokes_make("pool", 12, 1e3, "soft");
+        k->memory.hook.alloc_fn = stok_alloc;
+        stok_left = refused++;
+        result = gs4i_stokes_solve(&k->s);
+        CHECK(result == GS4_OK || result == GS4_ERROR_MEMORY);
+        CHECK(stokes_free(k) == 0);
+    } while (result != GS4_OK && refused < 100);
+    CHECK_BETWEEN(refused, 12, 60);
+}
+
 static void run_stokes(void)
 {
     RUN(test_stokes_agrees_with_dense);
@@ -521,4 +710,9 @@ static void run_stokes(void)
     RUN(test_stokes_rigid);
     RUN(test_stokes_walls);
     RUN(test_stokes_failures);
+    RUN(test_stokes_cycle_symmetry);
+    RUN(test_stokes_rigid_nodes);
+    RUN_ONCE(test_stokes_iterations);
+    RUN_ONCE(test_stokes_bits);
+    RUN(test_stokes_memory);
 }

@@ -6524,12 +6524,12 @@ static int gs4i_stokes_entry(const gs4i_stokes *s, int place, const int at[3], i
 /* All entries i, at at[], of a place in the plane z that are solved for. */
 #define GS4I_STOKES_LENGTH(s, place, a) \
     ((s)->end[a] + (!(s)->box->periodic[a] && ((place) >> (a)&1)))
-#define GS4I_STOKES_PLANE(s, place, z, at, i)                                             \
-    for (at[2] = (z), at[1] = (z) < GS4I_STOKES_LENGTH(s, place, 2)                       \
-                                  ? (s)->first[1]                                         \
-                                  : GS4I_STOKES_LENGTH(s, place, 1);                      \
-         at[1] < GS4I_STOKES_LENGTH(s, place, 1); at[1]++)                                \
-        for (at[0] = (s)->first[0], i = gs4i_box_index((s)->box, place, at[0], at[1], z); \
+#define GS4I_STOKES_PLANE(s, place, z, at, i)                                               \
+    for (at[2] = (z), at[1] = (z) >= (s)->first[2] && (z) < GS4I_STOKES_LENGTH(s, place, 2) \
+                                  ? (s)->first[1]                                           \
+                                  : GS4I_STOKES_LENGTH(s, place, 1);                        \
+         at[1] < GS4I_STOKES_LENGTH(s, place, 1); at[1]++)                                  \
+        for (at[0] = (s)->first[0], i = gs4i_box_index((s)->box, place, at[0], at[1], z);   \
              at[0] < GS4I_STOKES_LENGTH(s, place, 0); at[0]++, i++)
 
 /* The row of an edge: its faces in the order of the picture, and what they are multiplied by. */

@@ -8029,8 +8029,8 @@ static void gs4i_rigid_cycle(gs4i_stokes *s)
  *         S^-1 r = V B Q^-1 A' Q^-1 B^T V r
  *
  * The first does not mind the number of cells, but jumps of mu and narrow rooms. There the second
- * is taken, which needs C' = 0, with two cycles each beyond 64^3 cells. Closed pockets lose their means before and after V. Of what goes around periodic axes
- * the cycle knows nothing. */
+ * is taken, which needs C' = 0, with two cycles each beyond 64^3 cells. Closed pockets lose their
+ * means before and after V. Of what goes around periodic axes the cycle knows nothing. */
 
 /* What the second way is for. */
 static int gs4i_schur_wants_commutator(const gs4i_stokes_system *y)

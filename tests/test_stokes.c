@@ -556,8 +556,8 @@ static void test_stokes_cycle_symmetry(void)
     }
 }
 
-/* Nodes of every level give faces any rigid motion of a free body exactly; on every level the strain
- * of it is 0, so that only its mass is left. */
+/* Nodes of every level give faces any rigid motion of a free body exactly; on every level the
+ * strain of it is 0, so that only its mass is left. */
 static void test_stokes_rigid_nodes(void)
 {
     static const double v[3] = { 0.5, -0.25, 0.125 }, w[3] = { 1, -2, 0.5 };

@@ -707,6 +707,8 @@ static void test_heat_bounds(void)
 {
     static const double diffusivities[6] = { 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3 },
                         numbers[6] = { 0.05, 0.2, 5, 0.5, 2, 0.02 };
+    /* partitioned every fifth, but with each side, diffusivity, number, flip and integrator */
+    const int some = physics_scheme == GS4_PARTITIONED && !test_slow;
     double most = 0;
     int c, i;
     for (c = 0; c < (test_full ? 72 : 12); c++) {
@@ -728,6 +730,7 @@ static void test_heat_bounds(void)
                            0 };
         double end, worst = 0;
         gs4_sim *sim;
+        if (some && (c + c / 6) % 5 != 3) continue;
         b.wall[side & 1] = 1000;
         b.rho_inf = c % 5 == 1 && c % 7 != 3;
         if (c % 8 == 4) b.wall[0] = b.wall[1] = 1000;

@@ -99,7 +99,10 @@ static void test_partitioned_periodic_flows(void)
             coarse = periodic_amplitude(&k, 0.1, &mean);
             CHECK_CLOSE(mean, 1, 1e-5);
             k.n = 32;
-            fine = test_full && a == 0 ? periodic_amplitude(&k, 0.1, &mean) : 1;
+            /* of the two axes b one; both in turn */
+            fine = test_full && a == 0 && (n & 1) == ((n >> 1 ^ n >> 2 ^ n >> 3) & 1)
+                       ? periodic_amplitude(&k, 0.1, &mean)
+                       : 1;
             order = log2(fabs(coarse - 1) / fabs(fine - 1));
             if (test_filter[0])
                 printf("    axes %d %d, %s, %s, %s: %.4f %.4f, order %.2f\n", k.a, k.b,

@@ -372,9 +372,9 @@ static void test_volume_after_flow(void)
     volume_case of = kicks;
     int k;
     volume_after(physics_integrators[0], kicks);
-    for (k = 0; k < 2; k++) volume_after(physics_integrators[k], fall);
+    volume_after(physics_integrators[0], fall);
     if (!test_slow) return;
-    volume_after(physics_integrators[1], kicks);
+    for (k = 0; k < 2; k++) volume_after(physics_integrators[1], k ? fall : kicks);
     of.wall = GS4_WALL_STICK;
     for (k = 0; k < 2; k++) volume_after(physics_integrators[k], of);
     of = kicks;

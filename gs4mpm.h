@@ -16631,7 +16631,7 @@ static void gs4i_gather_euler(int index, void *context)
 }
 
 /* Stress and weight are in the momentum already. */
-static int gs4i_accelerate_nothing(gs4_sim *sim, gs4i_node_pass *nodes)
+static int gs4i_accelerate_euler(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     if (sim->integrator.unpacking > 0) gs4i_fill_mirror_masses(&sim->boundary, &sim->grid);
     (void)nodes;
@@ -19868,9 +19868,8 @@ static const gs4i_scheme *gs4i_scheme_of(const gs4_sim *sim)
                                      gs4i_set_velocities,         gs4i_accelerate_explicitly,
                                      gs4i_stable_explicit_dt };
     static const gs4i_scheme euler = {
-        gs4i_scatter_affinely, gs4i_gather_euler,   NULL,
-        gs4i_clear_all_nodes,  gs4i_set_velocities, gs4i_accelerate_nothing,
-        gs4i_stable_euler_dt
+        gs4i_scatter_affinely, gs4i_gather_euler,   NULL, gs4i_clear_all_nodes, gs4i_set_velocities,
+        gs4i_accelerate_euler, gs4i_stable_euler_dt
     };
     static const gs4i_scheme partitioned = {
         gs4i_scatter_to_faces,     gs4i_correct_from_faces, gs4i_remember_faces,

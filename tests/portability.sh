@@ -251,23 +251,28 @@ layout() {
 
 # ==== the same bits ============================================================================================
 
-# det BUILD ARGUMENTS [RUNNER]: builds tests/determinism.c, or what else $hashed is, if that build is not there yet, and runs it
-hashed=determinism
+# det BUILD ARGUMENTS: builds tests/determinism.c if that build is not there yet, and runs it. All groups share that of the reference.
 det() {
-    program=./det$(echo "$1 $real" | cksum | tr ' ' _)$suffix
-    [ -x "$tmp/$program" ] || $1 $real -I. tests/$hashed.c -o "$tmp/$program" -lm || return 1
-    (cd "$tmp" && ${3:-} "$program" $scene steps=$steps ${2:-})
+    program=$tmp/det$(echo "$1 $real" | cksum | tr ' ' _)
+    [ "$1" = "$threaded" ] && program=${GS4_SHARED:-$tmp}/reference$real
+    built_once "$program" $1 $real -I. tests/determinism.c && (cd "$tmp" && "$program" $scene steps=$steps ${2:-})
 }
 
-# same NAME BUILD ARGUMENTS [RUNNER]: prints what the reference printed
-same() { check "$1 $scene $real" prints_same "$2" "$3" "${4:-}"; }
+# built_once PROGRAM BUILD...: unless it is there; a group that wants it meanwhile waits
+built_once() (
+    [ -z "${GS4_SHARED:-}" ] || { exec 9> "$1.lock"; flock 9; }
+    [ -x "$1" ] || { program=$1; shift; "$@" -o "$program" -lm; }
+)
+
+# same NAME BUILD ARGUMENTS: prints what the reference printed
+same() { check "$1 $scene $real" prints_same "$2" "$3"; }
 prints_same() { det "$@" > "$tmp/det.out" && tr -d '\r' < "$tmp/det.out" | diff "$tmp/reference" -; }
 
 # reference REAL STEPS: what this compiler gives, to compare all others with
 scene=''
 threaded="$CC -O2 -DGS4_PTHREADS -pthread"
 reference() {
-    real=$1 steps=$2 suffix=''
+    real=$1 steps=$2
     det "$threaded" > "$tmp/reference"
 }
 
@@ -415,21 +420,26 @@ tsan() {
 
 # ==== other compilers and machines =============================================================================
 
-# few_of_main BUILD RUNNER: some of the tests; a part of which no test is run is a failure
+# few_of_main RUNNER: some of the tests; a part of which no test is run is a failure
 few_of_main() {
-    $1 -I. tests/main.c -o "$tmp/main$suffix" -lm || return 1
     for t in $few_tests; do
-        (cd "$tmp" && $2 "./main$suffix" "$t") > "$tmp/main.out" 2>&1 && grep '^[1-9][0-9]* passed' "$tmp/main.out" || { cat "$tmp/main.out"; return 1; }
+        (cd "$tmp" && $1 "./main$suffix" "$t") > "$tmp/main.out" 2>&1 && grep '^[1-9][0-9]* passed' "$tmp/main.out" || { cat "$tmp/main.out"; return 1; }
     done
 }
 
-# machine BUILD WARNINGS STEPS [RUNNER SUFFIX]: strict, the hashes of this machine, some tests, in both precisions
+# main_prints STEPS RUNNER: what the reference printed, also when it goes on from a checkpoint
+main_prints() {
+    (cd "$tmp" && $2 "./main$suffix" few steps=$1 checkpoint=checkpoint) > "$tmp/main.out" && tr -d '\r' < "$tmp/main.out" | diff "$tmp/reference" -
+}
+
+# machine BUILD WARNINGS STEPS [RUNNER SUFFIX]: strict; the hashes of this machine and some tests, in one program; in both precisions
 machine() {
     for precision in ${precisions:-'' -DGS4_DOUBLE}; do
         reference "$precision" "$3"; suffix=${5:-}
         check "strict $precision" $1 -std=c99 $2 $precision -I. -c "$tmp/implementation.c" -o "$tmp/strict.o"
-        same "hashes" "$1 -O2" checkpoint=checkpoint "${4:-}"
-        check "some tests $precision" few_of_main "$1 -O2 $precision" "${4:-}"
+        check "tests/main.c $precision" $1 ${level:--O2} -w $precision -DGS4_FEW -DGS4_FEW_HASHES -I. tests/main.c -o "$tmp/main$suffix" -lm || continue
+        check "hashes $precision" main_prints "$3" "${4:-}"
+        check "some tests $precision" few_of_main "${4:-}"
     done
 }
 
@@ -439,7 +449,7 @@ tiny() {
     check "compiles in float" tcc -Wall -Werror -I. -c "$tmp/implementation.c" -o "$tmp/strict.o"
     precisions=-DGS4_DOUBLE; machine tcc "-Wall -Werror" 100
 }
-musl() { have musl-gcc && machine "musl-gcc -static" "$strict_c" 100; }
+musl() { level=-O1; have musl-gcc && machine "musl-gcc -static" "$strict_c" 100; }
 i386() {
     echo 'int main(void) { return 0; }' | gcc -m32 -x c - -o "$tmp/m32" -lm 2> /dev/null || { skip "needs gcc-multilib"; return; }
     machine "gcc -m32 -msse2 -mfpmath=sse" "$strict_c" 100
@@ -462,11 +472,12 @@ wined() {
 }
 windows() {
     have x86_64-w64-mingw32-gcc || return
+    level=-O1
     check "threads" x86_64-w64-mingw32-gcc -std=c99 $strict_c -DGS4_PTHREADS -I. -c "$tmp/implementation.c" -o "$tmp/strict.o"
-    check "compiles" x86_64-w64-mingw32-gcc -O2 -I. tests/determinism.c -o "$tmp/det.exe" -lm
+    check "links" x86_64-w64-mingw32-gcc -static -pthread -I. "$tmp/user.c" "$tmp/strict.o" -o "$tmp/linked.exe" -lm
     have wine || return
     WINEPREFIX=$tmp/wine WINEDEBUG=-all; export WINEPREFIX WINEDEBUG
-    wine "$tmp/det.exe" steps=1 > /dev/null 2>&1                       # its first run sets it up
+    wine "$tmp/linked.exe" > /dev/null 2>&1                            # its first run sets it up
     machine "x86_64-w64-mingw32-gcc -static" "$strict_c" 100 wined .exe
     wineserver -w                                                      # until it has written its last
     [ ! -s "$tmp/wined.log" ] || cat "$tmp/wined.log"
@@ -586,6 +597,8 @@ if [ "${1:-}" = --group ]; then                     # one group in this process
     exit
 fi
 
+# shared by groups where there is a lock
+command -v flock > /dev/null 2>&1 && GS4_SHARED=$tmp && export GS4_SHARED
 case "${1:-full}" in quick) groups=$quick ;; full) groups=$full ;; *) groups=$* ;; esac
 echo $groups | tr ' ' '\n' | xargs -P "${JOBS:-2}" -I{} sh -c 'sh tests/portability.sh --group "$1" > "$2/$1.log" 2>&1 < /dev/null; cat "$2/$1.log" | sed "$ s/^/$1: /"' sh {} "$tmp"
 for group in $groups; do

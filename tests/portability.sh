@@ -276,10 +276,10 @@ reference() {
     det "$threaded" > "$tmp/reference"
 }
 
+# Numbers of threads, tasks in another order, from a checkpoint
+ways='threads=1 threads=2 threads=3 threads=8 shuffle=1 checkpoint=checkpoint'
 threads_and_checkpoint() {
-    for n in 1 2 3 8; do same "$n threads" "$threaded" threads=$n; done
-    same "tasks in another order" "$threaded" shuffle=1
-    same "from a checkpoint" "$threaded" checkpoint=checkpoint
+    for how in $ways; do same "$how" "$threaded" $how; done
 }
 
 # The program of tests/main.c with -DGS4_FEW; run.sh has it already
@@ -289,7 +289,7 @@ few_hashes() {
     few=${GS4_FEW:-$tmp/few}
     [ -x "$few" ] || check "few.c" $CC -O0 -w -DGS4_FEW -DGS4_PTHREADS -pthread -I. tests/main.c -o "$few" -lm
     few_prints > "$tmp/reference"
-    for how in threads=1 threads=2 threads=3 threads=8 shuffle=1 checkpoint=checkpoint; do check "$how" few_same $how; done
+    for how in $ways; do check "$how" few_same $how; done
     check "a few scenes of the fuzzer" sh -c 'cd "$1" && "$2" few fuzz 1 5' few "$tmp" "$few"
 }
 

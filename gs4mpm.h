@@ -286,8 +286,8 @@
  * spheres of 8 cells decay within 5 %. In steps of 100 times the explicit limit Poiseuille flow is
  * within 0.5 % at 8 cells. Viscous heating is that of u~. The solve to 1e-6 takes 8 to 20
  * iterations (viscous_iterations) for any s mu/(rho h^2) in compact bodies, pools and rooms; up to
- * 60 in folded sheets, 90 in pools with inclusions 1e6 times stiffer (bench/stokes.c). A step that
- * does not converge is refused.
+ * 36 in ropes, 60 in folded sheets, 90 in pools with inclusions 1e6 times stiffer (bench/stokes.c).
+ * A step that does not converge is refused.
  *
  * Symplectic Euler, the fast tier: one affine scatter with stress and one gather (MLS-MPM, APIC),
  * first order.
@@ -6905,6 +6905,14 @@ static int32_t gs4i_stokes_root(int32_t *pocket, int32_t a)
     return a;
 }
 
+/* The parts of a and b are one: the lower root is that of both. */
+static void gs4i_stokes_unite(int32_t *root, int32_t a, int32_t b)
+{
+    a = gs4i_stokes_root(root, a);
+    b = gs4i_stokes_root(root, b);
+    root[a > b ? a : b] = a > b ? b : a;
+}
+
 /* Parts of the liquid that no unknown face joins to air, and that do not compress: p is unique
  * there but for its mean, and the mean of e' must vanish. The air is cell 0. */
 static void gs4i_stokes_find_pockets(gs4i_stokes *s)
@@ -6914,11 +6922,7 @@ static void gs4i_stokes_find_pockets(gs4i_stokes *s)
     y->pockets = 0;
     for (c = 0; c < y->cells; c++) pocket[c] = y->compliance[c] > 0 ? 0 : c;
     for (f = 1; f < y->faces; f++)
-        if (y->share[f] > 0) {
-            const int32_t a = gs4i_stokes_root(pocket, y->face_cells[f][0]),
-                          b = gs4i_stokes_root(pocket, y->face_cells[f][1]);
-            pocket[a > b ? a : b] = a > b ? b : a;
-        }
+        if (y->share[f] > 0) gs4i_stokes_unite(pocket, y->face_cells[f][0], y->face_cells[f][1]);
     for (c = 1; c < y->cells; c++) pocket[c] = gs4i_stokes_root(pocket, c);
     /* a root is before all that it holds; numbers are negative for a while */
     for (c = 1; c < y->cells; c++)
@@ -7153,6 +7157,12 @@ GS4I_INLINE double gs4i_stokes_force(const gs4i_stokes_system *y, int32_t f)
               + (gs4i_linked(y->stress, k[4]) - gs4i_linked(y->stress, k[5])));
 }
 
+/* B^T p at a face, p of cells. */
+GS4I_INLINE double gs4i_stokes_push(const gs4i_stokes_system *y, const double *p, int32_t f)
+{
+    return (double)y->share[f] * (p[y->face_cells[f][0]] - p[y->face_cells[f][1]]);
+}
+
 /* Faces: M' u + D^T stress - B^T p; cells: B u + C' p. */
 static void gs4i_stokes_face_task(int index, void *context)
 {
@@ -7162,9 +7172,8 @@ static void gs4i_stokes_face_task(int index, void *context)
     GS4I_STOKES_RANGE(index, y->faces, begin, end);
     int32_t f;
     for (f = begin; f < end; f++) {
-        const double force = gs4i_stokes_force(y, f);
-        const double push = (double)y->share[f] * (p[y->face_cells[f][0]] - p[y->face_cells[f][1]]);
-        const double sum = (double)y->mass[f] * t->in[f] + force - push;
+        const double sum =
+            (double)y->mass[f] * t->in[f] + gs4i_stokes_force(y, f) - gs4i_stokes_push(y, p, f);
         t->out[f] = t->affine ? y->b[f] - sum : sum;
     }
 }
@@ -7217,7 +7226,7 @@ static void gs4i_stokes_apply(gs4i_stokes *s, const double *in, double *out, int
  * u, and a face changes its six rows as it moves. Nodes: one forward, one backward, by blocks of
  * six; motions that a node does not have (a face has but one) have no pivot there.
  *
- * CYCLE. W among nodes: with V folded sheets take 45 iterations instead of 17. */
+ * CYCLE. W among nodes: thin folded sheets need it. */
 
 #define GS4I_RIGID_STRONG 4e-4 /* K_fg^2 over K_ff K_gg above which faces join; */
 #define GS4I_RIGID_JOINED 1e-4 /* nodes, with traces of their 3 x 3 blocks for velocities */
@@ -7362,13 +7371,6 @@ static void gs4i_rigid_place_plane(int z, void *context)
         }
 }
 
-static void gs4i_rigid_join(int32_t *root, int32_t a, int32_t b)
-{
-    a = gs4i_stokes_root(root, a);
-    b = gs4i_stokes_root(root, b);
-    root[a > b ? a : b] = a > b ? b : a;
-}
-
 static void gs4i_rigid_join_faces(const gs4i_stokes_system *y)
 {
     const gs4i_rigid *m = &y->rigid;
@@ -7387,7 +7389,7 @@ static void gs4i_rigid_join_faces(const gs4i_stokes_system *y)
                 if (!m->parent[g] || m->block[f] != m->block[g]) continue;
                 K *= (double)y->weight[r];
                 if (K * K > GS4I_RIGID_STRONG * stiffness[j] * stiffness[k])
-                    gs4i_rigid_join(m->parent, f, g);
+                    gs4i_stokes_unite(m->parent, f, g);
             }
         }
 }
@@ -7421,7 +7423,7 @@ static int gs4i_rigid_join_nodes(gs4i_rigid *m, int l)
             if (j > i || !g->parent[j] || m->block[i] != m->block[j]) continue;
             if (K * K > GS4I_RIGID_JOINED * gs4i_rigid_trace(g->A[g->start[i]], g->mass[i])
                             * gs4i_rigid_trace(g->A[g->start[j]], g->mass[j]))
-                gs4i_rigid_join(g->parent, i, j);
+                gs4i_stokes_unite(g->parent, i, j);
         }
     return any;
 }
@@ -7578,7 +7580,7 @@ static void gs4i_rigid_add_faces(const gs4i_stokes_system *y, gs4i_rigid_sum *t)
         const gs4i_rigid_face v = gs4i_rigid_of(m->arm[f]);
         for (a = 0; a < 9; a++)
             t->mass[6 * v.entry[a / 3] + v.entry[a % 3]] +=
-                (double)y->mass[f] * (double)(v.value[a / 3] * v.value[a % 3]);
+                (double)y->mass[f] * (v.value[a / 3] * v.value[a % 3]);
         for (q = 0; q < 6; q++) {
             const gs4i_link row = y->face_rows[f][q];
             for (k = 0; k < 4; k++) {
@@ -7592,7 +7594,7 @@ static void gs4i_rigid_add_faces(const gs4i_stokes_system *y, gs4i_rigid_sum *t)
                 W = ((q + k) & 1 ? -half : half) * (double)y->weight[row >> 1];
                 for (b = 0; b < 3; b++)
                     for (a = 0; a < 3; a++)
-                        K[6 * w.entry[b] + v.entry[a]] += W * (double)(v.value[a] * w.value[b]);
+                        K[6 * w.entry[b] + v.entry[a]] += W * (v.value[a] * w.value[b]);
             }
         }
     }
@@ -7628,17 +7630,26 @@ typedef struct gs4i_rigid_task {
     int level, colour, backward;
 } gs4i_rigid_task;
 
+#define GS4I_RIGID_RANGE(index, g, begin, end)          \
+    const int32_t begin = 1 + (index)*GS4I_RIGID_CHUNK, \
+                  end = begin + GS4I_RIGID_CHUNK < (g)->n ? begin + GS4I_RIGID_CHUNK : (g)->n
+
+static int gs4i_rigid_tasks(int32_t count)
+{
+    return (count + GS4I_RIGID_CHUNK - 1) / GS4I_RIGID_CHUNK;
+}
+
 static void gs4i_rigid_fill_task(int index, void *context)
 {
     const gs4i_rigid_task *task = (const gs4i_rigid_task *)context;
     const gs4i_stokes_system *y = &task->s->system;
     const int l = task->level;
     const gs4i_rigid_level *g = &y->rigid.level[l];
-    int32_t i = 1 + index * GS4I_RIGID_CHUNK, b;
-    const int32_t end = i + GS4I_RIGID_CHUNK < g->n ? i + GS4I_RIGID_CHUNK : g->n;
+    GS4I_RIGID_RANGE(index, g, begin, end);
     gs4i_rigid_sum t;
+    int32_t i, b;
     int k;
-    for (; i < end; i++)
+    for (i = begin; i < end; i++)
         for (t.begin = g->start[i]; t.begin < g->start[i + 1]; t.begin += t.count) {
             t.node = i;
             t.last = g->start[i];
@@ -7680,8 +7691,7 @@ static int gs4i_rigid_build_level(gs4i_stokes *s, int l, int32_t *root, int32_t 
     t.s = s;
     t.level = l;
     t.colour = t.backward = 0;
-    gs4i_parallel_for(s->tasks, (g->n - 1 + GS4I_RIGID_CHUNK - 1) / GS4I_RIGID_CHUNK,
-                      gs4i_rigid_fill_task, &t);
+    gs4i_parallel_for(s->tasks, gs4i_rigid_tasks(g->n - 1), gs4i_rigid_fill_task, &t);
     memset(g->x[0], 0, sizeof g->x[0]);
     m->levels = l + 1;
     return GS4_OK;
@@ -7807,10 +7817,6 @@ static void gs4i_rigid_sweep_faces(gs4i_stokes *s, int backward)
     }
 }
 
-#define GS4I_RIGID_RANGE(index, g, begin, end)          \
-    const int32_t begin = 1 + (index)*GS4I_RIGID_CHUNK, \
-                  end = begin + GS4I_RIGID_CHUNK < (g)->n ? begin + GS4I_RIGID_CHUNK : (g)->n
-
 /* b of the first level: residuals of faces. */
 static void gs4i_rigid_restrict_faces(int index, void *context)
 {
@@ -7901,10 +7907,8 @@ static void gs4i_rigid_sweep_nodes(gs4i_stokes *s, int l, int backward)
     t.level = l;
     t.backward = backward;
     for (c = 0; c < 27; c++) {
-        int32_t n;
         t.colour = backward ? 26 - c : c;
-        n = colour[t.colour + 1] - colour[t.colour];
-        gs4i_parallel_for(s->tasks, (n + GS4I_RIGID_CHUNK - 1) / GS4I_RIGID_CHUNK,
+        gs4i_parallel_for(s->tasks, gs4i_rigid_tasks(colour[t.colour + 1] - colour[t.colour]),
                           gs4i_rigid_nodes_task, &t);
     }
 }
@@ -7921,13 +7925,11 @@ static void gs4i_rigid_restrict_nodes(int index, void *context)
     for (i = begin; i < end; i++) {
         memset(g->b[i], 0, sizeof g->b[i]);
         for (c = g->first[i]; c < g->first[i + 1]; c++) {
-            double f[6];
-            double r[3];
+            double f[6], r[3];
             gs4i_rigid_arm(m, t->level - 1, g->child[c], r);
             gs4i_rigid_node_residual(under, g->child[c], f);
             for (k = 0; k < 3; k++)
-                f[3 + k] += (double)r[(k + 1) % 3] * f[(k + 2) % 3]
-                            - (double)r[(k + 2) % 3] * f[(k + 1) % 3];
+                f[3 + k] += r[(k + 1) % 3] * f[(k + 2) % 3] - r[(k + 2) % 3] * f[(k + 1) % 3];
             for (k = 0; k < 6; k++) g->b[i][k] += f[k];
         }
     }
@@ -7947,9 +7949,8 @@ static void gs4i_rigid_prolong_nodes(int index, void *context)
         if (!g->parent[i]) continue;
         gs4i_rigid_arm(m, t->level - 1, i, r);
         for (k = 0; k < 3; k++) {
-            g->x[i][k] += x[k]
-                          + (x[3 + (k + 1) % 3] * (double)r[(k + 2) % 3]
-                             - x[3 + (k + 2) % 3] * (double)r[(k + 1) % 3]);
+            g->x[i][k] +=
+                x[k] + (x[3 + (k + 1) % 3] * r[(k + 2) % 3] - x[3 + (k + 2) % 3] * r[(k + 1) % 3]);
             g->x[i][3 + k] += x[3 + k];
         }
     }
@@ -7961,14 +7962,9 @@ static void gs4i_rigid_solve_dense(gs4i_rigid *m)
     const int n = 6 * (g->n - 1);
     double y[6 * GS4I_RIGID_DENSE];
     int i;
-    for (i = 0; i < n; i++) y[i] = (double)g->b[1 + i / 6][i % 6];
+    for (i = 0; i < n; i++) y[i] = g->b[1 + i / 6][i % 6];
     gs4i_rigid_substitute(m->factor, n, y);
-    for (i = 0; i < n; i++) g->x[1 + i / 6][i % 6] = (double)y[i];
-}
-
-static int gs4i_rigid_node_tasks(const gs4i_rigid_level *g)
-{
-    return (g->n - 1 + GS4I_RIGID_CHUNK - 1) / GS4I_RIGID_CHUNK;
+    for (i = 0; i < n; i++) g->x[1 + i / 6][i % 6] = y[i];
 }
 
 /* x of level l improved; W where the next level is much smaller, else levels add up. */
@@ -7989,10 +7985,10 @@ static void gs4i_rigid_visit(gs4i_stokes *s, int l)
         t.s = s;
         t.level = l + 1;
         t.colour = t.backward = 0;
-        gs4i_parallel_for(s->tasks, gs4i_rigid_node_tasks(g + 1), gs4i_rigid_restrict_nodes, &t);
+        gs4i_parallel_for(s->tasks, gs4i_rigid_tasks(g[1].n - 1), gs4i_rigid_restrict_nodes, &t);
         memset(g[1].x, 0, (size_t)g[1].n * sizeof *g[1].x);
         for (q = 0; q < (exact || g[1].n > 0.7 * g->n ? 1 : 2); q++) gs4i_rigid_visit(s, l + 1);
-        gs4i_parallel_for(s->tasks, gs4i_rigid_node_tasks(g), gs4i_rigid_prolong_nodes, &t);
+        gs4i_parallel_for(s->tasks, gs4i_rigid_tasks(g->n - 1), gs4i_rigid_prolong_nodes, &t);
     }
     for (q = 0; q < (last ? 4 : 1); q++) gs4i_rigid_sweep_nodes(s, l, 1);
 }
@@ -8007,7 +8003,7 @@ static void gs4i_rigid_cycle(gs4i_stokes *s)
     gs4i_rigid_sweep_faces(s, 0);
     if (y->rigid.levels) {
         gs4i_stokes_product D;
-        gs4i_parallel_for(s->tasks, gs4i_rigid_node_tasks(g), gs4i_rigid_restrict_faces, s);
+        gs4i_parallel_for(s->tasks, gs4i_rigid_tasks(g->n - 1), gs4i_rigid_restrict_faces, s);
         memset(g->x, 0, (size_t)g->n * sizeof *g->x);
         gs4i_rigid_visit(s, 0);
         if (y->rigid.levels > 1) gs4i_rigid_visit(s, 0);
@@ -8210,9 +8206,7 @@ static void gs4i_schur_push_task(int index, void *context)
     const double *p = y->z + y->faces;
     GS4I_STOKES_RANGE(index, y->faces, begin, end);
     int32_t f;
-    for (f = begin; f < end; f++)
-        y->t[f] = (double)y->inverse[f]
-                  * ((double)y->share[f] * (p[y->face_cells[f][0]] - p[y->face_cells[f][1]]));
+    for (f = begin; f < end; f++) y->t[f] = (double)y->inverse[f] * gs4i_stokes_push(y, p, f);
 }
 
 /* What V meets: r + B^T z. */
@@ -8222,10 +8216,7 @@ static void gs4i_stokes_push_task(int index, void *context)
     const double *p = y->z + y->faces;
     GS4I_STOKES_RANGE(index, y->faces, begin, end);
     int32_t f;
-    for (f = begin; f < end; f++) {
-        const double push = (double)y->share[f] * (p[y->face_cells[f][0]] - p[y->face_cells[f][1]]);
-        y->q[f] = y->r[f] + push;
-    }
+    for (f = begin; f < end; f++) y->q[f] = y->r[f] + gs4i_stokes_push(y, p, f);
 }
 
 /* p of z = V q, in cells. */

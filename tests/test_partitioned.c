@@ -740,7 +740,7 @@ static gs4_sim *partitioned_splash(int threads)
 }
 
 /* The same bits for any number of threads, and from a checkpoint; frames have its pressure. */
-static void partitioned_check_bits(void)
+static void test_partitioned_bits(void)
 {
     gs4_sim *a = partitioned_splash(1), *b = partitioned_splash(1);
     CHECK_RESULT(a, gs4_advance(a, (gs4_real)0.1), GS4_OK);
@@ -770,8 +770,6 @@ static void partitioned_check_bits(void)
     gs4_destroy(a);
     gs4_destroy(b);
 }
-
-static void test_partitioned_bits(void) { partitioned_check_bits(); }
 
 /* Every allocation refused once, and all from it on: the step is refused, its state is as before,
  * and the next step is as if nothing had been. */
@@ -809,7 +807,7 @@ static uint64_t partitioned_scenario(files_memory *m, long fail_at, int from_the
     return hash;
 }
 
-static void partitioned_check_memory(void)
+static void test_partitioned_memory(void)
 {
     files_memory m;
     const uint64_t reference = partitioned_scenario(&m, -1, 0);
@@ -821,8 +819,6 @@ static void partitioned_check_memory(void)
         CHECK(partitioned_scenario(&m, k, 1) == reference);
     }
 }
-
-static void test_partitioned_memory(void) { partitioned_check_memory(); }
 
 /* What moves and turns in a closed box that is full takes no room: it stirs, at rest at first. The
  * integral of velocity over the box is that of x_i u n over its walls, 0: liquid and body move as
@@ -1027,14 +1023,10 @@ static void test_partitioned_channel(void)
     }
 }
 
-/* What it has not is refused with a sentence. */
-static void test_partitioned_refusals(void)
+/* What none of the implicit schemes has. */
+static void partitioned_check_refused(gs4_sim_desc fine)
 {
-    const gs4_sim_desc fine = partitioned_cube(8);
     gs4_sim_desc d = fine;
-    gs4_material m = partitioned_liquid(0);
-    gs4_collider c;
-    gs4_sim *sim;
     d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER;
     partitioned_refuses(d, "integrator");
     d = fine;
@@ -1047,6 +1039,16 @@ static void test_partitioned_refusals(void)
     d.integrator = GS4_INTEGRATOR_BACKWARD_EULER;
     d.rho_inf = (gs4_real)0.5;
     partitioned_refuses(d, "rho_inf");
+}
+
+/* What it has not is refused with a sentence. */
+static void test_partitioned_refusals(void)
+{
+    const gs4_sim_desc fine = partitioned_cube(8);
+    gs4_material m = partitioned_liquid(0);
+    gs4_collider c;
+    gs4_sim *sim;
+    partitioned_check_refused(fine);
     CHECK_RESULT(NULL, gs4_create(&fine, &sim), GS4_OK);
     m.bulk_modulus = 1000;
     CHECK_RESULT(sim, gs4_add_material(sim, &m), GS4_ERROR_ARGUMENT);

@@ -600,7 +600,7 @@ static void test_stokes_rigid_nodes(void)
         t.level = l;
         t.colour = t.backward = 0;
         memset(m->level[l - 1].x, 0, (size_t)m->level[l - 1].n * sizeof *m->level[l - 1].x);
-        for (a = 0; a < gs4i_rigid_node_tasks(&m->level[l - 1]); a++)
+        for (a = 0; a < gs4i_rigid_tasks(m->level[l - 1].n - 1); a++)
             gs4i_rigid_prolong_nodes(a, &t);
     }
     for (a = 0; a < gs4i_stokes_tasks(k->s.system.faces); a++) gs4i_rigid_prolong_faces(a, &k->s);

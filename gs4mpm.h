@@ -284,10 +284,14 @@
  * flow, 1 : 1000, the stress is within 2 % wherever they meet. No stress acts on a free surface.
  * What strains in cells at surfaces is taken from the nearest inside, so that modes of viscous
  * spheres of 8 cells decay within 5 %. In steps of 100 times the explicit limit Poiseuille flow is
- * within 0.5 % at 8 cells. Viscous heating is that of u~. The solve to 1e-6 takes 8 to 20
+ * within 0.5 % at 8 cells. Viscous heating is that of u~. The solve to 1e-6 takes 9 to 25
  * iterations (viscous_iterations) for any s mu/(rho h^2) in compact bodies, pools and rooms; up to
- * 36 in ropes, 60 in folded sheets, 90 in pools with inclusions 1e6 times stiffer (bench/stokes.c).
- * A step that does not converge is refused.
+ * 60 in ropes and folded sheets, 40 in porous matter and spray, 90 in pools with inclusions 1e6
+ * times stiffer (bench/stokes.c). A step that does not converge is refused.
+ *     Steps go from a fall to creeping: waves on a pool of 16 cells fall level at the exact rate
+ * within 1 % in steps of a tenth of their time constant, whatever the viscosity, at
+ * s mu/(rho h^2) up to 1e12. Materials that differ in viscosity do so by at most a factor of 30
+ * where that of the stiffer one has s mu/(rho h^2) above 1e6.
  *
  * Symplectic Euler, the fast tier: one affine scatter with stress and one gather (MLS-MPM, APIC),
  * first order.
@@ -370,12 +374,17 @@
  *                           the heaviest particle: one among lighter ones swings by itself
  *                           partitioned: nu dt <= 0.4 h^2 (backward Euler 0.2), c dt <= h/2, c
  *                           of elastic waves alone; of surfaces dt <= (1/2 - rho_sp/4) sqrt(h/g)
- *                           semi-implicit: that of surfaces alone
+ *                           semi-implicit: of surfaces alone, that of a wave of number k, pi/h
+ *                           to pi over the domain, being the larger of a k^(-1/2), as above, and,
+ *                           where the least nu holds it, 2 nu k/g times
+ *                           4 (1 - r s)/(3 + r + s - r s) (backward Euler 2/3)
  *     flow                  one cell a step along each axis, the fall within the step included,
+ *                           semi-implicit: at the largest acceleration of the last step instead;
  *                           and the rim of a collider that turns, where the domain can meet it
  *     strain, relaxation    |grad v| dt <= 1, of colliders too (sqrt(2) |w|),  dt <= 1000 lambda_b
- * and gs4_step refuses more. gs4_advance takes the fraction `cfl` of it, and half of that again, up
- * to 7 times, where a step is refused.
+ * and gs4_step refuses more; gs4_limit_name says which it is. gs4_advance takes the fraction `cfl`
+ * of it, and half of that again, up to 7 times, where a step is refused, by an implicit scheme also
+ * one whose solve did not converge. Its semi-implicit steps grow by at most twice each.
  *
  * IN A GAME. Sixty times a second, in 10 ms of computing each; desc.now is a clock. What does not
  * fit waits for the next frame, up to a tenth of a second: from there on the scene is slower than
@@ -487,6 +496,7 @@ typedef double gs4_real;
 #define gs4_get_desc gs4_get_desc_f64
 #define gs4_get_stats gs4_get_stats_f64
 #define gs4_last_error gs4_last_error_f64
+#define gs4_limit_name gs4_limit_name_f64
 #define gs4_load gs4_load_f64
 #define gs4_material_preset gs4_material_preset_f64
 #define gs4_mesh gs4_mesh_f64
@@ -908,6 +918,10 @@ GS4_API int gs4_advance_within(gs4_sim *sim, gs4_real duration, const gs4_budget
  * this asked: gs4_last_error says which. */
 GS4_API gs4_real gs4_stable_dt(const gs4_sim *sim);
 
+/* What sets it: "sound", "viscosity", "elasticity", "surface", "flow", "strain", "relaxation" or
+ * "none"; "max_dt" where that is less than gs4_advance would take. */
+GS4_API const char *gs4_limit_name(const gs4_sim *sim);
+
 /* Of each particle; SI. A scene has stress to flux only where a material needs them. */
 typedef enum gs4_field {
     GS4_FIELD_POSITION = 0,
@@ -949,7 +963,8 @@ GS4_API const uint8_t *gs4_particle_materials(const gs4_sim *sim);
 typedef struct gs4_stats {
     double time; /* s */
     uint64_t steps;
-    double dt; /* s, of the last step */
+    uint64_t refused; /* by gs4_advance tried again, shorter; since this was made or loaded */
+    double dt;        /* s, of the last step */
     int particles, active_cells;
     uint64_t memory_bytes;
     /* sums over particles, SI; angular momentum about the origin of coordinates */
@@ -6358,11 +6373,14 @@ static int gs4i_elliptic_solve(gs4i_elliptic *e, const gs4_sim_desc *desc)
  * its value is the mirror image of its partner across the edge, odd (2 u_wall - partner, u_wall is
  * in u: sticks) or even (partner: slips). Then its pair of the row is 2 (partner - u_wall), or 0.
  *
- * SIZES. Lengths are in h, masses in T (a power of two near the mean of M):
+ * SIZES. Lengths are in h, masses in T, a power of two near the mean of M or, where
+ * that is more, the least of mu/h^2: b' is as large as u where viscosity holds, as where mass does,
+ * and the volume of cells is kept to the same share of what flows:
  *     u' = u, p' = p/(T h), M' = M/T, W' = W/(T h^2), C' = C T h^2, b' = b/T, e' = h e
- * and residuals are those of the primed equations, all rows alike. mu' is cut off at 1e6 times the
- * mass around: beyond, float loses the mass beside it, and nothing changes that could be seen; at
- * 1e2 in cells with less than two liquid neighbours, which are spray.
+ * and residuals are those of the primed equations, all rows alike. In cells with less than two
+ * liquid neighbours, which are spray, mu' is cut off at 1e2 times the mass around. Elsewhere it is
+ * where it exceeds both 1e6 times that and 30 times the least of mu': float loses what is softer
+ * beside it. What creeps as a whole goes by mu however large it is.
  *
  * Larionov, Batty & Bridson 2017. */
 
@@ -6377,8 +6395,7 @@ enum {
 
 /* --- the equations, numbered ------------------------------------------------------------------ */
 
-#define GS4I_STOKES_STIFFEST 1e6 /* times the mass around a cell: mu' is cut off there; */
-#define GS4I_STOKES_SPRAY 1e2    /* in cells with less than two liquid neighbours */
+#define GS4I_STOKES_SPRAY 1e2 /* times the mass around: most mu' of cells with one neighbour */
 
 enum {
     GS4I_STOKES_COLOURS = 48, /* see gs4i_stokes_colour */
@@ -6395,9 +6412,11 @@ enum {
  * face counts double, beside its odd mirror image. */
 typedef uint32_t gs4i_link;
 
-/* Of a plane: mass of its unknown faces, their number, and a value that will not do. */
+/* Of a plane: mass of its unknown faces, their number; the least viscosity of its liquid cells; and
+ * a value that will not do. */
 typedef struct gs4i_stokes_look {
     double mass, faces;
+    gs4_real softest;
     const char *fault, *accepted;
     double value;
 } gs4i_stokes_look;
@@ -6443,7 +6462,7 @@ typedef struct gs4i_schur {
 } gs4i_schur;
 
 typedef struct gs4i_stokes_system {
-    double h, mass_unit;                     /* T */
+    double h, softest, mass_unit;            /* T */
     int32_t faces, rows, cells, all;         /* with nobody; faces and cells together */
     int32_t colour[GS4I_STOKES_COLOURS + 1]; /* first face of each */
     int32_t *number[4], *counts;             /* of faces of each axis, and of cells, in the box */
@@ -6768,7 +6787,8 @@ static double gs4i_stokes_cut_viscosity(const gs4i_stokes *s, const int at[3], s
         neighbours += gs4i_stokes_entry(s, GS4I_AT_CELL, at, q / 2, 2 * (q & 1) - 1, &i)
                       && s->kind[i] == GS4_CELL_LIQUID;
     }
-    most = (neighbours > 1 ? GS4I_STOKES_STIFFEST : GS4I_STOKES_SPRAY) * mass / (faces ? faces : 1);
+    mass /= faces ? faces : 1;
+    most = neighbours > 1 ? fmax(1e6 * mass, 30 * y->softest) : GS4I_STOKES_SPRAY * mass;
     return mu < most ? mu : most;
 }
 
@@ -6973,6 +6993,7 @@ static void gs4i_stokes_look_plane(int z, void *context)
     int at[3], c;
     size_t i;
     memset(look, 0, sizeof *look);
+    look->softest = GS4I_HUGE;
     for (c = 0; c < 3; c++)
         GS4I_STOKES_PLANE(s, 1 << c, z, at, i) {
             if (s->face[c][i] != GS4I_STOKES_UNKNOWN) continue;
@@ -6985,6 +7006,7 @@ static void gs4i_stokes_look_plane(int z, void *context)
     GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i) {
         if (s->kind[i] != GS4_CELL_LIQUID) continue;
         gs4i_stokes_check(look, s->viscosity[i], 0, "viscosity[] holds ", at_least_0);
+        look->softest = gs4i_min(look->softest, s->viscosity[i]);
         if (s->compliance)
             gs4i_stokes_check(look, s->compliance[i], 0, "compliance[] holds ", at_least_0);
     }
@@ -6994,21 +7016,25 @@ static void gs4i_stokes_look_plane(int z, void *context)
 static int gs4i_stokes_choose_unit(gs4i_stokes *s)
 {
     gs4i_stokes_system *y = &s->system;
-    double mass = 0, faces = 0;
+    double mass = 0, faces = 0, softest = (double)GS4I_HUGE;
     int z, exponent = 0;
     for (z = 0; z <= s->box->size[2]; z++) {
         const gs4i_stokes_look *look = &y->look[z];
         mass += look->mass;
         faces += look->faces;
+        softest = fmin(softest, (double)look->softest);
         if (!look->fault) continue;
         s->fault = look->fault;
         s->fault_value = look->value;
         s->accepted = look->accepted;
         return GS4_ERROR_ARGUMENT;
     }
-    frexp(faces > 0 ? mass / faces : 1, &exponent);
     y->h = (double)s->h;
+    mass = faces > 0 ? mass / faces : 1;
+    softest = softest < (double)GS4I_HUGE ? softest / (y->h * y->h) : 0;
+    frexp(fmax(mass, softest), &exponent);
     y->mass_unit = ldexp(1, exponent);
+    y->softest = softest / y->mass_unit;
     return GS4_OK;
 }
 
@@ -11297,6 +11323,9 @@ static void gs4i_begin_heat(const gs4i_particles *p, size_t i, const gs4i_materi
 typedef struct gs4i_report {
     gs4_real max_speed, max_gradient, min_J, max_J, max_viscosity /* kinematic */, max_sound;
     gs4_real max_stiffness; /* over density: squared speed of elastic waves */
+    /* where steps outlast them, for gs4i_stable_semi_implicit_dt: least kinematic viscosity, and
+     * largest component of acceleration */
+    gs4_real min_viscosity, max_rate;
     /* particles that need the robust local integrator; that took it; whose stretch was bounded */
     int hard, split, bounded;
     int left_tile;     /* particles outside of the tile: sort and try again */
@@ -11324,7 +11353,7 @@ enum {
 static void gs4i_report_clear(gs4i_report *r)
 {
     memset(r, 0, sizeof *r);
-    r->min_J = GS4I_HUGE;
+    r->min_J = r->min_viscosity = GS4I_HUGE;
 }
 
 /* The extremes of `r` into those of `into`. */
@@ -11337,6 +11366,8 @@ static void gs4i_report_merge(gs4i_report *into, const gs4i_report *r)
     into->max_viscosity = gs4i_max(into->max_viscosity, r->max_viscosity);
     into->max_sound = gs4i_max(into->max_sound, r->max_sound);
     into->max_stiffness = gs4i_max(into->max_stiffness, r->max_stiffness);
+    into->min_viscosity = gs4i_min(into->min_viscosity, r->min_viscosity);
+    into->max_rate = gs4i_max(into->max_rate, r->max_rate);
     into->split += r->split;
     into->bounded += r->bounded;
     into->substeps += r->substeps;
@@ -11351,13 +11382,17 @@ static void gs4i_report_merge(gs4i_report *into, const gs4i_report *r)
 /* Extremes of a pass, still in lanes. */
 typedef struct gs4i_seen {
     gs4i_lanes min_J, max_J, max_viscosity, max_sound, max_stiffness, speed2, gradient2;
+    gs4i_lanes min_viscosity, max_rate; /* by gs4i_see_thinnest, gs4i_see_rates */
 } gs4i_seen;
 
 GS4I_INLINE void gs4i_see_nothing(gs4i_seen *r)
 {
     int b;
     memset(r, 0, sizeof *r);
-    GS4I_BATCH_LOOP(b) r->min_J[b] += GS4I_HUGE;
+    GS4I_BATCH_LOOP(b) {
+        r->min_J[b] += GS4I_HUGE;
+        r->min_viscosity[b] += GS4I_HUGE;
+    }
 }
 
 GS4I_INLINE void gs4i_see_liquids(gs4i_seen *r, const gs4i_batch_constants *l, const gs4i_wide *J,
@@ -11373,6 +11408,26 @@ GS4I_INLINE void gs4i_see_liquids(gs4i_seen *r, const gs4i_batch_constants *l, c
         GS4I_WIDE_MAX(r->max_viscosity[b], r->max_viscosity[b], viscosity);
         GS4I_WIDE_MAX(r->max_sound[b], r->max_sound[b], sound);
     }
+}
+
+static void gs4i_see_thinnest(gs4i_seen *r, const gs4i_batch_constants *l, const gs4i_wide *mu)
+{
+    int b;
+    GS4I_BATCH_LOOP(b) {
+        const gs4i_wide viscosity = mu[b] * l->inv_density[b];
+        GS4I_WIDE_MIN(r->min_viscosity[b], r->min_viscosity[b], viscosity);
+    }
+}
+
+static void gs4i_see_rates(gs4i_seen *r, gs4i_lanes a[3])
+{
+    int b, i;
+    for (i = 0; i < 3; i++)
+        GS4I_BATCH_LOOP(b) {
+            const gs4i_wide back = -a[i][b];
+            GS4I_WIDE_MAX(r->max_rate[b], r->max_rate[b], a[i][b]);
+            GS4I_WIDE_MAX(r->max_rate[b], r->max_rate[b], back);
+        }
 }
 
 /* Largest speed along an axis and largest |L|, squared */
@@ -11401,7 +11456,10 @@ static gs4_real gs4i_largest(const gs4i_wide *lanes)
 static void gs4i_report_liquids(gs4i_report *r, const gs4i_seen *s)
 {
     int n;
-    for (n = 0; n < GS4I_BATCH; n++) r->min_J = gs4i_min(r->min_J, GS4I_NTH_CONST(s->min_J, n));
+    for (n = 0; n < GS4I_BATCH; n++) {
+        r->min_J = gs4i_min(r->min_J, GS4I_NTH_CONST(s->min_J, n));
+        r->min_viscosity = gs4i_min(r->min_viscosity, GS4I_NTH_CONST(s->min_viscosity, n));
+    }
     r->max_J = gs4i_largest(s->max_J);
     r->max_viscosity = gs4i_largest(s->max_viscosity);
     r->max_sound = gs4i_largest(s->max_sound);
@@ -11412,6 +11470,7 @@ static void gs4i_report_motion(gs4i_report *r, const gs4i_seen *s)
 {
     r->max_speed = gs4i_largest(s->speed2);
     r->max_gradient = gs4i_largest(s->gradient2);
+    r->max_rate = gs4i_largest(s->max_rate);
 }
 
 GS4I_INLINE void gs4i_see_bad(gs4i_report *r, int reason, uint32_t id)
@@ -13577,6 +13636,7 @@ struct gs4_sim {
     double time, last_dt, seconds[GS4I_CLOCKS];
     /* stress integrated robustly, bounded: particles and steps so far */
     uint64_t steps, split, bounded;
+    uint64_t refused; /* steps that gs4_advance tried again, shorter */
     uint32_t next_id;
     gs4_real min_mass, max_mass; /* of any particle so far */
     /* m/s, the greatest that was ever set: chooses a sound speed where none is given */
@@ -15337,6 +15397,13 @@ static void gs4i_free_image_particles(gs4i_memory *m, gs4i_image_particles *g)
  * the order of the step: S3 scatter momentum; S4, S5 gather gradients, ask the laws, scatter
  * forces; S6 nodes; S7 gather and correct. Symplectic Euler has one kernel each way. */
 
+/* What limits the step of a scheme. */
+typedef struct gs4i_waves {
+    double c; /* m/s: of sound and elasticity */
+    /* kinematic viscosities, m^2/s: the largest, and the least, infinite where there is none */
+    double nu, least;
+} gs4i_waves;
+
 typedef struct gs4i_scheme {
     gs4_task_fn scatter, correct; /* kernels of S3 and S7 */
     gs4_task_fn remember;         /* what nodes keep of accelerations */
@@ -15345,8 +15412,8 @@ typedef struct gs4i_scheme {
     int (*set_velocities)(gs4_sim *sim, gs4i_node_pass *nodes);
     /* S4 to S6: acceleration and stage velocity of the nodes */
     int (*accelerate)(gs4_sim *sim, gs4i_node_pass *nodes);
-    /* largest dt for waves of the speed c (m/s) and the kinematic viscosity nu (m^2/s) */
-    double (*stable_dt)(const gs4_sim *sim, double c, double nu);
+    /* largest dt that is stable, s */
+    double (*stable_dt)(const gs4_sim *sim, const gs4i_waves *of);
 } gs4i_scheme;
 
 /* --- nodes ------------------------------------------------------------------------------------ */
@@ -16429,15 +16496,15 @@ static int gs4i_accelerate_explicitly(gs4_sim *sim, gs4i_node_pass *nodes)
 
 /* (w dt)^2 + d dt (3 + r + s - r s)/2 <= 2 (1 - r s), r and s the two rho, w the frequency of the
  * fastest wave that the grid holds and d its fastest viscous rate. */
-static double gs4i_stable_explicit_dt(const gs4_sim *sim, double c, double nu)
+static double gs4i_stable_explicit_dt(const gs4_sim *sim, const gs4i_waves *of)
 {
     const double r = (double)sim->desc.rho_inf, s = (double)sim->desc.rho_inf_spurious,
                  h = (double)sim->grid.h;
     const double sharper =
         sim->desc.sharp_gradients ? (double)GS4I_C(GS4I_DECONVOLVED_EIGENVALUES) : 1;
     const double a = 2 * (1 - r * s), b = (3 + r + s - r * s) / 2;
-    const double w = sqrt(sharper * GS4I_SOUND_EIGENVALUE) * c / h;
-    const double d = sharper * b * GS4I_VISCOUS_EIGENVALUE * nu / (h * h);
+    const double w = sqrt(sharper * GS4I_SOUND_EIGENVALUE) * of->c / h;
+    const double d = sharper * b * GS4I_VISCOUS_EIGENVALUE * of->nu / (h * h);
     return d + w > 0 ? 2 * a / (d + sqrt(d * d + 4 * w * w * a)) : (double)GS4I_HUGE;
 }
 
@@ -16636,10 +16703,10 @@ static int gs4i_accelerate_euler(gs4_sim *sim, gs4i_node_pass *nodes)
 #define GS4I_EULER_VISCOUS_EIGENVALUE 16.0
 
 /* (w dt)^2 + 2 d dt <= 4. */
-static double gs4i_stable_euler_dt(const gs4_sim *sim, double c, double nu)
+static double gs4i_stable_euler_dt(const gs4_sim *sim, const gs4i_waves *of)
 {
-    const double h = (double)sim->grid.h, w = sqrt(GS4I_EULER_SOUND_EIGENVALUE) * c / h,
-                 d = 2 * GS4I_EULER_VISCOUS_EIGENVALUE * nu / (h * h);
+    const double h = (double)sim->grid.h, w = sqrt(GS4I_EULER_SOUND_EIGENVALUE) * of->c / h,
+                 d = 2 * GS4I_EULER_VISCOUS_EIGENVALUE * of->nu / (h * h);
     return d + w > 0 ? 8 / (d + sqrt(d * d + 16 * w * w)) : (double)GS4I_HUGE;
 }
 
@@ -19410,6 +19477,7 @@ static void gs4i_correct_from_faces(int index, void *context)
         gs4i_pack_batch(&q, 1, &out);
         gs4i_correct_contact(sim, o, NULL, i, n, &out, &slope, report);
         gs4i_see_motion(&r.seen, q.v, k.L);
+        gs4i_see_rates(&r.seen, q.a);
         gs4i_store_batch(&p, i, n, &out);
         gs4i_store_affine(&p, i, n, &slope, integrator.restart);
     }
@@ -19463,20 +19531,32 @@ static void gs4i_remember_faces(int index, void *context)
     }
 }
 
-/* Viscosity and elasticity stay explicit: nu dt/h^2 at most 0.4, of backward Euler 0.2; waves of
- * elasticity half a cell a step. So do places of surfaces: ripples of a few cells, whose frequency
- * is about sqrt(g/h), grow from dt sqrt(g/h) .8 on with backward Euler, .7 with rho (1, 0) and .5
- * with (1, .9); see test_partitioned_ripples. */
-static double gs4i_stable_partitioned_dt(const gs4_sim *sim, double c, double nu)
+/* The largest component of gravity, m/s^2. */
+static gs4_real gs4i_fall_of(const gs4_sim *sim)
+{
+    const gs4_vec3 g = sim->desc.gravity;
+    return gs4i_max(gs4i_abs(g.x), gs4i_max(gs4i_abs(g.y), gs4i_abs(g.z)));
+}
+
+/* Places of surfaces stay explicit, so ripples of a few cells, whose frequency is about sqrt(g/h),
+ * grow from dt sqrt(g/h) .8 on with backward Euler, .7 with rho (1, 0) and .5 with (1, .9); see
+ * test_partitioned_ripples. */
+static double gs4i_stable_ripple_dt(const gs4_sim *sim)
+{
+    const double fall = (double)gs4i_fall_of(sim);
+    if (!(fall > 0)) return (double)GS4I_HUGE;
+    return (0.5 - 0.25 * (double)sim->desc.rho_inf_spurious) * sqrt((double)sim->grid.h / fall);
+}
+
+/* Viscosity and elasticity stay explicit, too: nu dt/h^2 at most 0.4, of backward Euler 0.2; waves
+ * of elasticity half a cell a step. */
+static double gs4i_stable_partitioned_dt(const gs4_sim *sim, const gs4i_waves *of)
 {
     const double h = (double)sim->grid.h,
                  most = sim->desc.integrator == GS4_INTEGRATOR_GS4 ? 0.4 : 0.2;
-    const gs4_vec3 g = sim->desc.gravity;
-    const double fall = (double)gs4i_max(gs4i_abs(g.x), gs4i_max(gs4i_abs(g.y), gs4i_abs(g.z)));
-    double dt = (double)GS4I_HUGE;
-    if (nu > 0) dt = fmin(dt, most * h * h / nu);
-    if (c > 0) dt = fmin(dt, 0.5 * h / c);
-    if (fall > 0) dt = fmin(dt, (0.5 - 0.25 * (double)sim->desc.rho_inf_spurious) * sqrt(h / fall));
+    double dt = gs4i_stable_ripple_dt(sim);
+    if (of->nu > 0) dt = fmin(dt, most * h * h / of->nu);
+    if (of->c > 0) dt = fmin(dt, 0.5 * h / of->c);
     return dt;
 }
 
@@ -19549,6 +19629,7 @@ static void gs4i_scatter_viscosity(int index, void *context)
         gs4i_turn_to_batch(&r, i, n);
         if (heat) gs4i_load_batch_heat(&r);
         gs4i_stress(&r, L, J, sigma, mu);
+        gs4i_see_thinnest(&r.seen, &r.constants, mu);
         gs4i_check_liquids(r.report, J, mu, p.id + i, n);
         GS4I_BATCH_LOOP(b) {
             const gs4i_wide inv_density = r.constants.inv_density[b],
@@ -19781,6 +19862,18 @@ static int gs4i_solve_stage(gs4_sim *sim)
     return GS4_OK;
 }
 
+/* What was held falls when it is let go, more than particles may move in a step that had not to
+ * know of it: refused. Cells in a step go by dt^2 then. */
+static int gs4i_check_travel(gs4_sim *sim)
+{
+    const double dt = (double)sim->integrator.dt, u = (double)gs4i_fastest_face(&sim->staggered),
+                 cells = u * dt / (double)sim->grid.h;
+    if (!(cells > 2) || u >= (double)GS4I_HUGE) return GS4_OK;
+    sim->stage_limit = GS4I_C(dt / sqrt(cells));
+    return gs4i_fail_value(&sim->error, GS4_ERROR_UNSTABLE, "material would move ", cells,
+                           " cells in this step; it was not taken: a smaller dt would do");
+}
+
 /* S4, S5 and u~. */
 static int gs4i_find_implicit_velocity(gs4_sim *sim, gs4i_node_pass *nodes)
 {
@@ -19798,7 +19891,8 @@ static int gs4i_find_implicit_velocity(gs4_sim *sim, gs4i_node_pass *nodes)
     gs4i_parallel_for(&sim->tasks, f->box.size[2], gs4i_find_viscosities, &pass);
     gs4i_classify_stage(sim, nodes);
     GS4I_TRY(gs4i_setup_pressure(sim));
-    return gs4i_solve_stage(sim);
+    GS4I_TRY(gs4i_solve_stage(sim));
+    return gs4i_check_travel(sim);
 }
 
 /* Heat of the stage to nodes: stress works in grad u~, which the solve bounds. That of v_i, which
@@ -19846,11 +19940,30 @@ static int gs4i_accelerate_by_solve(gs4_sim *sim, gs4i_node_pass *nodes)
     return GS4_OK;
 }
 
-/* Viscosity and sound are in the solve; places of surfaces are not. */
-static double gs4i_stable_semi_implicit_dt(const gs4_sim *sim, double c, double nu)
+/* Viscosity and sound are in the solve; places of surfaces are not. A wave of number k on a deep
+ * liquid swings by sqrt(g k) or, where viscosity holds it, creeps back at the rate g/(2 nu k); a
+ * shallow one is slower. The first is stable up to a dt ~ k^(-1/2), which ripples set, k = pi/h.
+ * Creeping, by (4) with the velocity of the place as it is now, is stable up to
+ *     rate dt = 4 (1 - r s)/(3 + r + s - r s);   2/3 with backward Euler
+ * Each wave may have the longer of both: the worst is the one where they meet, or the longest that
+ * the domain has room for. */
+static double gs4i_stable_semi_implicit_dt(const gs4_sim *sim, const gs4i_waves *of)
 {
-    (void)nu;
-    return gs4i_stable_partitioned_dt(sim, c, 0);
+    const double g = (double)gs4i_fall_of(sim), h = (double)sim->grid.h,
+                 r = (double)sim->desc.rho_inf, s = (double)sim->desc.rho_inf_spurious;
+    const double rate_dt = sim->desc.integrator == GS4_INTEGRATOR_BACKWARD_EULER
+                               ? 2.0 / 3
+                               : 4 * (1 - r * s) / (3 + r + s - r * s);
+    const int *n = sim->desc.cells;
+    const double longest = fmax(n[0], fmax(n[1], n[2]));
+    double dt = gs4i_stable_ripple_dt(sim);
+    if (g > 0) {
+        /* k in units of pi/h: swinging is stable up to dt k^(-1/2), creeping up to creep k */
+        const double pi = 3.14159265358979, creep = rate_dt * 2 * of->least * pi / (g * h),
+                     k = pow(dt / creep, 2.0 / 3);
+        if (k < 1) dt = k < 1 / longest ? creep / longest : dt / sqrt(k);
+    }
+    return of->c > 0 ? fmin(dt, 0.5 * h / of->c) : dt;
 }
 
 /* The scheme of a simulation. Nothing else asks which it is. */
@@ -21619,6 +21732,8 @@ static void gs4i_note_emission(gs4_sim *sim, const gs4i_material_constants *m)
     gs4i_report *r = &sim->limits;
     r->max_sound = gs4i_max(r->max_sound, m->sound_speed * GS4I_SQRT(m->lone));
     r->max_viscosity = gs4i_max(r->max_viscosity, m->viscosity * m->inv_density);
+    r->min_viscosity = gs4i_min(r->min_viscosity, m->local * m->viscosity * m->inv_density);
+    r->max_rate = gs4i_max(r->max_rate, gs4i_fall_of(sim));
     r->max_stiffness =
         gs4i_max(r->max_stiffness, gs4i_max(2 * m->modulus, GS4I_SOLID_WAVES * m->shear_modulus)
                                        * m->lone * m->inv_density);
@@ -21760,29 +21875,54 @@ static gs4i_report gs4i_with_both_phases(const gs4_sim *sim, gs4i_report r)
     return r;
 }
 
+/* Which of waves and viscosity sets the limit of the scheme. */
+static const char *gs4i_name_of_waves(const gs4_sim *sim, const gs4i_waves *of, int is_sound)
+{
+    const gs4i_scheme *scheme = gs4i_scheme_of(sim);
+    gs4i_waves still = *of, sound = *of, viscous = *of;
+    double by_surface, by_sound, by_viscosity;
+    still.c = still.nu = sound.nu = viscous.c = 0;
+    by_surface = scheme->stable_dt(sim, &still);
+    by_sound = scheme->stable_dt(sim, &sound);
+    by_viscosity = scheme->stable_dt(sim, &viscous);
+    if (by_surface <= fmin(by_sound, by_viscosity))
+        return by_surface < (double)GS4I_HUGE ? "surface" : "none";
+    if (by_viscosity < by_sound) return "viscosity";
+    return is_sound ? "sound" : "elasticity";
+}
+
+static void gs4i_lower(double *dt, double to, const char **by, const char *name)
+{
+    if (!(to < *dt)) return;
+    *dt = to;
+    *by = name;
+}
+
 /* Largest stable dt: what the scheme allows for waves and viscosity; one cell a step, the fall
  * within it included; a velocity gradient that turns or stretches by less than 1; and 1000
- * relaxation times, so that no particle needs more substeps than there may be. */
-static gs4_real gs4i_stable_dt(const gs4_sim *sim, const gs4i_report *seen)
+ * relaxation times, so that no particle needs more substeps than there may be. `by` is what sets
+ * it. Steps of the semi-implicit scheme outlast a fall: what it holds falls no more. */
+static gs4_real gs4i_stable_dt(const gs4_sim *sim, const gs4i_report *seen, const char **by)
 {
     const gs4i_report r = gs4i_with_both_phases(sim, *seen);
     const double h = (double)sim->grid.h, speed = (double)r.max_speed,
-                 gradient = (double)r.max_gradient;
-    const double fall =
-        (double)gs4i_max(gs4i_abs(sim->desc.gravity.x),
-                         gs4i_max(gs4i_abs(sim->desc.gravity.y), gs4i_abs(sim->desc.gravity.z)));
-    /* of sound and of elasticity */
-    const double wave = sqrt((double)r.max_sound * (double)r.max_sound + (double)r.max_stiffness);
-    double dt = gs4i_scheme_of(sim)->stable_dt(sim, wave, (double)r.max_viscosity);
+                 fall = (double)(sim->desc.scheme == GS4_SEMI_IMPLICIT ? r.max_rate
+                                                                       : gs4i_fall_of(sim));
+    gs4i_waves of;
+    double dt;
     int i;
+    of.c = sqrt((double)r.max_sound * (double)r.max_sound + (double)r.max_stiffness);
+    of.nu = (double)r.max_viscosity;
+    of.least = (double)r.min_viscosity;
+    dt = gs4i_scheme_of(sim)->stable_dt(sim, &of);
+    *by = gs4i_name_of_waves(sim, &of, r.max_sound * r.max_sound > r.max_stiffness);
     if (speed * dt + 0.5 * fall * dt * dt > h)
-        dt = 2 * h / (speed + sqrt(speed * speed + 2 * fall * h));
-    if (gradient * dt > 1) dt = 1 / gradient;
+        gs4i_lower(&dt, 2 * h / (speed + sqrt(speed * speed + 2 * fall * h)), by, "flow");
+    if ((double)r.max_gradient > 0) gs4i_lower(&dt, 1 / (double)r.max_gradient, by, "strain");
     for (i = 0; i < sim->material_count; i++)
         if ((double)sim->constants[i].inv_lambda * dt > 1000)
-            dt = 1000 / (double)sim->constants[i].inv_lambda;
-    if (dt > (double)GS4I_HUGE) dt = (double)GS4I_HUGE;
-    return GS4I_C(dt);
+            gs4i_lower(&dt, 1000 / (double)sim->constants[i].inv_lambda, by, "relaxation");
+    return GS4I_C(fmin(dt, (double)GS4I_HUGE));
 }
 
 /* Speeds that colliders and emitters will give to their nodes, and velocity gradients: |grad v|
@@ -21841,12 +21981,14 @@ static void gs4i_find_limits(const gs4_sim *sim, gs4_real top_speed, gs4i_report
         if (r.heat) gs4i_load_batch_heat(&r);
         gs4i_stress(&r, L, q.v[3], sigma, mu);
         gs4i_check_liquids(report, q.v[3], mu, p->id + i, n);
+        gs4i_see_thinnest(&r.seen, &r.constants, mu);
         gs4i_see_motion(&r.seen, q.v, L);
     }
     gs4i_report_liquids(report, &r.seen);
     gs4i_report_motion(report, &r.seen);
     report->max_speed = GS4I_SQRT(report->max_speed);
     report->max_gradient = GS4I_SQRT(report->max_gradient);
+    report->max_rate = gs4i_fall_of(sim); /* what holds the material is not known */
     gs4i_see_colliders(sim, report);
 }
 
@@ -22060,8 +22202,9 @@ static int gs4i_scatter_momenta(gs4_sim *sim, gs4i_node_pass *nodes)
 static int gs4i_check_stage(gs4_sim *sim)
 {
     gs4i_report r = gs4i_all_reports(sim);
+    const char *by;
     if (r.bad) return gs4i_fail_bad(sim, &r);
-    sim->stage_limit = gs4i_stable_dt(sim, &r);
+    sim->stage_limit = gs4i_stable_dt(sim, &r, &by);
     if (sim->integrator.dt > GS4I_C(1.25) * sim->stage_limit)
         return gs4i_fail_value(&sim->error, GS4_ERROR_UNSTABLE,
                                "viscosity or compression rose during the step: dt ",
@@ -22083,6 +22226,7 @@ static void gs4i_finish(gs4_sim *sim)
         gs4i_report r = gs4i_all_reports(sim);
         r.max_speed = GS4I_SQRT(r.max_speed);
         r.max_gradient = GS4I_SQRT(r.max_gradient);
+        if (!sim->staggered.is_viscous) r.min_viscosity = 0; /* nothing asked for it */
         sim->limits = r;
         sim->split += (uint64_t)r.split;
         sim->bounded += (uint64_t)r.bounded;
@@ -22905,13 +23049,14 @@ static int gs4i_head_is_sound(const gs4i_head *h)
     const double times[6] = {
         h->time, h->last_dt, h->top_speed, h->min_mass, h->max_mass, h->shift
     };
-    const gs4_real limits[7] = { h->limits.max_speed,     h->limits.max_gradient,
+    const gs4_real limits[9] = { h->limits.min_viscosity, h->limits.max_rate,
+                                 h->limits.max_speed,     h->limits.max_gradient,
                                  h->limits.min_J,         h->limits.max_J,
                                  h->limits.max_viscosity, h->limits.max_sound,
                                  h->limits.max_stiffness };
     int i, sound = 1;
     for (i = 0; i < 6; i++) sound &= times[i] >= 0 && times[i] <= (double)GS4I_HUGE;
-    for (i = 0; i < 7; i++) sound &= limits[i] >= 0 && gs4i_finite(limits[i]);
+    for (i = 0; i < 9; i++) sound &= limits[i] >= 0 && gs4i_finite(limits[i]);
     return sound && (h->restart | h->needs_sort | h->limits_stale | h->needs_spin) >> 1 == 0
            && (h->min_mass > 0 || h->particles == 0) && h->max_mass >= h->min_mass;
 }
@@ -24563,18 +24708,19 @@ static void gs4i_warn_of_soft(gs4_sim *sim)
 
 /* Largest stable dt of the present state, s, and the extremes `r` that set it. What an edit by hand
  * has brought is seen, but left to the next call that checks it. */
-static int gs4i_limit_now(gs4_sim *sim, gs4i_report *r, gs4_real *limit)
+static int gs4i_limit_now(gs4_sim *sim, gs4i_report *r, gs4_real *limit, const char **by)
 {
     const int busy = sim->busy;
     gs4_real top_speed = sim->top_speed;
     *limit = 0;
+    *by = "none";
     GS4I_TRY(gs4i_require(&sim->error, !sim->asks,
                           "gs4_stable_dt is asked by a viscosity callback that it asks itself"));
     sim->busy = sim->asks = 1;
     *r = sim->limits;
     if (sim->needs_check) top_speed = gs4i_max(top_speed, gs4i_top_speed(&sim->particles));
     if (sim->limits_stale) gs4i_find_limits(sim, top_speed, r);
-    if (!r->bad) *limit = gs4i_stable_dt(sim, r);
+    if (!r->bad) *limit = gs4i_stable_dt(sim, r, by);
     sim->busy = busy;
     sim->asks = 0;
     return r->bad ? gs4i_fail_bad(sim, r) : GS4_OK;
@@ -24584,25 +24730,40 @@ GS4_API gs4_real gs4_stable_dt(const gs4_sim *sim)
 {
     gs4i_report r;
     gs4_real limit = 0;
-    if (sim) gs4i_limit_now(sim->self, &r, &limit);
+    const char *by;
+    if (sim) gs4i_limit_now(sim->self, &r, &limit, &by);
     return limit;
+}
+
+GS4_API const char *gs4_limit_name(const gs4_sim *sim)
+{
+    gs4i_report r;
+    gs4_real limit = 0;
+    const char *by = "none";
+    if (sim) gs4i_limit_now(sim->self, &r, &limit, &by);
+    if (limit > 0 && sim->desc.max_dt > 0 && sim->desc.max_dt < sim->desc.cfl * limit)
+        by = "max_dt";
+    return by;
 }
 
 static int gs4i_try_step(gs4_sim *sim, gs4_real dt)
 {
     gs4i_report r;
     gs4_real limit;
+    const char *by;
     int result;
     GS4I_TRY(gs4i_check(&sim->error, "dt", dt, GS4I_POSITIVE));
     GS4I_TRY(gs4i_check_edit(sim));
-    GS4I_TRY(gs4i_limit_now(sim, &r, &limit));
+    GS4I_TRY(gs4i_limit_now(sim, &r, &limit, &by));
     if (dt > limit * (1 + 8 * GS4I_EPSILON)) {
         gs4i_text t = gs4i_begin_error(&sim->error);
         gs4i_put(&t, "dt is ");
         gs4i_put_real(&t, (double)dt);
         gs4i_put(&t, " s; the largest stable step is now ");
         gs4i_put_real(&t, (double)limit);
-        gs4i_put(&t, " s (gs4_stable_dt); the step was not taken");
+        gs4i_put(&t, " s (gs4_stable_dt), by ");
+        gs4i_put(&t, by);
+        gs4i_put(&t, "; the step was not taken");
         return gs4i_end_error(&sim->error, GS4_ERROR_UNSTABLE);
     }
     /* not before: a refused call changes nothing, and a law may say something else next time */
@@ -24627,12 +24788,30 @@ GS4_API int gs4_step(gs4_sim *sim, gs4_real dt)
 
 #define GS4I_MAX_STEPS 1e8 /* of one gs4_advance: beyond, it would seem to hang */
 
+/* What gs4_advance takes at most, s. Steps of the semi-implicit scheme go from a fall to creeping,
+ * which may be a million times as long: by twice each, as rates of a short step say little of a
+ * long one (levelling waves: heights off by .007 of the first, by .08 to .13 where steps grow at
+ * once; test_semi_levelling). */
+static double gs4i_longest_dt(const gs4_sim *sim)
+{
+    double dt = sim->desc.max_dt > 0 ? (double)sim->desc.max_dt : (double)GS4I_HUGE;
+    if (sim->desc.scheme == GS4_SEMI_IMPLICIT && sim->last_dt > 0) dt = fmin(dt, 2 * sim->last_dt);
+    return dt;
+}
+
 /* What part of a refused step to try: half, or as much as is stable by what it saw. Liquids that
  * thicken have little to say at rest. */
 static double gs4i_less(const gs4_sim *sim)
 {
     const double part = (double)sim->stage_limit / (double)sim->integrator.dt;
     return part > 0 && part < 0.5 ? part : 0.5;
+}
+
+/* Is there hope for a shorter step? A solve of an implicit scheme is easier then. */
+static int gs4i_may_be_shorter(const gs4_sim *sim, int result)
+{
+    return result == GS4_ERROR_UNSTABLE
+           || (result == GS4_ERROR_NOT_CONVERGED && sim->desc.scheme != GS4_EXPLICIT);
 }
 
 /* A step that may be refused and tried again: that is no error, so `log` does not hear of it. */
@@ -24665,28 +24844,29 @@ static int gs4i_advance(gs4_sim *sim, const gs4_budget *budget)
     int taken = 0;
     while (*left > 0) {
         const double began = now;
-        double fraction = (double)sim->desc.cfl, dt, steps;
+        double dt = (double)GS4I_HUGE, steps;
         int tries, result = GS4_OK;
         /* a refused step is tried again, shorter */
-        for (tries = 0; tries < 8; tries++, fraction *= gs4i_less(sim)) {
+        for (tries = 0; tries < 8; tries++) {
             gs4i_report r;
             gs4_real limit;
-            GS4I_TRY(gs4i_limit_now(sim, &r, &limit));
-            dt = fraction * (double)limit;
-            if (sim->desc.max_dt > 0 && dt > (double)sim->desc.max_dt)
-                dt = (double)sim->desc.max_dt;
+            const char *by;
+            GS4I_TRY(gs4i_limit_now(sim, &r, &limit, &by));
+            dt = fmin((double)sim->desc.cfl * (double)limit,
+                      tries ? dt * gs4i_less(sim) : gs4i_longest_dt(sim));
             steps = ceil(*left / dt * (1 - 1e-9));
-            if (!(steps < GS4I_MAX_STEPS))
+            if (!(steps < GS4I_MAX_STEPS) && (sim->desc.scheme != GS4_SEMI_IMPLICIT || taken > 64))
                 return gs4i_fail_value(
                     &sim->error, GS4_ERROR_UNSTABLE, "the stable step is ", dt,
                     " s, so short that the rest would take more than 1e8 steps; a larger "
                     "cell_size, or less viscosity, sound_speed or speed, would do");
             dt = *left / steps;
             result = gs4i_try_quietly(sim, GS4I_C(dt));
-            if (result != GS4_ERROR_UNSTABLE) break;
+            if (!gs4i_may_be_shorter(sim, result)) break;
         }
         if (result != GS4_OK) return gs4i_end_error(&sim->error, result);
         if (tries) sim->error = before;
+        sim->refused += (uint64_t)tries;
         *left = steps <= 1 ? 0 : *left - sim->last_dt;
         now = gs4i_now(sim);
         used += gs4i_elapsed(began, now);
@@ -25116,6 +25296,30 @@ static double gs4i_occupied_volume(gs4_sim *sim)
     return result == GS4_OK ? cells * h * h * h : -1;
 }
 
+/* What is counted and timed, not summed over particles. */
+static void gs4i_count_stats(const gs4_sim *sim, gs4_stats *s)
+{
+    s->time = sim->time;
+    s->time_left = sim->time_left;
+    s->steps = sim->steps;
+    s->refused = sim->refused;
+    s->dt = sim->last_dt;
+    s->particles = sim->particles.count;
+    s->stress_substeps = sim->split;
+    s->stress_bounded = sim->bounded;
+    s->active_cells = sim->grid.active * GS4I_BLOCK_NODES;
+    s->memory_bytes = sim->memory.bytes;
+    s->heat_iterations = sim->conduction.system.iterations;
+    s->solver_residual = fmax(sim->conduction.system.residual, sim->staggered.residual);
+    s->pressure_iterations = sim->staggered.iterations;
+    s->viscous_iterations = sim->staggered.viscous_iterations;
+    s->seconds_total = sim->seconds[GS4I_CLOCK_TOTAL];
+    s->seconds_sort = sim->seconds[GS4I_CLOCK_SORT];
+    s->seconds_solve = sim->seconds[GS4I_CLOCK_SOLVE];
+    /* stress is evaluated within the transfers */
+    s->seconds_transfer = fmax(0, s->seconds_total - s->seconds_sort - s->seconds_solve);
+}
+
 GS4_API gs4_stats gs4_get_stats(gs4_sim *sim)
 {
     gs4_stats s;
@@ -25125,19 +25329,7 @@ GS4_API gs4_stats gs4_get_stats(gs4_sim *sim)
     memset(&s, 0, sizeof s);
     if (!sim) return s;
     gs4i_settle_edit(sim);
-    s.time = sim->time;
-    s.time_left = sim->time_left;
-    s.steps = sim->steps;
-    s.dt = sim->last_dt;
-    s.particles = sim->particles.count;
-    s.stress_substeps = sim->split;
-    s.stress_bounded = sim->bounded;
-    s.active_cells = sim->grid.active * GS4I_BLOCK_NODES;
-    s.memory_bytes = sim->memory.bytes;
-    s.heat_iterations = sim->conduction.system.iterations;
-    s.solver_residual = fmax(sim->conduction.system.residual, sim->staggered.residual);
-    s.pressure_iterations = sim->staggered.iterations;
-    s.viscous_iterations = sim->staggered.viscous_iterations;
+    gs4i_count_stats(sim, &s);
     for (i = 0; i < (size_t)sim->particles.count; i++) {
         const gs4_real *at = sim->particles.position + 4 * i,
                        *moves = sim->particles.velocity + 4 * i;
@@ -25169,11 +25361,6 @@ GS4_API gs4_stats gs4_get_stats(gs4_sim *sim)
     s.min_volume_ratio = least;
     s.max_volume_ratio = most;
     s.occupied_volume = gs4i_occupied_volume(sim);
-    s.seconds_total = sim->seconds[GS4I_CLOCK_TOTAL];
-    s.seconds_sort = sim->seconds[GS4I_CLOCK_SORT];
-    s.seconds_solve = sim->seconds[GS4I_CLOCK_SOLVE];
-    /* stress is evaluated within the transfers */
-    s.seconds_transfer = fmax(0, s.seconds_total - s.seconds_sort - s.seconds_solve);
     return s;
 }
 
@@ -25751,7 +25938,6 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_RIGID_PIVOT
 #undef GS4I_RIGID_RANGE
 #undef GS4I_STOKES_SPRAY
-#undef GS4I_STOKES_STIFFEST
 #undef GS4I_STRIP
 #undef GS4I_STRONG
 #undef GS4I_SUM
@@ -25833,4 +26019,8 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  * momentum. Its sound is within 1.5 % at 20 cells a wave, before 2.5. Incompressible liquid slides
  * around slippery colliders, which braked it or, where they turned, gave it energy without end.
  * What meets a separating wall in its first step is thrown back no more. Separating colliders, with
- * the partitioned scheme too; there a step much longer than the last one gives no energy. */
+ * the partitioned scheme too; there a step much longer than the last one gives no energy.
+ * gs4_limit_name; gs4_stats has `refused`. gs4_advance tries half of what was refused, before
+ * half of the limit, which a max_dt could keep the same. Semi-implicit: steps are limited by
+ * what moves, not by a fall that viscosity holds; viscosity is not cut off at s mu/(rho h^2) of
+ * 1e6 any more, beyond which all crept too fast; the residual counts volume beside what flows. */

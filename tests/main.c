@@ -127,6 +127,7 @@ int main(int count, char **values)
     RUN_ONCE(test_reference);
     RUN_ONCE(test_stability);
     RUN(test_stability_by_hand);
+    RUN(test_stability_names);
     RUN(test_stability_of_turning);
     RUN_FULL(test_stability_of_blades);
     RUN_ONCE(test_stability_of_two_densities);

@@ -454,6 +454,154 @@ static void test_semi_order(void)
 
 /* --- what it has not -------------------------------------------------------------------------- */
 
+/* --- surfaces that creep level --------------------------------------------------------------- */
+
+/* A pool of n cells along `across`, half as deep, that starts with a wave half as long as the box,
+ * 0.02 high, on a sticky floor between slippery walls. Creeping, inertia apart, waves on a pool of
+ * depth H fall by exp(-r t) (Orchard 1962):
+ *     r = g/(2 nu k) (sinh kH cosh kH - kH)/(cosh^2 kH + (kH)^2) */
+static gs4_sim *semi_wave(int n, int down, int across, double viscosity, gs4_integrator how)
+{
+    static gs4_real points[3 * 64 * 32 * 8 + 3];
+    const double k = 3.14159265358979, H = 0.5, d = 0.5 / n;
+    gs4_sim_desc desc = semi_cube(n);
+    const gs4_material m = partitioned_liquid(1000 * viscosity);
+    gs4_real gravity[3] = { 0, 0, 0 };
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    gs4_sim *sim;
+    int i, count = 0;
+    desc.cells[3 - down - across] = 4;
+    gravity[down] = -1;
+    desc.gravity = at(gravity[0], gravity[1], gravity[2]);
+    desc.integrator = how;
+    for (i = 0; i < 6; i++) desc.walls[i] = i == 2 * down ? GS4_WALL_STICK : GS4_WALL_SLIP;
+    CHECK_RESULT(NULL, gs4_create(&desc, &sim), GS4_OK);
+    f.material = gs4_add_material(sim, &m);
+    for (i = 0; i < 2 * n * n * 8; i++) {
+        const double a = (i % (2 * n) + 0.5) * d, b = (i / (2 * n) % n + 0.5) * d;
+        points[3 * count + across] = (gs4_real)(a - 0.02 * cosh(k * b) / sinh(k * H) * sin(k * a));
+        points[3 * count + down] = (gs4_real)(b + 0.02 * sinh(k * b) / sinh(k * H) * cos(k * a));
+        points[3 * count + 3 - down - across] = (gs4_real)((i / (2 * n * n) + 0.5) * d);
+        count++;
+    }
+    CHECK_RESULT(sim, gs4_add_points(sim, points, count, (gs4_real)(d * d * d), &f), GS4_OK);
+    return sim;
+}
+
+/* The height of the wave, in units of its first. */
+static double semi_wave_height(const gs4_sim *sim, int down, int across)
+{
+    const double k = 3.14159265358979;
+    const gs4_view x = gs4_particles(sim, GS4_FIELD_POSITION);
+    double sum = 0;
+    int i;
+    for (i = 0; i < x.count; i++)
+        sum += (double)x.data[i * x.stride + down] * cos(k * (double)x.data[i * x.stride + across]);
+    return sum / x.count / (0.5 * 0.02);
+}
+
+static double semi_wave_rate(double nu)
+{
+    const double k = 3.14159265358979, kH = 0.5 * k;
+    return (sinh(kH) * cosh(kH) - kH) / (cosh(kH) * cosh(kH) + kH * kH) / (2 * nu * k);
+}
+
+/* The wave falls to a third of its height in 11 pieces of a tenth of the time constant each, taken
+ * as gs4_advance likes: GS4 in these steps follows exp to second order, backward Euler falls by
+ * 1/(1 + r dt) a step. Viscosities are 1e4 to 1e12 times what a step could have in an explicit
+ * scheme. */
+static void semi_level(int n, int c, double viscosity, double within)
+{
+    const int down = c % 3, across = (down + 1 + c / 3) % 3;
+    const gs4_integrator how = semi_integrators[c & 1];
+    const double z = 0.1, dt = z / semi_wave_rate(viscosity);
+    gs4_sim *sim = semi_wave(n, down, across, viscosity, how);
+    double before, fell;
+    int i;
+    CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)dt), GS4_OK);
+    before = semi_wave_height(sim, down, across);
+    for (i = 0; i < 10; i++) CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)dt), GS4_OK);
+    fell = log(before / semi_wave_height(sim, down, across));
+    if (test_filter[0])
+        printf("%d cells, axes %d %d, viscosity %g: rate %.4f, %d steps\n", n, down, across,
+               viscosity, fell / (10 * z), (int)gs4_get_stats(sim).steps);
+    CHECK_CLOSE(fell / (10 * (how == GS4_INTEGRATOR_GS4 ? z : log(1 + z))), 1, within);
+    CHECK(viscosity > 10 || strcmp(gs4_limit_name(sim), "surface") == 0);
+    CHECK_BETWEEN(gs4_get_stats(sim).steps, 11, viscosity > 10 ? 80 : 20);
+    CHECK(gs4_get_stats(sim).refused == 0);
+    gs4_destroy(sim);
+}
+
+static void test_semi_levelling(void)
+{
+    int c;
+    for (c = 0; c < (test_full ? 6 : 2); c++) semi_level(16, c, c == 2 ? 1e6 : 10, 0.02);
+    for (c = 0; c < 2 && test_full; c++) semi_level(32, c, 10, 0.005);
+}
+
+/* In steps of the whole limit nothing grows, swinging or creeping or between. */
+static void test_semi_levelling_limit(void)
+{
+    static const double viscosity[5] = { 0.001, 0.01, 0.1, 1, 10 };
+    int c, i;
+    for (c = 0; c < 10; c++) {
+        gs4_sim *sim = semi_wave(16, c % 3, (c + 1) % 3, viscosity[c / 2], semi_integrators[c & 1]);
+        double most = 0, late = 0;
+        for (i = 0; i < 100; i++) {
+            CHECK_RESULT(sim, gs4_step(sim, gs4_stable_dt(sim)), GS4_OK);
+            CHECK_BETWEEN(fabs(semi_wave_height(sim, c % 3, (c + 1) % 3)), 0, 1.001);
+            if (i < 50) most = fmax(most, gs4_get_stats(sim).kinetic_energy);
+            if (i > 75) late = fmax(late, gs4_get_stats(sim).kinetic_energy);
+        }
+        CHECK_BETWEEN(late, 0, viscosity[c / 2] < 0.01 ? most : 0.5 * most);
+        gs4_destroy(sim);
+    }
+}
+
+/* A block that a floor has held for long falls freely once that is pulled away: steps that outlast
+ * the fall are refused, none of them is taken, and gs4_advance finds shorter ones. */
+static void test_semi_let_fall(void)
+{
+    gs4_sim_desc d = semi_cube(16);
+    const gs4_material m = partitioned_liquid(1e7);
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    gs4_collider c;
+    gs4_pose pose;
+    gs4_stats s;
+    gs4_sim *sim;
+    uint64_t before;
+    int body;
+    d.gravity = at(0, -1, 0);
+    d.solver_tolerance = (gs4_real)1e-5;
+    CHECK_RESULT(NULL, gs4_create(&d, &sim), GS4_OK);
+    memset(&c, 0, sizeof c);
+    c.shape = gs4_box(at(0.1, 0.4, 0.1), at(0.9, 0.5, 0.9));
+    c.contact = GS4_WALL_STICK;
+    body = gs4_add_collider(sim, &c);
+    f.material = gs4_add_material(sim, &m);
+    gs4_add_particles(sim, gs4_box(at(0.25, 0.5, 0.25), at(0.75, 0.75, 0.75)), &f);
+    CHECK_RESULT(sim, gs4_advance(sim, 100), GS4_OK);
+    s = gs4_get_stats(sim);
+    CHECK_BETWEEN(s.steps, 1, 60);
+    CHECK_BETWEEN(s.max_speed, 0, 1e-5);
+    CHECK_RESULT(sim, gs4_collider_pose(sim, body, &pose), GS4_OK);
+    pose.position.x += 10;
+    CHECK_RESULT(sim, gs4_put_collider(sim, body, &pose), GS4_OK);
+    /* as if nobody had said so */
+    sim->limits_stale = 0;
+    sim->limits.max_rate = 0;
+    before = gs4_state_hash(sim);
+    CHECK_RESULT(sim, gs4_step(sim, 2), GS4_ERROR_UNSTABLE);
+    CHECK(strstr(gs4_last_error(sim), "would move") != NULL);
+    CHECK(gs4_state_hash(sim) == before);
+    CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)0.9), GS4_OK);
+    s = gs4_get_stats(sim);
+    CHECK_BETWEEN(s.refused, 1, 8);
+    /* the rate takes a step to know: a third of one, at most 0.45 s, is lost */
+    CHECK_BETWEEN(-s.momentum[1] / s.mass, 0.75, 0.9);
+    gs4_destroy(sim);
+}
+
 static void semi_refuses_material(gs4_sim *sim, gs4_material m, const char *what)
 {
     CHECK_RESULT(sim, gs4_add_material(sim, &m), GS4_ERROR_ARGUMENT);
@@ -535,6 +683,9 @@ static void run_semi_implicit(void)
     RUN_ONCE(test_semi_rest);
     RUN_FULL_ONCE(test_semi_heating);
     RUN(test_semi_order);
+    RUN_ONCE(test_semi_levelling);
+    RUN_FULL_ONCE(test_semi_levelling_limit);
+    RUN_ONCE(test_semi_let_fall);
     RUN(test_semi_refusals);
     RUN_FULL_ONCE(test_semi_flight);
     RUN_ONCE(test_semi_sound);

@@ -597,6 +597,55 @@ static void test_stability_of_blades(void)
         }
 }
 
+/* What sets the limit, in scenes that one thing rules. */
+static void test_stability_names(void)
+{
+    static const struct {
+        gs4_scheme scheme;
+        double viscosity, sound_speed, speed, gravity, max_dt, relaxation, G;
+        const char *name;
+    } scenes[] = {
+        { GS4_EXPLICIT, 0, 10, 0, 1, 0, 0, 0, "sound" },
+        { GS4_EXPLICIT, 1000, 10, 0, 1, 0, 0, 0, "viscosity" },
+        { GS4_EXPLICIT, 1, 10, 0, 1, 0, 0, 1e7, "elasticity" },
+        { GS4_EXPLICIT, 0, 1e-3, 5, 1, 0, 0, 0, "flow" },
+        { GS4_EXPLICIT, 1e-3, 1, 0, 1, 0, 1e-7, 0, "relaxation" },
+        { GS4_EXPLICIT, 0, 10, 0, 1, 1e-5, 0, 0, "max_dt" },
+        { GS4_PARTITIONED, 0, 10, 0, 1, 0, 0, 0, "surface" },
+        { GS4_PARTITIONED, 1000, 10, 0, 1, 0, 0, 0, "viscosity" },
+        { GS4_SEMI_IMPLICIT, 0, 10, 0, 1, 0, 0, 0, "surface" },
+        { GS4_SEMI_IMPLICIT, 1e6, 10, 0, 1, 0, 0, 0, "flow" },
+        { GS4_SEMI_IMPLICIT, 1e6, 10, 0, 0, 0, 0, 0, "none" },
+    };
+    size_t i;
+    for (i = 0; i < sizeof scenes / sizeof scenes[0]; i++) {
+        gs4_sim_desc d = scene_cube(8);
+        gs4_material m = scene_liquid(1000, scenes[i].viscosity, scenes[i].sound_speed);
+        const gs4_fill f = scene_fill(at(scenes[i].speed, 0, 0));
+        gs4_sim *sim;
+        d.scheme = scenes[i].scheme;
+        d.gravity = at(0, -scenes[i].gravity, 0);
+        d.max_dt = (gs4_real)scenes[i].max_dt;
+        if (scenes[i].relaxation > 0) {
+            m.liquid = GS4_OLDROYD_B;
+            m.local_fraction = (gs4_real)0.5;
+            m.relaxation_time = (gs4_real)scenes[i].relaxation;
+        }
+        if (scenes[i].G > 0) {
+            m.solid = GS4_NEO_HOOKEAN;
+            m.shear_modulus = (gs4_real)scenes[i].G;
+        }
+        CHECK_RESULT(NULL, gs4_create(&d, &sim), GS4_OK);
+        CHECK_RESULT(sim, gs4_add_material(sim, &m), 0);
+        CHECK(gs4_add_particles(sim, gs4_box(at(0.4, 0.4, 0.4), at(0.6, 0.6, 0.6)), &f) > 0);
+        if (strcmp(gs4_limit_name(sim), scenes[i].name) != 0)
+            printf("%d: %s instead of %s\n", (int)i, gs4_limit_name(sim), scenes[i].name);
+        CHECK(strcmp(gs4_limit_name(sim), scenes[i].name) == 0);
+        gs4_destroy(sim);
+    }
+    CHECK(strcmp(gs4_limit_name(NULL), "none") == 0);
+}
+
 /* The limit of a step where one thing rules it, by hand: fall, speed and fall, sound of what is
  * compressed. And what that stands on: default speeds of sound, the shear rate of a gradient. */
 static void test_stability_by_hand(void)

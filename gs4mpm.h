@@ -24791,7 +24791,7 @@ GS4_API int gs4_step(gs4_sim *sim, gs4_real dt)
 /* What gs4_advance takes at most, s. Steps of the semi-implicit scheme go from a fall to creeping,
  * which may be a million times as long: by twice each, as rates of a short step say little of a
  * long one (levelling waves: heights off by .007 of the first, by .08 to .13 where steps grow at
- * once; test_semi_levelling). */
+ * once). */
 static double gs4i_longest_dt(const gs4_sim *sim)
 {
     double dt = sim->desc.max_dt > 0 ? (double)sim->desc.max_dt : (double)GS4I_HUGE;

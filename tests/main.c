@@ -31,6 +31,7 @@
 #include "test_partitioned_flows.c"
 #include "test_partitioned_exact.c"
 #include "test_semi_implicit.c"
+#include "test_semi_viscoelastic.c"
 #include "test_mesh.c"
 #include "test_reference.c"
 
@@ -123,6 +124,7 @@ int main(int count, char **values)
     run_partitioned_flows();
     run_partitioned_exact();
     run_semi_implicit();
+    run_semi_viscoelastic();
     run_mesh();
     RUN_ONCE(test_reference);
     RUN_ONCE(test_stability);

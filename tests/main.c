@@ -2,7 +2,7 @@
  * With -DGS4_FEW: `few ...` runs scenes of fuzz.c and determinism.c. */
 #define GS4MPM_IMPLEMENTATION
 #include "gs4mpm.h"
-#ifdef GS4_TESTS_UNOPTIMIZED /* they compile in half the time, see run.sh */
+#ifdef GS4_TESTS_QUICK /* they compile in half the time, see run.sh */
 #pragma GCC optimize("O0")
 #endif
 #include "test.h"
@@ -46,18 +46,18 @@ int main(int count, char **values)
     if (count > 1 && strcmp(values[1], "few") == 0) return few(count - 1, values + 1);
 #endif
     test_arguments(count, values);
-    RUN(test_free_flight);
+    RUN_ONCE(test_free_flight);
     RUN_FULL(test_spin);
-    RUN_ONCE(test_momentum);
+    RUN_FULL(test_momentum);
     RUN_ONCE(test_momentum_seam);
-    RUN_ONCE(test_poiseuille);
+    RUN_FULL(test_poiseuille);
     RUN_FULL(test_shear_wave);
     RUN_FULL(test_stokes_first);
     RUN_FULL_ONCE(test_couette);
-    RUN_ONCE(test_couette_surface);
+    RUN_FULL(test_couette_surface);
     RUN_ONCE(test_sticky_askew);
     RUN_FULL(test_sticky_pipe);
-    RUN_ONCE(test_column_at_rest);
+    RUN_FULL(test_column_at_rest);
     RUN_ONCE(test_sound_speed);
     RUN(test_sharp_mirrors);
     RUN_FULL(test_drop_at_rest);
@@ -71,7 +71,7 @@ int main(int count, char **values)
     RUN(test_stress_edited_euler);
     RUN_SLOW(test_drop_draws_back);
     RUN_SLOW(test_die_swell);
-    RUN_ONCE(test_heat_modes);
+    RUN_FULL(test_heat_modes);
     RUN_FULL(test_heat_order_in_time);
     RUN_ONCE(test_heat_stiff);
     RUN_FULL(test_heat_pulse);
@@ -80,7 +80,7 @@ int main(int count, char **values)
     RUN(test_heat_periodic_mean);
     RUN_ONCE(test_heat_breakdown);
     RUN_FULL(test_heat_on_each_wall);
-    RUN_ONCE(test_heat_one_wall);
+    RUN_FULL(test_heat_one_wall);
     RUN_ONCE(test_heat_drifts);
     RUN_ONCE(test_heat_around);
     RUN_ONCE(test_heat_walls);
@@ -93,7 +93,7 @@ int main(int count, char **values)
     RUN_FULL(test_heat_cycles);
     RUN_FULL(test_heat_of_viscosity);
     RUN_FULL(test_heat_slowly);
-    RUN_ONCE(test_phase_freezing);
+    RUN_FULL(test_phase_freezing);
     RUN_FULL(test_phase_melting);
     RUN_ONCE(test_phase_between);
     RUN_ONCE(test_phase_forgets);
@@ -103,10 +103,10 @@ int main(int count, char **values)
     RUN(test_heat_glass);
     RUN(test_heat_not_converged);
     RUN_ONCE(test_heat_poured);
-    RUN_ONCE(test_heat_uneven_steps);
+    RUN_FULL(test_heat_uneven_steps);
     RUN_FULL(test_heat_draws);
-    RUN_ONCE(test_heat_partitioned);
-    RUN_ONCE(test_heat_semi_implicit);
+    RUN_FULL(test_heat_partitioned);
+    RUN_FULL(test_heat_semi_implicit);
     run_solid();
     run_errors();
     run_files();
@@ -127,13 +127,13 @@ int main(int count, char **values)
     run_semi_viscoelastic();
     run_mesh();
     RUN_ONCE(test_reference);
-    RUN_ONCE(test_stability);
+    RUN_FULL(test_stability);
     RUN(test_stability_by_hand);
     RUN(test_stability_names);
     RUN(test_stability_of_turning);
     RUN_FULL(test_stability_of_blades);
     RUN_ONCE(test_stability_of_two_densities);
-    RUN_ONCE(test_extremes);
+    RUN_FULL(test_extremes);
     RUN_FULL(test_short_decay);
     RUN(test_tiny_step);
     RUN(test_thickening);

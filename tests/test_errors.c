@@ -2641,9 +2641,9 @@ static void run_errors(void)
     RUN(test_errors_desc);
     RUN(test_errors_material);
     RUN_ONCE(test_errors_fill);
-    RUN_ONCE(test_errors_collider);
+    RUN_FULL(test_errors_collider);
     RUN(test_errors_large_emitter);
-    RUN_ONCE(test_errors_emitter);
+    RUN_FULL(test_errors_emitter);
     RUN(test_errors_calls);
     RUN(test_errors_points);
     RUN(test_errors_null);
@@ -2664,7 +2664,7 @@ static void run_errors(void)
     RUN(test_errors_material_all_or_nothing);
     RUN(test_errors_point);
     RUN(test_errors_refused_step);
-    RUN_ONCE(test_errors_viscosity_callback);
+    RUN_FULL(test_errors_viscosity_callback);
     RUN_FULL(test_errors_viscosity_that_turns);
     RUN(test_errors_no_end);
     RUN_FULL(test_errors_fast_pom_pom);

@@ -1678,7 +1678,7 @@ static void run_files(void)
     RUN_FULL(test_files_memory);
     RUN(test_files_fast_collider);
     RUN_ONCE(test_files_load_refused);
-    RUN(test_files_frames);
+    RUN_ONCE(test_files_frames);
     RUN(test_files_places);
     RUN(test_files_previous);
 #ifdef FILES_LINKS
@@ -1687,11 +1687,11 @@ static void run_files(void)
 #ifdef FILES_UNIX
     RUN_ONCE(test_files_two_writers);
 #endif
-    RUN_ONCE(test_files_continue);
+    RUN_FULL(test_files_continue);
     RUN(test_files_continue_frozen);
     RUN_ONCE(test_files_continue_edited);
     RUN(test_files_bad_edit);
-    RUN_ONCE(test_files_damaged);
+    RUN_FULL(test_files_damaged);
     RUN_ONCE(test_files_forged);
     RUN_ONCE(test_files_forged_order);
     RUN_ONCE(test_files_forged_anywhere);

@@ -647,7 +647,7 @@ static void run_mesh(void)
     RUN(test_mesh_box);
     RUN_ONCE(test_mesh_ball);
     RUN_FULL(test_mesh_parts);
-    RUN(test_mesh_table);
+    RUN_ONCE(test_mesh_table);
     RUN_FULL(test_mesh_table_moves);
     RUN(test_mesh_stray);
     RUN(test_mesh_far);

@@ -331,9 +331,9 @@ static void test_partitioned_walls_bits(void)
 static void run_partitioned_walls(void)
 {
     RUN(test_partitioned_walls_let_go);
-    RUN_ONCE(test_partitioned_walls_slug);
+    RUN_FULL(test_partitioned_walls_slug);
     RUN_FULL(test_partitioned_walls_thrown);
-    RUN_ONCE(test_partitioned_walls_rest);
+    RUN_FULL(test_partitioned_walls_rest);
     RUN(test_partitioned_walls_piston);
     RUN_FULL_ONCE(test_partitioned_walls_symmetry);
     RUN_FULL(test_partitioned_walls_bits);

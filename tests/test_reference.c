@@ -2,12 +2,12 @@
  * particles, the same steps, in small scenes that between them have every wall on every side,
  * members of the family, materials, short and long decay, uneven steps, spray, and particles
  * that change blocks. */
-#ifdef GS4_TESTS_UNOPTIMIZED /* this would take two thirds of the test */
+#ifdef GS4_TESTS_QUICK /* this would take two thirds of the test */
 #pragma GCC push_options
 #pragma GCC optimize("O1")
 #endif
 #include "reference_step.h"
-#ifdef GS4_TESTS_UNOPTIMIZED
+#ifdef GS4_TESTS_QUICK
 #pragma GCC pop_options
 #endif
 

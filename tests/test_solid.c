@@ -1054,6 +1054,6 @@ static void run_solid(void)
     RUN(test_solid_huge_steps);
     RUN_ONCE(test_solid_state);
     RUN(test_solid_is_paid_for_where_it_is);
-    RUN_ONCE(test_solid_memory);
+    RUN_FULL(test_solid_memory);
     RUN_FULL(test_solid_stability);
 }

@@ -720,13 +720,13 @@ static void test_symmetry_points(void)
 
 static void run_symmetry(void)
 {
-    RUN_ONCE(test_symmetry_flows);
+    RUN_FULL(test_symmetry_flows);
     RUN_ONCE(test_symmetry_walls);
     RUN_FULL(test_symmetry_bodies);
     RUN_FULL(test_symmetry_solids);
     RUN_FULL(test_symmetry_stress);
-    RUN_ONCE(test_symmetry_heat);
-    RUN_ONCE(test_symmetry_emitters);
+    RUN_FULL(test_symmetry_heat);
+    RUN_FULL(test_symmetry_emitters);
     RUN_ONCE(test_symmetry_fills);
     RUN_ONCE(test_symmetry_all);
     RUN_ONCE(test_symmetry_poisson);

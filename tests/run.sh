@@ -11,6 +11,7 @@ set -u
 cd "$(dirname "$0")/.." || exit 1
 CC=${CC:-cc}; export CC
 quick='-Og -fexpensive-optimizations -ftree-sra -ftree-pta -fmove-loop-invariants -fif-conversion'
+echo 'int main(void) { return 0; }' | $CC $quick -S -x c - -o - > /dev/null 2>&1 || quick=-O1 # clang has them not
 quick="$quick -Dalways_inline=unused -DGS4_TESTS_QUICK"
 case "${1:-}" in
     '') slow='' part=quick level="$quick" ;;

@@ -548,7 +548,7 @@ static void run_semi_viscoelastic(void)
     RUN_FULL_ONCE(test_semi_elastic_heating);
     RUN_FULL_ONCE(test_semi_elastic_splash);
     RUN_FULL(test_semi_elastic_newtonian);
-    RUN(test_semi_elastic_order);
+    RUN_FULL(test_semi_elastic_order);
     RUN_FULL_ONCE(test_semi_elastic_wave);
     RUN_FULL_ONCE(test_semi_overshoot);
     RUN_FULL(test_semi_elastic_steady);

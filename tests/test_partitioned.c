@@ -435,26 +435,21 @@ typedef struct partitioned_run {
     double x[PARTITIONED_MOST], v[PARTITIONED_MOST];
 } partitioned_run;
 
-/* A drop that strains and turns, for so short a time that no cell becomes liquid or air. */
-static int partitioned_drop(const gs4_material *m, double rho, int be, int without_split, int steps,
-                            partitioned_run *out)
+/* A drop of the radius R in an open cube, which strains and turns. */
+static gs4_sim *partitioned_strained(gs4_sim_desc d, const gs4_material *m, double R)
 {
-    gs4_sim_desc d = partitioned_cube(16);
     gs4_fill f = scene_fill(at(0, 0, 0));
     gs4_sim *sim;
     gs4_view x;
     gs4_edit v;
-    int i, count;
+    int i;
     for (i = 0; i < 6; i++) d.walls[i] = GS4_WALL_OPEN;
-    d.integrator = be ? GS4_INTEGRATOR_BACKWARD_EULER : GS4_INTEGRATOR_GS4;
-    d.rho_inf = (gs4_real)rho;
-    d.solver_tolerance = (gs4_real)1e-12;
     CHECK_RESULT(NULL, gs4_create(&d, &sim), GS4_OK);
     f.material = gs4_add_material(sim, m);
-    count = gs4_add_particles(sim, gs4_sphere(at(0.5, 0.5, 0.5), (gs4_real)0.33), &f);
+    gs4_add_particles(sim, gs4_sphere(at(0.5, 0.5, 0.5), (gs4_real)R), &f);
     v = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
     x = gs4_particles(sim, GS4_FIELD_POSITION);
-    for (i = 0; i < count; i++) {
+    for (i = 0; i < x.count; i++) {
         const gs4_real *p = x.data + i * x.stride;
         gs4_real *u = v.data + i * v.stride;
         const double a = (double)p[0] - 0.5, b = (double)p[1] - 0.5, c = (double)p[2] - 0.5;
@@ -462,6 +457,21 @@ static int partitioned_drop(const gs4_material *m, double rho, int be, int witho
         u[1] = (gs4_real)(2 * a - 0.5 * b + 0.2 * c);
         u[2] = (gs4_real)(-0.5 * c);
     }
+    return sim;
+}
+
+/* It, for so short a time that no cell becomes liquid or air. */
+static int partitioned_drop(const gs4_material *m, double rho, int be, int without_split, int steps,
+                            partitioned_run *out)
+{
+    gs4_sim_desc d = partitioned_cube(16);
+    gs4_sim *sim;
+    int count;
+    d.integrator = be ? GS4_INTEGRATOR_BACKWARD_EULER : GS4_INTEGRATOR_GS4;
+    d.rho_inf = (gs4_real)rho;
+    d.solver_tolerance = (gs4_real)1e-12;
+    sim = partitioned_strained(d, m, 0.33);
+    count = gs4_particles(sim, GS4_FIELD_POSITION).count;
     sim->staggered.without_split = without_split;
     partitioned_steps(sim, 0.008, steps);
     scene_by_id(sim, GS4_FIELD_POSITION, out->x);

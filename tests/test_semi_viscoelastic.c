@@ -24,29 +24,14 @@ static int semi_elastic_drop(const gs4_material *m, double rho, gs4_integrator h
                              semi_elastic_run *out)
 {
     gs4_sim_desc d = semi_cube(16);
-    gs4_fill f = scene_fill(at(0, 0, 0));
     gs4_sim *sim;
-    gs4_view x;
-    gs4_edit v;
-    int i, count;
-    for (i = 0; i < 6; i++) d.walls[i] = GS4_WALL_OPEN;
+    int count;
     d.integrator = how;
     d.rho_inf = (gs4_real)rho;
     d.solver_tolerance = (gs4_real)1e-11;
-    CHECK_RESULT(NULL, gs4_create(&d, &sim), GS4_OK);
-    f.material = gs4_add_material(sim, m);
-    count = gs4_add_particles(sim, gs4_sphere(at(0.5, 0.5, 0.5), (gs4_real)0.24), &f);
+    sim = partitioned_strained(d, m, 0.24);
+    count = gs4_particles(sim, GS4_FIELD_POSITION).count;
     CHECK(count > 1000 && count < SEMI_ELASTIC_MOST);
-    v = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
-    x = gs4_particles(sim, GS4_FIELD_POSITION);
-    for (i = 0; i < count; i++) {
-        const gs4_real *p = x.data + i * x.stride;
-        gs4_real *u = v.data + i * v.stride;
-        const double a = (double)p[0] - 0.5, b = (double)p[1] - 0.5, c = (double)p[2] - 0.5;
-        u[0] = (gs4_real)(a - 2 * b);
-        u[1] = (gs4_real)(2 * a - 0.5 * b + 0.2 * c);
-        u[2] = (gs4_real)(-0.5 * c);
-    }
     partitioned_steps(sim, 0.008, steps);
     scene_by_id(sim, GS4_FIELD_POSITION, out->x);
     scene_by_id(sim, GS4_FIELD_VELOCITY, out->v);
@@ -107,7 +92,7 @@ static void semi_elastic_wave(int n, gs4_integrator how, const double law[3], in
     gs4_sim_desc d = semi_cube(n);
     gs4_material m = semi_elastic(mu_s + mu_p, mu_s / (mu_s + mu_p), lambda);
     gs4_fill f = scene_fill(at(0, 0, 0));
-    double a[16], s[5] = { 0, 0, 0, 0, 0 }, p, q, det, size[3];
+    double a[16], size[3];
     gs4_edit v;
     gs4_view x, u;
     gs4_sim *sim;
@@ -135,19 +120,9 @@ static void semi_elastic_wave(int n, gs4_integrator how, const double law[3], in
             a[t] += (double)u.data[i * u.stride + axis]
                     * sin(k * (double)x.data[i * x.stride + across]) / (0.05 * u.count);
         partitioned_steps(sim, step, (int)ceil(step / dt));
-        if (t < 2) continue;
-        s[0] += a[t - 1] * a[t - 1];
-        s[1] += a[t - 1] * a[t - 2];
-        s[2] += a[t - 2] * a[t - 2];
-        s[3] += a[t] * a[t - 1];
-        s[4] += a[t] * a[t - 2];
     }
     gs4_destroy(sim);
-    det = s[0] * s[2] - s[1] * s[1];
-    p = (s[3] * s[2] - s[4] * s[1]) / det;
-    q = (s[4] * s[0] - s[3] * s[1]) / det;
-    *decay = -0.5 * log(-q) / step / b;
-    *frequency = acos(p / (2 * sqrt(-q))) / step / w;
+    elastic_fit(a, step, b, w, decay, frequency);
 }
 
 /* At ten times the step of the explicit scheme's test, within its bounds of frequency from above
@@ -182,28 +157,6 @@ static void test_semi_elastic_wave(void)
     }
 }
 
-/* Liquid of density 1 between sticky walls 1 apart across `across`, driven along `axis`. */
-static gs4_sim *semi_elastic_channel(int n, const gs4_material *m, double g, int axis, int across,
-                                     gs4_integrator how)
-{
-    const gs4_fill f = scene_fill(at(0, 0, 0));
-    gs4_sim_desc d = semi_cube(n);
-    double size[3];
-    gs4_sim *sim;
-    int c;
-    for (c = 0; c < 3; c++) {
-        if (c != across) d.cells[c] = 4;
-        d.walls[2 * c] = d.walls[2 * c + 1] = c == across ? GS4_WALL_STICK : GS4_WALL_PERIODIC;
-        size[c] = (double)d.cells[c] / n;
-    }
-    d.integrator = how;
-    d.gravity = at(axis == 0 ? g : 0, axis == 1 ? g : 0, axis == 2 ? g : 0);
-    CHECK_RESULT(NULL, gs4_create(&d, &sim), GS4_OK);
-    CHECK_RESULT(sim, gs4_add_material(sim, m), 0);
-    CHECK(gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(size[0], size[1], size[2])), &f) > 0);
-    return sim;
-}
-
 /* Steady flow in steps of a hundred times the explicit limit 0.4 h^2/nu, from rest. Faces have the
  * parabola and h^2 of the walls, as of Newton's liquid: that error times n^2, in the middle and the
  * worst of it; errors of particles: velocity (2-norm) over the largest, shear stress over that at
@@ -222,7 +175,7 @@ static semi_steady semi_elastic_steady(int n, double local, double U, gs4_integr
     gs4_sim *sim;
     int i;
     m.density = 1;
-    sim = semi_elastic_channel(n, &m, 8 * U * nu, axis, across, how);
+    sim = semi_channel_at_rest(n, &m, 8 * U * nu, axis, across, how);
     partitioned_steps(sim, 20, n * n / 4);
     x = gs4_particles(sim, GS4_FIELD_POSITION);
     v = gs4_particles(sim, GS4_FIELD_VELOCITY);
@@ -285,7 +238,7 @@ static void semi_overshoot(int n, const double c[4], int axis, int across, doubl
     gs4_sim *sim;
     int k;
     m.density = 1;
-    sim = semi_elastic_channel(n, &m, 4, axis, across, GS4_INTEGRATOR_GS4);
+    sim = semi_channel_at_rest(n, &m, 4, axis, across, GS4_INTEGRATOR_GS4);
     for (k = 0; k < 3 || u[2] > u[1]; k++) {
         double s[5] = { 0, 0, 0, 0, 0 };
         gs4_view x, v;

@@ -10,6 +10,27 @@ static gs4_material viscoelastic_liquid(double mu, double local, double lambda, 
     return m;
 }
 
+/* Decay over b and frequency over w of what swings with 16 amplitudes a `step` apart, by the least
+ * squares of a_n+2 = p a_n+1 + q a_n. */
+static void elastic_fit(const double a[16], double step, double b, double w, double *decay,
+                        double *frequency)
+{
+    double s[5] = { 0, 0, 0, 0, 0 }, p, q, det;
+    int t;
+    for (t = 2; t < 16; t++) {
+        s[0] += a[t - 1] * a[t - 1];
+        s[1] += a[t - 1] * a[t - 2];
+        s[2] += a[t - 2] * a[t - 2];
+        s[3] += a[t] * a[t - 1];
+        s[4] += a[t] * a[t - 2];
+    }
+    det = s[0] * s[2] - s[1] * s[1];
+    p = (s[3] * s[2] - s[4] * s[1]) / det;
+    q = (s[4] * s[0] - s[3] * s[1]) / det;
+    *decay = -0.5 * log(-q) / step / b;
+    *frequency = acos(p / (2 * sqrt(-q))) / step / w;
+}
+
 /* Shear wave u_x = a(t) sin(2 pi y) in a periodic box, exact at any amplitude (shared reference:
  * shear_wave): a' = -mu_s k^2 a - b, lambda b' = mu_p k^2 a - b, so a has the decay d and the
  * frequency w of the roots of (z + mu_s k^2)(lambda z + 1) + mu_p k^2 = 0. Both are fitted to a
@@ -23,7 +44,7 @@ static void elastic_wave(int n, gs4_integrator integrator, double mu_s, double m
     gs4_sim_desc d = scene_cube(n);
     gs4_material m = viscoelastic_liquid(mu_s + mu_p, mu_s / (mu_s + mu_p), lambda, 5);
     gs4_fill f = scene_fill(at(0, 0, 0));
-    double a[16], s[5] = { 0, 0, 0, 0, 0 }, p, q, det;
+    double a[16];
     gs4_edit v;
     gs4_view x, u;
     gs4_sim *sim;
@@ -47,19 +68,9 @@ static void elastic_wave(int n, gs4_integrator integrator, double mu_s, double m
             a[t] += (double)u.data[(size_t)i * (size_t)u.stride]
                     * sin(k * (double)x.data[(size_t)i * (size_t)x.stride + 1]) / (0.05 * u.count);
         CHECK(physics_run(sim, (t + 1) * step) == 0);
-        if (t < 2) continue;
-        s[0] += a[t - 1] * a[t - 1];
-        s[1] += a[t - 1] * a[t - 2];
-        s[2] += a[t - 2] * a[t - 2];
-        s[3] += a[t] * a[t - 1];
-        s[4] += a[t] * a[t - 2];
     }
     gs4_destroy(sim);
-    det = s[0] * s[2] - s[1] * s[1];
-    p = (s[3] * s[2] - s[4] * s[1]) / det;
-    q = (s[4] * s[0] - s[3] * s[1]) / det;
-    *decay = -0.5 * log(-q) / step / b;
-    *frequency = acos(p / (2 * sqrt(-q))) / step / w;
+    elastic_fit(a, step, b, w, decay, frequency);
 }
 
 /* The four interpolations of a step see (1 - (k h)^2/8) of a wave each: its frequency is 1.0 to

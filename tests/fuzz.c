@@ -826,6 +826,7 @@ static int take_step(void)
     const double stable = (double)gs4_stable_dt(r.s.sim), part = number(1, 8, 8);
     const gs4_real dt = any((gs4_real)(stable * (one_in(20) ? 1.5 : part)));
     int result;
+    check(stable > 0 || strcmp(gs4_limit_name(r.s.sim), "none") == 0, "what limits", stable);
     begin_time("gs4_step");
     result = gs4_step(r.s.sim, dt);
     if (result == GS4_OK) check_time((double)dt);
@@ -1236,6 +1237,7 @@ static int use_nothing(void)
     bad +=
         gs4_particles(NULL, GS4_FIELD_MASS).data || gs4_edit_particles(NULL, GS4_FIELD_MASS).data;
     bad += gs4_particle_ids(NULL) || gs4_particle_materials(NULL) || gs4_state_hash(NULL);
+    bad += strcmp(gs4_limit_name(NULL), "none") != 0;
     bad += gs4_stable_dt(NULL) != 0 || gs4_get_stats(NULL).particles || gs4_get_desc(NULL).cells[0];
     bad += gs4_material_preset(NULL, NULL) != GS4_ERROR_ARGUMENT;
     bad += gs4_version() != GS4_VERSION || gs4_real_size() != (int)sizeof real;

@@ -294,10 +294,10 @@ few_hashes() {
 }
 
 all_hashes() {
-    reference "$1" 500
+    reference "$1" 250
     for cc in gcc clang; do
         have $cc || continue
-        for level in -O0 '-O3 -march=native' '-O2 -std=c99'; do same "$cc $level" "$cc $level" ""; done
+        for level in '-O0 -std=c99' '-O3 -march=native'; do same "$cc $level" "$cc $level" ""; done
     done
     have g++ && same "g++" "g++ -x c++ -O1" ""
     same "GS4_NO_VECTORS" "$CC -O1 -DGS4_NO_VECTORS" ""
@@ -308,9 +308,11 @@ all_hashes() {
 scenes() {
     for cc in gcc clang; do
         have $cc || continue
-        $cc -O2 -w -I. tests/random_scenes.c -o "$tmp/scenes" -lm && "$tmp/scenes" steps=10 > "$tmp/scenes.hashes"
-        check "$cc: 100 scenes" grep '^100 scenes' "$tmp/scenes.hashes"
-        for level in '-O0 -DGS4_PTHREADS -pthread' '-O3 -march=native'; do check "$cc $level" same_scenes "$cc" "$level"; done
+        [ $cc = gcc ] && level=-O2 || level='-O3 -march=native'
+        $cc $level -w -I. tests/random_scenes.c -o "$tmp/scenes" -lm && "$tmp/scenes" steps=10 > "$tmp/scenes.hashes"
+        check "$cc $level: 100 scenes" grep '^100 scenes' "$tmp/scenes.hashes"
+        [ $cc = clang ] || check "gcc -O3 -march=native" same_scenes gcc '-O3 -march=native'
+        check "$cc -O0, threads" same_scenes $cc '-O0 -DGS4_PTHREADS -pthread'
     done
 }
 same_scenes() {
@@ -323,8 +325,8 @@ hashes_double() { all_hashes -DGS4_DOUBLE; }
 
 bunnies() {
     scene=scene=bunny
-    reference "" 500
-    for level in -O0 '-O3 -march=native'; do same "$level" "$CC $level" ""; done
+    reference "" 250
+    for level in '-O0 -std=c99' '-O3 -march=native'; do same "$level" "$CC $level" ""; done
     threads_and_checkpoint
     scene=''
 }
@@ -332,8 +334,8 @@ bunnies() {
 # Stress that depends on what was before: the robust paths of single particles among them
 history() {
     for scene in elastic=1 solid=1 heat=1; do
-        reference "" 300
-        for level in -O0 '-O3 -march=native'; do same "$level" "$CC $level" ""; done
+        reference "" 200
+        for level in '-O0 -std=c99' '-O3 -march=native'; do same "$level" "$CC $level" ""; done
         same "GS4_NO_VECTORS" "$CC -O1 -DGS4_NO_VECTORS" ""
         threads_and_checkpoint
     done
@@ -354,14 +356,14 @@ fused_for() {
     for real in '' -DGS4_DOUBLE; do check "$* $real" unfused "$@" $real; done
 }
 # gcc fuses while it vectorizes: in float as eagerly as any flag makes it, in double as users ask. clang's front end decides what may
-# be fused, and is asked at levels that are quick; its -ffp-contract=fast does not ask the source.
+# be fused, which -O0 shows; its -ffp-contract=fast does not ask the source.
 fused() {
     for cc in gcc clang; do
         have $cc || continue
         $cc -march=x86-64-v4 -E -x c /dev/null > /dev/null 2>&1 || { skip "needs $cc for x86-64"; continue; }
         check "$cc: contraction of the code around is as it was" fuses $cc -O2 -mfma -ffp-contract=fast
         fused_for $cc -O0 -mfma
-        [ $cc = gcc ] || { check "$cc -O2 -march=x86-64-v3" unfused $cc -O2 -march=x86-64-v3; fused_for $cc -O1 -march=x86-64-v4; continue; }
+        [ $cc = gcc ] || { check "$cc -O2 -march=x86-64-v3" unfused $cc -O2 -march=x86-64-v3; continue; }
         fused_for gcc -O2 -march=x86-64-v3
         check "gcc, eager" unfused gcc -O3 -march=x86-64-v4 -ffp-contract=fast -ftree-slp-vectorize -fvect-cost-model=unlimited
         check "gcc -O3 -march=x86-64-v4 -DGS4_DOUBLE" unfused gcc -O3 -march=x86-64-v4 -DGS4_DOUBLE
@@ -370,7 +372,7 @@ fused() {
     check "aarch64: contraction of the code around is as it was" fuses aarch64-linux-gnu-gcc -O2
     # armv8.3-a has all that armv8-a has, and products of complex numbers
     fused_for aarch64-linux-gnu-gcc -O3 -march=armv8.3-a
-    have clang && fused_for clang --target=aarch64-linux-gnu -isystem /usr/aarch64-linux-gnu/include -O1 -march=armv8.3-a
+    have clang && fused_for clang --target=aarch64-linux-gnu -isystem /usr/aarch64-linux-gnu/include -O0 -march=armv8.3-a
 }
 
 # ==== sanitizers ===============================================================================================
@@ -434,14 +436,16 @@ main_prints() {
     (cd "$tmp" && $2 "./main$suffix" few steps=$1 checkpoint=checkpoint) > "$tmp/main.out" && tr -d '\r' < "$tmp/main.out" | diff "$tmp/reference" -
 }
 
-# machine BUILD WARNINGS STEPS [RUNNER SUFFIX]: strict; the hashes of this machine and some tests, in one program; in both precisions
+# machine BUILD WARNINGS STEPS [RUNNER SUFFIX]: strict, and the hashes of this machine, in both precisions; some tests in the first
 machine() {
+    tests=some
     for precision in ${precisions:-'' -DGS4_DOUBLE}; do
         reference "$precision" "$3"; suffix=${5:-}
         check "strict $precision" $1 -std=c99 $2 $precision -I. -c "$tmp/implementation.c" -o "$tmp/strict.o"
         check "tests/main.c $precision" $1 ${level:--O2} -w $precision -DGS4_FEW -DGS4_FEW_HASHES -I. tests/main.c -o "$tmp/main$suffix" -lm || continue
         check "hashes $precision" main_prints "$3" "${4:-}"
-        check "some tests $precision" few_of_main "${4:-}"
+        [ -z "$tests" ] || check "some tests $precision" few_of_main "${4:-}"
+        tests=
     done
 }
 
@@ -549,12 +553,13 @@ needs_only() {
 
 # ==== examples and benches =====================================================================================
 
-# builds FILE PROGRAM FLAGS...: by the line in the comment at its head, which must be there, but quickly
+# builds LEVEL FILE PROGRAM FLAGS...: by the line in the comment at its head, which must be there, but quickly
 builds() {
+    level=$1; shift
     line=$(sed -n 's/^[ *]*g*cc -O3 \(.*\)/\1/p' "$1" | head -n 1 | sed 's/ -o .*//; s/\\$//') program=$2
     [ -n "$line" ] || { echo "no line to build it with"; return 1; }
     shift 2
-    $CC -O1 $line -Wall -Wno-unused-function -Werror "$@" -lm -lpthread -o "$program"
+    $CC $level $line -Wall -Wno-unused-function -Werror "$@" -lm -lpthread -o "$program"
 }
 
 # shows FILE PROGRAM [ROW]: one frame, and whether picture and particles are there where it writes such
@@ -570,9 +575,10 @@ examples() {
     check "one object" $CC -O1 -Wall -Werror -DGS4MPM_IMPLEMENTATION -DGS4_PTHREADS -I. -x c -c gs4mpm.h -o "$tmp/gs4mpm.o"
     for file in bench/*.c examples/*.c; do
         linked=; grep -q '"example.h"' "$file" && linked="-DGS4_LINKED $tmp/gs4mpm.o"
-        check "$file is built" builds "$file" "$tmp/$(basename "$file" .c)" $linked
+        level=-O1; [ "$file" = "${file#bench}" ] || level=-O0          # benches are not run here
+        check "$file is built" builds $level "$file" "$tmp/$(basename "$file" .c)" $linked
     done
-    check "an example is built as its comment says" builds examples/drop.c "$tmp/drop"
+    check "an example is built as its comment says" builds -O1 examples/drop.c "$tmp/drop"
     for file in examples/*.c; do
         program=$tmp/$(basename "$file" .c)
         rows=$(sed -n 's/.*e\.rows = \([0-9]*\);.*/\1/p' "$file")

@@ -545,7 +545,7 @@ static void run_density(void)
     RUN(test_density_saved);
     RUN(test_density_soft);
     RUN(test_density_range);
-    RUN_FULL(test_density_piston);
+    RUN_FULL_ONCE(test_density_piston);
     RUN_FULL_ONCE(test_density_rest);
     RUN_FULL_ONCE(test_density_drops);
     RUN_SLOW(test_density_far_apart);

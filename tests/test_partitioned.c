@@ -1161,10 +1161,10 @@ static void run_partitioned(void)
     RUN_FULL(test_partitioned_bodies_at_rest);
     RUN_ONCE(test_partitioned_slope);
     RUN_FULL_ONCE(test_partitioned_ripples);
-    RUN_FULL(test_partitioned_sloshing);
+    RUN_FULL_ONCE(test_partitioned_sloshing);
     RUN_ONCE(test_partitioned_vortex);
     RUN(test_partitioned_order);
-    RUN_FULL(test_partitioned_dam);
+    RUN_FULL_ONCE(test_partitioned_dam);
     RUN_FULL(test_partitioned_moduli);
     RUN_FULL_ONCE(test_partitioned_symmetry);
     RUN_FULL(test_partitioned_stirs);

@@ -332,7 +332,7 @@ static void run_partitioned_walls(void)
 {
     RUN(test_partitioned_walls_let_go);
     RUN_FULL(test_partitioned_walls_slug);
-    RUN_FULL(test_partitioned_walls_thrown);
+    RUN_FULL_ONCE(test_partitioned_walls_thrown);
     RUN_FULL(test_partitioned_walls_rest);
     RUN(test_partitioned_walls_piston);
     RUN_FULL_ONCE(test_partitioned_walls_symmetry);

@@ -399,7 +399,7 @@ static void run_volume(void)
     RUN(test_volume_of_others);
     RUN_ONCE(test_volume_of_packed);
     RUN(test_volume_stops);
-    RUN_FULL(test_volume_of_smooth_flow);
+    RUN_FULL_ONCE(test_volume_of_smooth_flow);
     RUN_FULL(test_volume_momentum);
     RUN_FULL_ONCE(test_volume_after_flow);
 }

@@ -700,10 +700,10 @@ static void run_semi_implicit(void)
     RUN_ONCE(test_semi_let_fall);
     RUN(test_semi_refusals);
     RUN_FULL_ONCE(test_semi_flight);
-    RUN_FULL(test_semi_sound);
+    RUN_FULL_ONCE(test_semi_sound);
     RUN_FULL_ONCE(test_semi_walls_let_go);
     RUN_FULL_ONCE(test_semi_walls_slug);
-    RUN_FULL_ONCE(test_semi_walls_rest);
+    RUN_SLOW(test_semi_walls_rest);
     RUN_FULL(test_semi_walls_symmetry);
     RUN_FULL_ONCE(test_semi_walls_bits);
     RUN_FULL(test_semi_bits);

@@ -438,6 +438,7 @@ static void test_semi_elastic_splash(void)
         double most = 0, first = 0, range[2], low = 1, high = 1, stored;
         gs4_sim *sim;
         int k;
+        if (!test_slow && (n & 1) != (n / 2 & 1)) continue; /* each law with one integrator */
         d.walls[2] = GS4_WALL_STICK;
         d.integrator = semi_integrators[n & 1];
         d.gravity = at(0, -1, 0);

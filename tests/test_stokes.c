@@ -713,7 +713,7 @@ static void run_stokes(void)
     RUN(test_stokes_failures);
     RUN(test_stokes_cycle_symmetry);
     RUN(test_stokes_rigid_nodes);
-    RUN_FULL(test_stokes_iterations);
+    RUN_FULL_ONCE(test_stokes_iterations);
     RUN_FULL(test_stokes_bits);
     RUN_ONCE(test_stokes_memory);
 }

@@ -18058,11 +18058,12 @@ static void gs4i_classify_face(const gs4_sim *sim, gs4i_staggered *f, int c, con
 {
     const gs4i_box *box = &f->box;
     const gs4_real s = sim->integrator.s;
+    const int end = box->periodic[c] ? f->to[c] + GS4I_BLOCK_SIDE : box->size[c]; /* of copies */
     gs4_real *q = f->given[c] + 4 * i, w = 1;
     size_t cell, before;
     int kind, kind_before;
     f->reach[c][i] = 0;
-    if (at[c] == 0 || at[c] == box->size[c]) return;
+    if (at[c] == 0 || at[c] >= end) return;
     if (!box->periodic[c]
         && ((at[c] == f->from[c] && gs4i_has_wall(sim, 2 * c)
              && gs4i_wall_holds(sim, 2 * c, 1 << c, at))
@@ -18177,7 +18178,8 @@ static void gs4i_pressure_rhs(int z, void *context)
     }
 }
 
-/* Numbers of the unknown faces += scale c (p before - p behind)/h. */
+/* Numbers of the unknown faces += scale c (p before - p behind)/h. Copies at the ends of the box
+ * have no cell on one side, and no reach. */
 static void gs4i_apply_pressure(int z, void *context)
 {
     const gs4i_staggered_pass *pass = (const gs4i_staggered_pass *)context;
@@ -18189,7 +18191,7 @@ static void gs4i_apply_pressure(int z, void *context)
     for (c = 0; c < 3; c++)
         GS4I_EACH_FACE(f, c, z, at, i) {
             size_t cell, before;
-            if (f->known[c][i] != GS4I_FACE_SOLVED) continue;
+            if (f->known[c][i] != GS4I_FACE_SOLVED || !(f->reach[c][i] > 0)) continue;
             cell = gs4i_cells_of_face(box, c, at, &before);
             f->taken[c][4 * i + (size_t)pass->what] -= scale
                                                        / f->given[c][4 * i + GS4I_FACE_DENSITY]
@@ -18284,16 +18286,17 @@ static int gs4i_solve_pressure(gs4_sim *sim, gs4i_staggered_pass *pass)
     return GS4_OK;
 }
 
-/* The fastest face (m/s); infinity where something is not finite. */
+/* The fastest face (m/s), copies apart; infinity where something is not finite. */
 static gs4_real gs4i_fastest_face(const gs4i_staggered *f)
 {
     gs4_real most = 0;
-    int c;
+    int c, z, at[3];
     size_t i;
     for (c = 0; c < 3; c++)
-        for (i = 0; i < gs4i_box_count(&f->box, 1 << c); i++)
-            if (f->known[c][i]) {
+        for (z = 0; z <= f->box.size[2]; z++)
+            GS4I_EACH_FACE(f, c, z, at, i) {
                 const gs4_real *t = f->taken[c] + 4 * i;
+                if (!f->known[c][i] || gs4i_is_copy(f, at)) continue;
                 if (!gs4i_finite(t[0] + t[1] + t[2])) return GS4I_HUGE;
                 most = gs4i_max(most, gs4i_abs(t[GS4I_FACE_STAGE]));
             }
@@ -19189,7 +19192,25 @@ static int gs4i_clear_faces(gs4_sim *sim, gs4i_node_pass *nodes)
     return gs4i_begin_staggered(sim);
 }
 
-/* v_i on faces and volumes in cells, walls included. */
+/* What was scattered behind walls, of one kind: those that separate, or all others. */
+static void gs4i_fold_sides(gs4_sim *sim, int separate)
+{
+    gs4i_staggered *f = &sim->staggered;
+    gs4i_mirror_pass pass;
+    int k;
+    memset(&pass, 0, sizeof pass);
+    pass.sim = sim;
+    pass.fn = gs4i_fold_given;
+    for (k = 0; k < 4; k++) {
+        pass.place = k < 3 ? 1 << k : GS4I_AT_CELL;
+        pass.field = k < 3 ? f->given[k] : f->cell;
+        for (pass.side = 0; pass.side < 6; pass.side++)
+            if ((sim->desc.walls[pass.side] == GS4_WALL_SEPARATE) == separate)
+                gs4i_mirror_side(&pass);
+    }
+}
+
+/* v_i on faces and volumes in cells, where all but walls that separate is folded. */
 static void gs4i_fold_faces(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     gs4i_staggered *f = &sim->staggered;
@@ -19197,8 +19218,7 @@ static void gs4i_fold_faces(gs4_sim *sim, gs4i_node_pass *nodes)
     memset(&pass, 0, sizeof pass);
     pass.sim = sim;
     pass.lightest = nodes->lightest;
-    gs4i_mirror_faces(sim, f->given, gs4i_fold_given);
-    gs4i_each_mirror(sim, GS4I_AT_CELL, f->cell, gs4i_fold_given);
+    gs4i_fold_sides(sim, 1);
     gs4i_parallel_for(&sim->tasks, f->box.size[2] + 1, gs4i_face_velocities, &pass);
     gs4i_wrap_faces(sim, f->given, 4);
     gs4i_wrap_cells(sim, f->cell, 4);
@@ -19206,6 +19226,7 @@ static void gs4i_fold_faces(gs4_sim *sim, gs4i_node_pass *nodes)
 
 static int gs4i_finish_faces(gs4_sim *sim, gs4i_node_pass *nodes)
 {
+    gs4i_fold_sides(sim, 0); /* first: contact also is by what is beyond a seam */
     gs4i_guess_contact(sim);
     gs4i_fold_faces(sim, nodes);
     if (sim->staggered.bodies_separate)
@@ -19221,6 +19242,7 @@ static void gs4i_scatter_again(gs4_sim *sim, gs4i_node_pass *nodes)
     gs4i_parallel_for(&sim->tasks, sim->staggered.box.size[2] + 1, gs4i_clear_staggered,
                       &sim->staggered);
     gs4i_scatter(sim, gs4i_scatter_to_faces);
+    gs4i_fold_sides(sim, 0);
     gs4i_fold_faces(sim, nodes);
 }
 

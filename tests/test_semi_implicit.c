@@ -76,6 +76,88 @@ static void test_semi_sphere(void)
     }
 }
 
+/* Edges along e that have a row, `ring` steps along axes away from `at`: how many; each takes
+ * `share`. */
+static int semi_edges_take(const gs4i_staggered *f, int e, const int at[3], int ring, double share,
+                           double *taken)
+{
+    int n, count = 0;
+    for (n = 0; n < 27; n++) {
+        const int step[3] = { n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1 };
+        size_t to;
+        if (abs(step[0]) + abs(step[1]) + abs(step[2]) != ring) continue;
+        if (!gs4i_edge_beside(&f->stokes, e, at, step, &to) || !f->has_row[e][to]) continue;
+        taken[to] += share;
+        count++;
+    }
+    return count;
+}
+
+/* What edges along e should count; how many take from each ring. */
+static void semi_edges_expect(const gs4i_staggered *f, int e, double *expected, int rings[4])
+{
+    const gs4i_box *box = &f->box;
+    int z, a, at[3];
+    size_t i;
+    for (z = 0; z < gs4i_box_length(box, 7 ^ 1 << e, 2); z++) STOK_PLANE(box, 7 ^ 1 << e, z, at, i)
+        {
+            gs4i_stokes_row row;
+            int ring = 0, count = 0, copy = 0;
+            for (a = 0; a < 3; a++) copy |= box->periodic[a] && at[a] == box->size[a];
+            gs4i_stokes_edge_cells(&f->stokes, e, at, &row);
+            if (copy || !row.liquid) continue;
+            for (; ring < 4 && !count; ring++) count = semi_edges_take(f, e, at, ring, 0, expected);
+            if (!count) continue;
+            rings[ring - 1]++;
+            semi_edges_take(f, e, at, ring - 1, 0.25 * row.liquid / count, expected);
+        }
+}
+
+/* Edges without a row give what they count to the nearest that have one, 1, 2 or 3 steps away,
+ * each as much, around a periodic axis too: nothing is lost where one is around. A share of all
+ * cells is liquid, at random. */
+static void semi_edges(double liquid, int periodic)
+{
+    static double expected[3][9 * 9 * 9];
+    stokes_case *k = stokes_make("closed", 8, 1, "");
+    gs4_sim *sim = (gs4_sim *)calloc(1, sizeof *sim);
+    gs4i_staggered *f = &sim->staggered;
+    int c, rings[4] = { 0, 0, 0, 0 };
+    size_t i;
+    for (i = 0; i < k->cells; i++)
+        k->kind[i] = (uint8_t)(stokes_random() < liquid ? GS4_CELL_LIQUID : GS4_CELL_AIR);
+    for (c = 0; c < 3; c++) stokes_set_faces(k, c);
+    k->box.periodic[periodic] = 1;
+    f->box = k->box;
+    f->stokes = k->s;
+    for (c = 0; c < 3; c++) {
+        f->edge[c] = (gs4_real *)stokes_alloc(9 * 9 * 9, sizeof(gs4_real));
+        f->has_row[c] = (uint8_t *)stokes_alloc(9 * 9 * 9, 1);
+        f->stokes.edge[c] = f->edge[c];
+    }
+    gs4i_weigh_edges(sim);
+    memset(expected, 0, sizeof expected);
+    for (c = 0; c < 3; c++) {
+        semi_edges_expect(f, c, expected[c], rings);
+        for (i = 0; i < gs4i_box_count(&f->box, 7 ^ 1 << c); i++)
+            if (f->has_row[c][i]) CHECK_CLOSE(f->edge[c][i], expected[c][i], 1e-5);
+        free(f->edge[c]);
+        free(f->has_row[c]);
+    }
+    for (c = 0; c < 4; c++) CHECK(rings[c] > 3);
+    if (test_filter[0])
+        printf("    %.1f liquid: %d %d %d %d edges\n", liquid, rings[0], rings[1], rings[2],
+               rings[3]);
+    free(sim);
+    CHECK(stokes_free(k) == 0);
+}
+
+static void test_semi_edges(void)
+{
+    int a;
+    for (a = 0; a < 3; a++) semi_edges(0.3 + 0.1 * a, a);
+}
+
 /* --- flows between sticky walls --------------------------------------------------------------- */
 
 /* Liquid between sticky walls 1 apart across `across`, that a force drives along
@@ -688,6 +770,7 @@ static void test_semi_memory(void) { semi_check(test_partitioned_memory); }
 static void run_semi_implicit(void)
 {
     RUN_FULL(test_semi_sphere);
+    RUN_ONCE(test_semi_edges);
     RUN_ONCE(test_semi_poiseuille);
     RUN_FULL(test_semi_startup);
     RUN_FULL(test_semi_layers);

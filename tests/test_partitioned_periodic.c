@@ -239,7 +239,9 @@ static void test_partitioned_periodic_seam(void)
     int scene, s, down, i, c;
     for (scene = 0; scene < 24; scene++)
         for (down = 0; down < 3; down++) {
-            const int count = periodic_pool(scene, down, 0, one);
+            int count;
+            if (!test_slow && (scene + down) % 3) continue; /* each scene along one axis */
+            count = periodic_pool(scene, down, 0, one);
             for (s = 0; s < 2; s++) {
                 double far = 0, fast = 0;
                 CHECK(periodic_pool(scene, down, shifts[scene >> 3][s], other) == count);

@@ -81,8 +81,8 @@ int main(int count, char **values)
     RUN_ONCE(test_heat_breakdown);
     RUN_FULL(test_heat_on_each_wall);
     RUN_FULL(test_heat_one_wall);
-    RUN_ONCE(test_heat_drifts);
-    RUN_ONCE(test_heat_around);
+    RUN_FULL(test_heat_drifts);
+    RUN_FULL(test_heat_around);
     RUN_ONCE(test_heat_walls);
     RUN_FULL_ONCE(test_heat_bounds);
     RUN_FULL(test_heat_long_steps);

@@ -1,6 +1,6 @@
 #!/bin/sh
-# The tests: sh tests/run.sh            quick ones in float and in double, and the cheap part of portability.sh: some 60 s
-#                                      of processor time, 70 s beside other work, half to compile (user + sys of `time`)
+# The tests: sh tests/run.sh            quick ones in float and in double, and the cheap part of portability.sh: 60 to 70 s
+#                                      of processor time by the machine, half to compile (user + sys of `time`)
 #            sh tests/run.sh --full     all but the slow tests, and all compilers, machines and sanitizers that are installed
 #            sh tests/run.sh --nightly  the slow tests, too, and whether the tests catch mutants.sh
 # CC and CFLAGS choose compiler and flags of tests/main.c. The last line counts. Quick tests are compiled at -Og with what pays of

@@ -1689,7 +1689,7 @@ static void run_files(void)
 #endif
     RUN_FULL(test_files_continue);
     RUN(test_files_continue_frozen);
-    RUN_ONCE(test_files_continue_edited);
+    RUN_FULL(test_files_continue_edited);
     RUN(test_files_bad_edit);
     RUN_FULL(test_files_damaged);
     RUN_ONCE(test_files_forged);

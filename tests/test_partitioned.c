@@ -1162,7 +1162,7 @@ static void run_partitioned(void)
     RUN_ONCE(test_partitioned_slope);
     RUN_FULL_ONCE(test_partitioned_ripples);
     RUN_FULL_ONCE(test_partitioned_sloshing);
-    RUN_ONCE(test_partitioned_vortex);
+    RUN_FULL(test_partitioned_vortex);
     RUN(test_partitioned_order);
     RUN_FULL_ONCE(test_partitioned_dam);
     RUN_FULL(test_partitioned_moduli);

@@ -1015,5 +1015,5 @@ static void run_poisson(void)
     RUN(test_poisson_arguments);
     RUN(test_poisson_bad_numbers);
     RUN_ONCE(test_poisson_memory);
-    RUN_ONCE(test_poisson_best);
+    RUN_FULL(test_poisson_best);
 }

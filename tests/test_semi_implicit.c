@@ -780,7 +780,7 @@ static void run_semi_implicit(void)
     RUN_FULL(test_semi_order);
     RUN_FULL(test_semi_levelling);
     RUN_FULL_ONCE(test_semi_levelling_limit);
-    RUN_ONCE(test_semi_let_fall);
+    RUN_FULL(test_semi_let_fall);
     RUN(test_semi_refusals);
     RUN_FULL_ONCE(test_semi_flight);
     RUN_FULL_ONCE(test_semi_sound);

@@ -847,7 +847,7 @@ static void test_stress_eigen(void)
 static void run_stress(void)
 {
     RUN(test_stress_eigen);
-    RUN(test_stress_reference);
+    RUN_ONCE(test_stress_reference);
     RUN(test_stress_units);
     RUN(test_stress_split);
     RUN_ONCE(test_stress_steady);

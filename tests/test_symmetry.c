@@ -721,7 +721,7 @@ static void test_symmetry_points(void)
 static void run_symmetry(void)
 {
     RUN_FULL(test_symmetry_flows);
-    RUN_ONCE(test_symmetry_walls);
+    RUN_FULL(test_symmetry_walls);
     RUN_FULL(test_symmetry_bodies);
     RUN_FULL(test_symmetry_solids);
     RUN_FULL(test_symmetry_stress);

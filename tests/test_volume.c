@@ -397,7 +397,7 @@ static void run_volume(void)
 {
     RUN(test_volume_of_blocks);
     RUN(test_volume_of_others);
-    RUN_ONCE(test_volume_of_packed);
+    RUN_FULL(test_volume_of_packed);
     RUN(test_volume_stops);
     RUN_FULL_ONCE(test_volume_of_smooth_flow);
     RUN_FULL(test_volume_momentum);

@@ -4905,22 +4905,36 @@ typedef struct gs4i_frame {
 /* From the first of the 27 nodes that a particle sees in a tile to the one nearest to it. */
 #define GS4I_MIDDLE_NODE (1 + GS4I_TILE + GS4I_TILE * GS4I_TILE)
 
-/* Tile coordinates outside of 1 <= x < 7, and NaN, give base -1: their nodes are not all there. */
+/* Along one axis: cell of the tile that x is in, and how far it is from its centre. Tile coordinates
+ * outside of 1 <= x < 7, and NaN, give cell 0: their nodes are not all there. */
+GS4I_INLINE void gs4i_cell_at(const gs4i_frame *f, int axis, const gs4i_wide *x,
+                              gs4i_wide_int *cell, gs4i_wide *xi)
+{
+    const gs4i_wide t = (*x - f->origin[axis]) * f->inv_h - f->first[axis];
+    gs4i_wide zero, safe;
+    memset(&zero, 0, sizeof zero);
+    GS4I_CHOOSE(safe, (t >= GS4I_C(1)) & (t < GS4I_C(GS4I_TILE - 1)), t, zero);
+    GS4I_TRUNCATE(*cell, safe);
+    GS4I_TO_REAL(*xi, *cell);
+    *xi = safe - *xi - GS4I_C(0.5);
+}
+
+/* Where the first nodes are that particles in these cells see. */
+GS4I_INLINE void gs4i_first_nodes(const gs4i_wide_int cell[3], int32_t *first)
+{
+    gs4i_wide_int base = ((cell[2] - 1) * GS4I_TILE + (cell[1] - 1)) * GS4I_TILE + (cell[0] - 1);
+    GS4I_CHOOSE_INT(base, (cell[0] > 0) & (cell[1] > 0) & (cell[2] > 0), base, 0 * base - 1);
+    memcpy(first, &base, sizeof base);
+}
+
 GS4I_INLINE void gs4i_stencils_at(gs4i_stencils *s, const gs4i_frame *f, gs4i_lanes x[3])
 {
-    gs4i_wide_int base;
-    gs4i_wide zero;
     int a, b;
-    memset(&zero, 0, sizeof zero);
     GS4I_BATCH_LOOP(b) {
         gs4i_wide_int cell[3];
         for (a = 0; a < 3; a++) {
-            const gs4i_wide t = (x[a][b] - f->origin[a]) * f->inv_h - f->first[a];
-            gs4i_wide safe, xi, lo, hi;
-            GS4I_CHOOSE(safe, (t >= GS4I_C(1)) & (t < GS4I_C(GS4I_TILE - 1)), t, zero);
-            GS4I_TRUNCATE(cell[a], safe);
-            GS4I_TO_REAL(xi, cell[a]);
-            xi = safe - xi - GS4I_C(0.5);
+            gs4i_wide xi, lo, hi;
+            gs4i_cell_at(f, a, &x[a][b], &cell[a], &xi);
             lo = GS4I_C(0.5) - xi;
             hi = GS4I_C(0.5) + xi;
             s->xi[a][b] = xi;
@@ -4931,9 +4945,19 @@ GS4I_INLINE void gs4i_stencils_at(gs4i_stencils *s, const gs4i_frame *f, gs4i_la
             s->d[a][1][b] = (-2 * f->inv_h) * xi;
             s->d[a][2][b] = f->inv_h * hi;
         }
-        base = ((cell[2] - 1) * GS4I_TILE + (cell[1] - 1)) * GS4I_TILE + (cell[0] - 1);
-        GS4I_CHOOSE_INT(base, (cell[0] > 0) & (cell[1] > 0) & (cell[2] > 0), base, 0 * base - 1);
-        memcpy(s->base + GS4I_WIDTH * b, &base, sizeof base);
+        gs4i_first_nodes(cell, s->base + GS4I_WIDTH * b);
+    }
+}
+
+/* The first nodes alone. */
+GS4I_INLINE void gs4i_bases_at(const gs4i_frame *f, gs4i_lanes x[3], int32_t base[GS4I_BATCH])
+{
+    int a, b;
+    GS4I_BATCH_LOOP(b) {
+        gs4i_wide_int cell[3];
+        gs4i_wide xi;
+        for (a = 0; a < 3; a++) gs4i_cell_at(f, a, &x[a][b], &cell[a], &xi);
+        gs4i_first_nodes(cell, base + GS4I_WIDTH * b);
     }
 }
 
@@ -9040,6 +9064,19 @@ GS4I_INLINE void gs4i_predict_positions(const gs4i_batch *q, gs4i_prediction pre
         GS4I_BATCH_LOOP(b) x[c][b] += prediction.bend * q->a[c][b];
 }
 
+/* Both, where nothing else of the particles is wanted. */
+GS4I_INLINE void gs4i_load_positions(const gs4i_particles *p, size_t i, int n,
+                                     gs4i_prediction prediction, gs4i_lanes x[4])
+{
+    gs4i_batch q;
+    if (!p->with_rates) {
+        gs4i_to_lanes(p->position + 4 * i, n, x);
+        return;
+    }
+    gs4i_load_batch(p, i, n, prediction, &q);
+    gs4i_predict_positions(&q, prediction, x);
+}
+
 static void gs4i_sort_keys_task(int index, void *context)
 {
     gs4i_sorting *s = (gs4i_sorting *)context;
@@ -12055,7 +12092,8 @@ typedef struct gs4i_image_particle {
 typedef struct gs4i_patch {
     int collider, slot;
     gs4_real nearest, bend[2]; /* least distance, least and greatest bend of its nodes */
-    uint64_t clear;            /* of each node a bit: see gs4i_is_clear */
+    /* of each node a bit: see gs4i_is_clear; is it within three cells, by the first number? */
+    uint64_t clear, near;
 } gs4i_patch;
 
 /* What the particles of a block have of the surface of a body. */
@@ -14587,10 +14625,11 @@ static void gs4i_sample_patch(int index, void *context)
     patch->nearest = GS4I_HUGE;
     patch->bend[0] = h;
     patch->bend[1] = -h;
-    patch->clear = 0;
+    patch->clear = patch->near = 0;
     for (i = 0; i < GS4I_BLOCK_NODES; i++) {
         const gs4_real own = d[43 + (i & 3) + 6 * (i >> 2 & 3) + 36 * (i >> 4)];
         patch->clear |= (uint64_t)gs4i_is_clear(own, h) << i;
+        patch->near |= (uint64_t)(to[4 * i] < GS4I_IMAGE_REACH * h) << i;
         patch->nearest = gs4i_min(patch->nearest, gs4i_min(own, to[4 * i]));
         patch->bend[0] = gs4i_min(patch->bend[0], to[4 * i + 1]);
         patch->bend[1] = gs4i_max(patch->bend[1], to[4 * i + 1]);
@@ -14802,17 +14841,31 @@ static int gs4i_load_near_decay(const gs4_sim *sim, int o, uint64_t rows, gs4_re
     return sticks;
 }
 
+/* Bits of the nodes of a tile, bit 8 y + x of each z, from those of the 27 blocks around it. */
+static void gs4i_bits_of_tile(const uint64_t of[27], uint64_t bits[GS4I_TILE])
+{
+    int row;
+    memset(bits, 0, GS4I_TILE * sizeof *bits);
+    for (row = 0; row < GS4I_TILE * GS4I_TILE; row++) {
+        const int y = (row & 7) + 2, z = (row >> 3) + 2, place = gs4i_place_of(0, y, z);
+        const uint64_t *three = of + 3 * (3 * (z >> 2) + (y >> 2));
+        bits[row >> 3] |= ((three[0] >> place & 15) >> 2 | (three[1] >> place & 15) << 2
+                           | (three[2] >> place & 3) << 6)
+                          << 8 * (row & 7);
+    }
+}
+
 /* Nodes of the tile of occupied block o which say of every particle that they are nearest to that
  * it is outside of all sticky bodies: bit 8 y + x of each z. Returns NULL if none is within three
  * cells of them: no particle gets there in a step. */
 static const uint64_t *gs4i_find_clear_nodes(const gs4_sim *sim, int o, uint64_t clear[GS4I_TILE])
 {
     const gs4i_patch *all = (const gs4i_patch *)sim->image_particles.patches.all.data;
-    int any = 0, k, i, row;
+    int any = 0, k, i;
     memset(clear, 0xff, GS4I_TILE * sizeof *clear);
     for (k = 0; k < sim->boundary.collider_count; k++) {
         const gs4i_surface *surface;
-        uint64_t of[27];
+        uint64_t of[27], bits[GS4I_TILE];
         if (!gs4i_sticks_by(sim, k, o)) continue;
         any = 1;
         surface = gs4i_surface_of(sim, k, o);
@@ -14824,13 +14877,8 @@ static const uint64_t *gs4i_find_clear_nodes(const gs4_sim *sim, int o, uint64_t
                     : patch < 0                        ? ~(uint64_t)0
                                                        : all[patch].clear;
         }
-        for (row = 0; row < GS4I_TILE * GS4I_TILE; row++) {
-            const int y = (row & 7) + 2, z = (row >> 3) + 2, place = gs4i_place_of(0, y, z);
-            const uint64_t *three = of + 3 * (3 * (z >> 2) + (y >> 2)),
-                           bits = (three[0] >> place & 15) >> 2 | (three[1] >> place & 15) << 2
-                                  | (three[2] >> place & 3) << 6;
-            clear[row >> 3] &= ~((uint64_t)0xff << 8 * (row & 7)) | bits << 8 * (row & 7);
-        }
+        gs4i_bits_of_tile(of, bits);
+        for (i = 0; i < GS4I_TILE; i++) clear[i] &= bits[i];
     }
     return any ? clear : NULL;
 }
@@ -14857,6 +14905,20 @@ static int gs4i_is_in_sticky(const gs4_sim *sim, int o, gs4_vec3 p, int node, gs
         if (gs4i_collider_distance(body, p) < 0) return 1;
     }
     return 0;
+}
+
+/* Is any of the n particles from i on, of occupied block o, within three cells of a sticky body, or
+ * may be? */
+static int gs4i_any_is_near(const gs4_sim *sim, int o, size_t i, int n)
+{
+    const gs4i_image_particles *g = &sim->image_particles;
+    const gs4i_near_particle *near;
+    int b, any = 0;
+    if (!g->near) return 1;
+    near = (const gs4i_near_particle *)g->of_particles.data + ((const int32_t *)g->of.data)[o]
+           + (i - (size_t)sim->grid.first[o]);
+    for (b = 0; b < n; b++) any |= near[b].body >= 0 || near[b].base < 0;
+    return any;
 }
 
 /* Which of n particles of occupied block o are inside of a sticky body where they ended, at x? A
@@ -14917,16 +14979,25 @@ static void gs4i_load_patches(const gs4_sim *sim, int collider, int o, gs4_real 
     gs4i_load_around(of, (GS4I_IMAGE_REACH + GS4I_NODES_REACH) * sim->grid.h, tile);
 }
 
-/* The least distance of the 27 nodes from each node of a tile on: no particle that sees them is
- * nearer, as weights are positive. */
-static void gs4i_find_least(const gs4_real *tile, gs4_real *least)
+/* Nodes of the tile of occupied block o from which on one of the 27 nodes is within three cells of
+ * a body: no particle that sees the others is, as weights are positive. Returns whether any is. */
+static int gs4i_find_near_nodes(const gs4_sim *sim, int collider, int o, uint64_t near[GS4I_TILE])
 {
-    const int nodes = GS4I_TILE * GS4I_TILE * GS4I_TILE;
-    int apart, i;
-    for (i = 0; i < nodes; i++) least[i] = tile[4 * i];
-    for (apart = 1; apart < nodes; apart *= GS4I_TILE)
-        for (i = 0; i < nodes - 2 * apart; i++)
-            least[i] = gs4i_min(least[i], gs4i_min(least[i + apart], least[i + 2 * apart]));
+    const gs4i_patch *all = (const gs4i_patch *)sim->image_particles.patches.all.data;
+    uint64_t of[27], any = 0;
+    int i;
+    for (i = 0; i < 27; i++) {
+        const int patch = gs4i_patch_of(sim, collider, sim->grid.neighbour[27 * o + i]);
+        of[i] = patch < 0 ? 0 : all[patch].near;
+    }
+    gs4i_bits_of_tile(of, near);
+    for (i = 0; i < GS4I_TILE; i++) {
+        near[i] |= near[i] >> 1 | near[i] >> 2;
+        near[i] |= near[i] >> GS4I_TILE | near[i] >> 2 * GS4I_TILE;
+        any |= near[i];
+    }
+    for (i = 0; i < GS4I_TILE - 2; i++) near[i] |= near[i + 1] | near[i + 2];
+    return any != 0;
 }
 
 /* Where a point at p is reflected to. */
@@ -14980,50 +15051,74 @@ static void gs4i_meet_particle(const gs4i_grid *grid, int collider, const gs4_re
     gs4i_seek_image(grid, p, g);
 }
 
+/* How far n particles at x are from body `collider`, of a block before which it is flat. */
+static void gs4i_meet_plane(const gs4i_grid *grid, int collider, const gs4i_surface *surface,
+                            gs4i_lanes x[3], int n, gs4i_near_particle *g)
+{
+    const gs4_real deep = GS4I_IMAGE_NODES * grid->h;
+    int b;
+    for (b = 0; b < n; b++, g++) {
+        const gs4_vec3 p = gs4i_vec3(GS4I_NTH(x[0], b), GS4I_NTH(x[1], b), GS4I_NTH(x[2], b));
+        gs4_real four[4] = { 0, 0, 0, 0 };
+        if (g->base < 0) continue;
+        four[0] = surface->d + gs4i_dot(surface->n, gs4i_sub(p, surface->at));
+        four[1] = four[0] > -deep ? GS4I_C(0) : grid->h;
+        gs4i_meet_particle(grid, collider, four, surface->n, p, g);
+    }
+}
+
+/* The same elsewhere, from a tile of its patches. */
+static void gs4i_meet_patches(const gs4i_grid *grid, int collider, const gs4i_frame *frame,
+                              const gs4_real *tile, const uint64_t near[GS4I_TILE], gs4i_lanes x[3],
+                              int n, gs4i_near_particle *g)
+{
+    gs4i_gathered u;
+    gs4i_stencils s;
+    int b;
+    gs4i_stencils_at(&s, frame, x);
+    for (b = 0; b < n; b++, g++) {
+        const gs4_vec3 p = gs4i_vec3(GS4I_NTH(x[0], b), GS4I_NTH(x[1], b), GS4I_NTH(x[2], b));
+        gs4i_row w, dw;
+        if (g->base < 0 || !(near[g->base >> 6] >> (g->base & 63) & 1)) continue;
+        gs4i_x_weights(&s, b, &w, &dw);
+        gs4i_gather_local(tile + 4 * g->base, &s, b, &w, &dw, &u);
+        gs4i_meet_particle(grid, collider, u.value + 4 * b,
+                           gs4i_vec3(u.dx[4 * b], u.dy[4 * b], u.dz[4 * b]), p, g);
+    }
+}
+
 /* How far the particles of occupied block o are from a body. */
 static void gs4i_meet_body(const gs4_sim *sim, int collider, int o, gs4i_near_particle *g)
 {
     const gs4i_grid *grid = &sim->grid;
     const gs4i_frame frame = gs4i_tile_frame(grid, grid->occupied_block[o]);
-    const gs4_real deep = GS4I_IMAGE_NODES * grid->h;
     const gs4i_surface *surface = gs4i_surface_of(sim, collider, o);
-    const gs4_real reach = GS4I_IMAGE_REACH * grid->h;
-    gs4_real tile[GS4I_TILE_REALS], least[GS4I_TILE * GS4I_TILE * GS4I_TILE];
+    const int flat = surface->kind == GS4I_SURFACE_FLAT;
+    gs4_real tile[GS4I_TILE_REALS];
+    uint64_t near[GS4I_TILE];
     size_t i = (size_t)grid->first[o], end = (size_t)grid->first[o + 1];
-    if (surface->kind == GS4I_SURFACE_FAR || !(surface->nearest < reach)) return;
-    if (surface->kind == GS4I_SURFACE_CURVED) {
+    if (surface->kind == GS4I_SURFACE_FAR || !(surface->nearest < GS4I_IMAGE_REACH * grid->h))
+        return;
+    if (!flat) {
+        if (!gs4i_find_near_nodes(sim, collider, o, near)) return;
         gs4i_load_patches(sim, collider, o, tile);
-        gs4i_find_least(tile, least);
     }
     for (; i < end; i += GS4I_BATCH) {
         const int n = gs4i_batch_size(i, end);
-        gs4i_batch q;
-        gs4i_lanes x[3];
-        gs4i_stencils s;
-        gs4i_gathered u;
-        int b;
-        gs4i_load_batch(&sim->particles, i, n, sim->integrator.prediction, &q);
-        gs4i_predict_positions(&q, sim->integrator.prediction, x);
-        gs4i_stencils_at(&s, &frame, x);
-        for (b = 0; b < n; b++, g++) {
-            const gs4_vec3 p = gs4i_vec3(GS4I_NTH(x[0], b), GS4I_NTH(x[1], b), GS4I_NTH(x[2], b));
-            gs4i_row w, dw;
-            gs4_vec3 slope;
-            g->base = s.base[b];
-            if (g->base < 0) continue; /* it will be sorted first */
-            if (surface->kind == GS4I_SURFACE_FLAT) {
-                u.value[0] = surface->d + gs4i_dot(surface->n, gs4i_sub(p, surface->at));
-                u.value[1] = u.value[0] > -deep ? GS4I_C(0) : grid->h;
-                u.value[2] = 0;
-                gs4i_meet_particle(grid, collider, u.value, surface->n, p, g);
-                continue;
-            }
-            if (!(least[g->base] < reach)) continue;
-            gs4i_x_weights(&s, b, &w, &dw);
-            gs4i_gather_local(tile + 4 * s.base[b], &s, b, &w, &dw, &u);
-            slope = gs4i_vec3(u.dx[4 * b], u.dy[4 * b], u.dz[4 * b]);
-            gs4i_meet_particle(grid, collider, u.value + 4 * b, slope, p, g);
+        gs4i_lanes x[4];
+        int32_t base[GS4I_BATCH];
+        int b, any = 0;
+        gs4i_load_positions(&sim->particles, i, n, sim->integrator.prediction, x);
+        gs4i_bases_at(&frame, x, base);
+        for (b = 0; b < n; b++) {
+            g[b].base = base[b]; /* -1: it will be sorted first */
+            any |= !flat && base[b] >= 0 && (near[base[b] >> 6] >> (base[b] & 63) & 1);
         }
+        if (flat)
+            gs4i_meet_plane(grid, collider, surface, x, n, g);
+        else if (any)
+            gs4i_meet_patches(grid, collider, &frame, tile, near, x, n, g);
+        g += n;
     }
 }
 
@@ -15162,7 +15257,12 @@ static void gs4i_place_image_particles(int index, void *context)
         const int n = gs4i_batch_size(i, end);
         gs4i_batch q;
         gs4i_lanes x[3];
-        int b, c;
+        int b, c, any = 0;
+        for (b = 0; b < n; b++) any |= near[b].image >= 0;
+        if (!any) {
+            near += n;
+            continue;
+        }
         gs4i_load_batch(p, i, n, sim->integrator.prediction, &q);
         gs4i_predict_positions(&q, sim->integrator.prediction, x);
         for (b = 0; b < n; b++, near++) {
@@ -16505,7 +16605,9 @@ static void gs4i_correct_contact(gs4_sim *sim, int block, const uint64_t *clear,
                             : NULL;
     const int touches =
         gs4i_may_touch(&sim->boundary, o->x, n, sim->grid.h, sim->desc.scheme != GS4_EXPLICIT);
-    const unsigned inside = clear ? gs4i_ended_inside(sim, block, clear, o->x, n) : 0;
+    const unsigned inside = clear && gs4i_any_is_near(sim, block, i, n)
+                                ? gs4i_ended_inside(sim, block, clear, o->x, n)
+                                : 0;
     int b;
     if (!touches && !inside && gs4i_are_in_domain(&sim->grid, o->x, n)) return;
     for (b = 0; b < n; b++) {

@@ -351,8 +351,9 @@
  * rates. Near sticky ones, without solids and with a finite flip_decay_time, it takes none farther
  * than to V. Before sticky ones that move, k_n of NOISE is c0/h more, or 500 |v|/h if that is less,
  * v their velocity, within a cell, and none from three on: else particles went at up to 1.7 |v|
- * (tests: contact_pairs). A particle that ends inside a collider or behind a wall is put back on
- * the surface.
+ * (tests: contact_pairs). Symplectic Euler, of liquids that differ by at most a factor of 2 in rho0
+ * and in stiffness, has J decay there at that rate to its mean over a cell. A particle that ends
+ * inside a collider or behind a wall is put back on the surface.
  * Where the grid sees little of a particle its sub-grid velocity decays at the rate c0/h: at a wall
  * by the weight of mirror nodes, at a sticky collider by that of nodes inside or held, and in spray
  * that fills nodes by less than 20 %.
@@ -4905,7 +4906,7 @@ typedef struct gs4i_frame {
 /* From the first of the 27 nodes that a particle sees in a tile to the one nearest to it. */
 #define GS4I_MIDDLE_NODE (1 + GS4I_TILE + GS4I_TILE * GS4I_TILE)
 
-/* Along one axis: cell of the tile that x is in, and how far it is from its centre. Tile coordinates
+/* Along one axis: cell of the tile that x is in, and how far x is from its centre. Tile places
  * outside of 1 <= x < 7, and NaN, give cell 0: their nodes are not all there. */
 GS4I_INLINE void gs4i_cell_at(const gs4i_frame *f, int axis, const gs4i_wide *x,
                               gs4i_wide_int *cell, gs4i_wide *xi)
@@ -14801,28 +14802,38 @@ static int gs4i_sticks_near(const gs4_sim *sim, int o)
 }
 
 /* Rates of gs4i_near_decay by one body, of the nodes in a row of the tile of occupied block o: the
- * greater of them and of what the fourth numbers of the row are. */
-static void gs4i_add_near_decay(const gs4_sim *sim, int collider, int o, int row, gs4_real *tile)
+ * greater of them and of what the fourth numbers of the row are. Here from patches. */
+static void gs4i_add_sampled_decay(const gs4_sim *sim, int collider, int o, int row, gs4_real *tile)
 {
-    const gs4i_surface *surface = gs4i_surface_of(sim, collider, o);
     const gs4_real *nodes = (const gs4_real *)sim->image_particles.patches.nodes.data;
     const int y = (row & 7) + 2, z = (row >> 3) + 2;
     const int32_t *slots = sim->grid.neighbour + 27 * o + 3 * (3 * (z >> 2) + (y >> 2));
-    int x, patch[3];
-    for (x = 0; x < 3; x++) patch[x] = gs4i_patch_of(sim, collider, slots[x]);
-    for (x = 2; x < GS4I_TILE + 2; x++, tile += 4) {
-        gs4_real rate = 0;
-        if (surface->kind == GS4I_SURFACE_FLAT) {
-            const gs4_vec3 from = gs4i_scale(
-                gs4i_vec3(GS4I_C(x - 5.5), GS4I_C(y - 5.5), GS4I_C(z - 5.5)), sim->grid.h);
-            rate = gs4i_near_decay(sim, &sim->boundary.colliders[collider],
-                                   gs4i_add(surface->at, from),
-                                   surface->d + gs4i_dot(surface->n, from));
-        } else if (patch[x >> 2] >= 0) {
-            rate =
-                nodes[(ptrdiff_t)patch[x >> 2] * GS4I_NODE_REALS + 4 * gs4i_place_of(x, y, z) + 3];
+    int part, x;
+    for (part = 0; part < 3; part++) {
+        const int patch = gs4i_patch_of(sim, collider, slots[part]);
+        const int from = part == 0 ? 2 : 0, to = part == 2 ? 2 : 4;
+        const gs4_real *four;
+        if (patch < 0) continue;
+        four = nodes + (ptrdiff_t)patch * GS4I_NODE_REALS + 4 * gs4i_place_of(0, y, z);
+        for (x = from; x < to; x++) {
+            gs4_real *rate = tile + 4 * (4 * part + x - 2) + 3;
+            *rate = gs4i_max(*rate, four[4 * x + 3]);
         }
-        tile[3] = gs4i_max(tile[3], rate);
+    }
+}
+
+/* And where the body is flat. */
+static void gs4i_add_flat_decay(const gs4_sim *sim, int collider, int o, int row, gs4_real *tile)
+{
+    const gs4i_surface *surface = gs4i_surface_of(sim, collider, o);
+    int x;
+    for (x = 0; x < GS4I_TILE; x++, tile += 4) {
+        const gs4_vec3 from = gs4i_scale(
+            gs4i_vec3(GS4I_C(x - 3.5), GS4I_C((row & 7) - 3.5), GS4I_C((row >> 3) - 3.5)),
+            sim->grid.h);
+        tile[3] = gs4i_max(tile[3], gs4i_near_decay(sim, &sim->boundary.colliders[collider],
+                                                    gs4i_add(surface->at, from),
+                                                    surface->d + gs4i_dot(surface->n, from)));
     }
 }
 
@@ -14835,8 +14846,13 @@ static int gs4i_load_near_decay(const gs4_sim *sim, int o, uint64_t rows, gs4_re
         if (!gs4i_is_moving(&sim->boundary.colliders[i]) || !gs4i_sticks_by(sim, i, o)) continue;
         for (row = 0; row < GS4I_TILE_REALS && !sticks; row += 4) tile[row + 3] = 0;
         sticks = 1;
-        for (row = 0; row < GS4I_TILE * GS4I_TILE; row++)
-            if (rows >> row & 1) gs4i_add_near_decay(sim, i, o, row, tile + 4 * GS4I_TILE * row);
+        for (row = 0; row < GS4I_TILE * GS4I_TILE; row++) {
+            if (!(rows >> row & 1)) continue;
+            if (gs4i_surface_of(sim, i, o)->kind == GS4I_SURFACE_FLAT)
+                gs4i_add_flat_decay(sim, i, o, row, tile + 4 * GS4I_TILE * row);
+            else
+                gs4i_add_sampled_decay(sim, i, o, row, tile + 4 * GS4I_TILE * row);
+        }
     }
     return sticks;
 }
@@ -17086,6 +17102,15 @@ GS4I_INLINE void gs4i_advect_batch(const gs4i_integrator *r, const gs4i_gathered
         }
 }
 
+/* What Euler gathered as the affine velocity of n particles. */
+GS4I_INLINE void gs4i_store_gradients(const gs4i_particles *p, size_t i, int n,
+                                      const gs4i_gathered *u)
+{
+    memcpy(p->affine[0] + 4 * i, u->dx, 4 * (size_t)n * sizeof *u->dx);
+    memcpy(p->affine[1] + 4 * i, u->dy, 4 * (size_t)n * sizeof *u->dy);
+    memcpy(p->affine[2] + 4 * i, u->dz, 4 * (size_t)n * sizeof *u->dz);
+}
+
 /* Symplectic Euler, and back. */
 static void gs4i_gather_euler(int index, void *context)
 {
@@ -17130,23 +17155,20 @@ static void gs4i_gather_euler(int index, void *context)
             gs4i_gather_local(nodes + 4 * s.base[b], &s, b, &w, &d, &u);
         }
         if (near.particle) gs4i_make_odd(&near, n, 0, &u, NULL);
+        if (near.particle) near.particle += n;
         if (pressure.settles) gs4i_settle_volume(&r, pressure.nodes, &s, i, n, &q);
         gs4i_advect_batch(&integrator, &u, n, &q, C);
         gs4i_advance_response(&r, i, n, C, NULL, q.v[3], pass->commit);
         if (!pass->commit) {
             gs4i_validate_batch(&q, C, p.position + 4 * i, n, g->h, p.id + i, report);
-            if (near.particle) near.particle += n;
             continue;
         }
         if (heat) gs4i_gather_heat(&r, &s, C, heat);
         gs4i_pack_batch(&q, 0, &out);
         if (edge) gs4i_correct_contact(sim, o, clear, i, n, &out, &u, report);
-        if (near.particle) near.particle += n;
         gs4i_see_motion(&r.seen, q.v, C);
         gs4i_store_batch(&p, i, n, &out);
-        memcpy(p.affine[0] + 4 * i, u.dx, 4 * (size_t)n * sizeof *u.dx);
-        memcpy(p.affine[1] + 4 * i, u.dy, 4 * (size_t)n * sizeof *u.dy);
-        memcpy(p.affine[2] + 4 * i, u.dz, 4 * (size_t)n * sizeof *u.dz);
+        gs4i_store_gradients(&p, i, n, &u);
     }
     if (pass->commit) gs4i_report_motion(report, &r.seen);
 }
@@ -26775,6 +26797,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_SUM
 #undef GS4I_SURFACE_DEPTH
 #undef GS4I_THREAD_LOCAL
+#undef GS4I_MIDDLE_NODE
 #undef GS4I_TILE
 #undef GS4I_TILE_REALS
 #undef GS4I_TINY

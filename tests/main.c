@@ -27,6 +27,7 @@
 #include "test_partitioned_walls.c"
 #include "test_partitioned_bodies.c"
 #include "test_partitioned_surface.c"
+#include "test_partitioned_solids.c"
 #include "test_partitioned_periodic.c"
 #include "test_partitioned_flows.c"
 #include "test_partitioned_exact.c"
@@ -120,6 +121,7 @@ int main(int count, char **values)
     run_partitioned_walls();
     run_partitioned_bodies();
     run_partitioned_surface();
+    run_partitioned_solids();
     run_partitioned_periodic();
     run_partitioned_flows();
     run_partitioned_exact();

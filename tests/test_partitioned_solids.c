@@ -1,9 +1,19 @@
 /* Solids under the partitioned scheme: pressure and stress have one mass, so that what strains much
  * gives back what it took, and beams stand. */
 
+static gs4_material solids_rubber(void)
+{
+    gs4_material m = scene_liquid(1000, 0, 0);
+    m.incompressible = 1;
+    m.solid = GS4_NEO_HOOKEAN;
+    m.shear_modulus = 100000;
+    return m;
+}
+
 /* A free beam of 14 by 5 by 5 cells along `axis`, incompressible and neo-Hookean, 1e5 Pa: stretched
- * (more than 1), or twisted by 12.5 a metre where that is 1. */
-static gs4_sim *solids_beam(const gs4_material *m, double stretch, int axis)
+ * (more than 1), or twisted by 12.5 a metre where that is 1. In a box that is periodic along it,
+ * `parts` 1; 2: across the seam. */
+static gs4_sim *solids_beam(const gs4_material *m, double stretch, int axis, int parts)
 {
     gs4_sim_desc d = partitioned_cube(20);
     gs4_fill f = scene_fill(at(0, 0, 0));
@@ -11,18 +21,25 @@ static gs4_sim *solids_beam(const gs4_material *m, double stretch, int axis)
     double low[3], high[3];
     gs4_sim *sim;
     gs4_view x, F;
-    int i, k;
+    int i, k, part;
     d.cell_size = (gs4_real)0.01;
     for (i = 0; i < 6; i++) d.walls[i] = GS4_WALL_OPEN;
+    for (k = 0; k < 2 && parts; k++) d.walls[2 * axis + k] = GS4_WALL_PERIODIC;
     for (k = 0; k < 3; k++) {
         low[k] = k == axis ? 0.03 : 0.075;
         high[k] = 0.2 - low[k];
     }
     CHECK_RESULT(NULL, gs4_create(&d, &sim), GS4_OK);
     f.material = gs4_add_material(sim, m);
-    CHECK(gs4_add_particles(sim, gs4_box(at(low[0], low[1], low[2]), at(high[0], high[1], high[2])),
-                            &f)
-          > 0);
+    for (part = 0; part < (parts ? parts : 1); part++) {
+        if (parts == 2) {
+            low[axis] = part ? 0 : 0.13;
+            high[axis] = part ? 0.07 : 0.2;
+        }
+        CHECK(gs4_add_particles(
+                  sim, gs4_box(at(low[0], low[1], low[2]), at(high[0], high[1], high[2])), &f)
+              > 0);
+    }
     x = gs4_particles(sim, GS4_FIELD_POSITION);
     F = gs4_particles(sim, GS4_FIELD_DEFORMATION);
     for (i = 0; i < F.count; i++) {
@@ -46,13 +63,10 @@ static void test_partitioned_solids_energy(void)
     int n, k;
     for (n = 0; n < (test_slow ? 9 : 3); n++) {
         const int axis = (n + n / 3) % 3;
-        gs4_material m = scene_liquid(1000, 0, 0);
+        const gs4_material m = solids_rubber();
         double first, most = 0, last = 0, moves = 0, drift = 0, worst = 0, least;
         gs4_sim *sim;
-        m.incompressible = 1;
-        m.solid = GS4_NEO_HOOKEAN;
-        m.shear_modulus = 100000;
-        sim = solids_beam(&m, stretch[n % 3], axis);
+        sim = solids_beam(&m, stretch[n % 3], axis, 0);
         first = solid_elastic_energy(sim, &m);
         for (k = 0; k < 20; k++) {
             gs4_stats s;
@@ -76,6 +90,26 @@ static void test_partitioned_solids_energy(void)
         CHECK_BETWEEN(drift, 0, SOLID_DOUBLE ? 1e-9 : 1e-5);
         CHECK_BETWEEN(worst, 0, 0.001);
         gs4_destroy(sim);
+    }
+}
+
+/* A beam across the seam of a periodic box has the energy of one within it. */
+static void test_partitioned_solids_seam(void)
+{
+    int axis, n, k;
+    for (axis = test_slow ? 0 : 2; axis < 3; axis++) {
+        const gs4_material m = solids_rubber();
+        double energy[2][6];
+        for (n = 0; n < 2; n++) {
+            gs4_sim *sim = solids_beam(&m, 1.2, axis, n + 1);
+            for (k = 0; k < 6; k++) {
+                CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)0.0005), GS4_OK);
+                energy[n][k] = gs4_get_stats(sim).kinetic_energy + solid_elastic_energy(sim, &m);
+            }
+            gs4_destroy(sim);
+        }
+        for (k = 0; k < 6; k++)
+            CHECK_CLOSE(energy[1][k] / energy[0][k], 1, SOLID_DOUBLE ? 1e-8 : 1e-5);
     }
 }
 
@@ -157,5 +191,6 @@ static void test_partitioned_solids_cantilever(void)
 static void run_partitioned_solids(void)
 {
     RUN_FULL(test_partitioned_solids_energy);
+    RUN_FULL(test_partitioned_solids_seam);
     RUN_SLOW(test_partitioned_solids_cantilever);
 }

@@ -18700,10 +18700,10 @@ static int gs4i_take_fit_vectors(gs4_sim *sim)
 static gs4_real *gs4i_fitted_field(const gs4i_staggered *f, gs4_real *const field[3], int reals,
                                    int32_t n)
 {
-    const gs4i_moved_face *moved = (const gs4i_moved_face *)f->fit.moved.data + n;
-    const gs4i_face_beyond *beyond = (const gs4i_face_beyond *)f->fit.beyond.data - n;
-    return n > 0 ? field[moved->axis] + (size_t)reals * moved->face
-                 : field[beyond->axis] + (size_t)reals * beyond->face;
+    const gs4i_moved_face *moved = (const gs4i_moved_face *)f->fit.moved.data;
+    const gs4i_face_beyond *beyond = (const gs4i_face_beyond *)f->fit.beyond.data;
+    return n > 0 ? field[moved[n].axis] + (size_t)reals * moved[n].face
+                 : field[beyond[-n].axis] + (size_t)reals * beyond[-n].face;
 }
 
 /* All faces beyond liquid that have mass, and those that they depend on. */

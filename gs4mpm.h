@@ -277,7 +277,7 @@
  *     Pressure of solids has the mass that particles give to faces, those beyond the surface
  * included, as their stress has: what strains gives back what it took, and total stress vanishes at
  * free surfaces. A neo-Hookean beam of 5 x 5 cells, stretched to up to twice its length or twisted,
- * then let go, never has more than 1.01 of its energy, and .8 or more of it after 0.01 s. Fixed-
+ * then let go, never has more than its energy, and 3/4 or more of it after 0.01 s. Fixed-
  * corotated ones soften where they shrink: stretched to twice, 1.03. Cantilevers of 4 cells at
  * K/G = 1e4 or infinite sink within 7 % of beam theory, of 6 within 3 %, where particles lie as
  * they are filled in whole cells; where surfaces cut cells up to 1.53 (explicit 1.34) at 4 cells.
@@ -13958,7 +13958,7 @@ typedef struct gs4i_staggered {
     int is_plain;                          /* acc is not split, and not remembered */
     int without_split, without_correction; /* for tests of what they are for */
     uint8_t *kind;                         /* gs4_cell */
-    gs4i_elliptic system;                  /* the solver; all of it where an axis is periodic */
+    gs4i_elliptic system;                  /* the solver; [[krylov]] with a period or solids */
     gs4i_stokes stokes;                    /* that for velocity and pressure together */
     gs4i_fit fit;                          /* faces at surfaces */
     int is_fitted;                         /* pressure moves them as stress does */

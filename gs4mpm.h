@@ -4288,6 +4288,8 @@ typedef struct gs4i_krylov {
     int (*precondition)(void *context, const double *r, double *out);
     void *context;
     double residual; /* |r| / |b| of the last look; 1 and x = 0 after a breakdown */
+    double leeway;   /* what is wanted over what is left: of the products' own errors as much again
+                      * changes x by what is wanted (Simoncini & Szyld 2003) */
 } gs4i_krylov;
 
 static double gs4i_krylov_dot(const double *a, const double *b, size_t n)
@@ -4318,6 +4320,7 @@ static int gs4i_conjugate_gradients(gs4i_krylov *k, double tolerance, int max_it
         }
         if (norm <= tolerance * size) return GS4_OK;
         if (iteration >= max_iterations) return GS4_ERROR_NOT_CONVERGED;
+        k->leeway = tolerance * size / norm;
         result = k->precondition(k->context, k->r, k->q);
         if (result != GS4_OK) return result;
         rz = gs4i_krylov_dot(k->r, k->q, k->n);
@@ -6014,7 +6017,7 @@ typedef struct gs4i_elliptic {
     const gs4i_tasks *tasks;
     gs4_real h, inv_h;
     uint8_t *kind; /* GS4_CELL_LIQUID: an unknown; GS4_CELL_SOLID */
-    /* d; c of the faces across each axis; b; the unknown, 0 at the start */
+    /* d; c of the faces across each axis; b; the unknown, a guess at the start */
     gs4_real *diagonal, *face[3], *rhs, *x;
     /* scratch: residual of the sweeps; diagonal, then right-hand side of the preconditioner;
      * with a periodic axis what that gives, the vectors of [[krylov]] and two numbers of parts; the
@@ -6029,6 +6032,7 @@ typedef struct gs4i_elliptic {
     void (*beside)(void *context, const double *p, double *out);
     void *context;
     gs4i_solver solver;
+    gs4i_krylov krylov;
     double tolerance;   /* relative residual */
     int max_iterations; /* of the multigrid, and of what is around it */
     int iterations;     /* out: sweeps or cycles */
@@ -6329,36 +6333,57 @@ static int gs4i_elliptic_precondition(void *context, const double *r, double *ou
     return GS4_OK;
 }
 
+/* r = b - A x, with A x in q where x is not 0. */
+static void gs4i_begin_krylov(gs4i_elliptic *e)
+{
+    const size_t n = gs4i_box_count(e->box, GS4I_AT_CELL);
+    gs4i_krylov *k = &e->krylov;
+    size_t i;
+    int is_guess = 0;
+    k->n = n;
+    k->x = e->vectors;
+    k->r = k->x + n;
+    k->p = k->r + n;
+    k->q = k->p + n;
+    k->leeway = e->tolerance;
+    k->apply = gs4i_elliptic_apply;
+    k->precondition = gs4i_elliptic_precondition;
+    k->context = e;
+    for (i = 0; i < n; i++) {
+        k->r[i] = (double)e->rhs[i];
+        k->p[i] = e->kind[i] == GS4_CELL_LIQUID ? (double)e->x[i] : 0;
+        is_guess |= k->p[i] != 0;
+    }
+    if (!is_guess) return;
+    k->apply(k->context, k->p, k->q);
+    for (i = 0; i < n; i++) k->r[i] -= k->q[i];
+}
+
 static int gs4i_solve_by_krylov(gs4i_elliptic *e)
 {
     const size_t n = gs4i_box_count(e->box, GS4I_AT_CELL);
-    gs4i_krylov k;
-    double size, rest;
+    gs4i_krylov *k = &e->krylov;
+    double size = 0, rest;
     size_t i;
     int result;
-    k.n = n;
-    k.x = e->vectors;
-    k.r = k.x + n;
-    k.p = k.r + n;
-    k.q = k.p + n;
-    k.apply = gs4i_elliptic_apply;
-    k.precondition = gs4i_elliptic_precondition;
-    k.context = e;
-    for (i = 0; i < n; i++) k.r[i] = (double)e->rhs[i];
-    size = sqrt(gs4i_krylov_dot(k.r, k.r, n));
+    for (i = 0; i < n; i++) size += (double)e->rhs[i] * (double)e->rhs[i];
+    size = sqrt(size);
+    gs4i_begin_krylov(e);
     gs4i_find_parts(e);
-    gs4i_find_means(e, k.r, 1);
+    gs4i_find_means(e, k->r, 1);
     for (i = 0; i < n; i++) {
-        e->x[i] = 0;
-        if (e->kind[i] != GS4_CELL_LIQUID) continue;
-        k.r[i] -= gs4i_weight_in_part(e, i) * e->part_mean[e->part[i]];
-        if (e->part_capacity[e->part[i]] > 0) e->x[i] = GS4I_C(e->part_mean[e->part[i]]);
+        if (e->kind[i] != GS4_CELL_LIQUID) {
+            e->x[i] = 0;
+            continue;
+        }
+        k->r[i] -= gs4i_weight_in_part(e, i) * e->part_mean[e->part[i]];
+        if (e->part_capacity[e->part[i]] > 0) e->x[i] += GS4I_C(e->part_mean[e->part[i]]);
     }
-    rest = sqrt(gs4i_krylov_dot(k.r, k.r, n));
+    rest = sqrt(gs4i_krylov_dot(k->r, k->r, n));
     result =
-        gs4i_conjugate_gradients(&k, rest > 0 ? e->tolerance * size / rest : 1, e->max_iterations);
-    for (i = 0; i < n; i++) e->x[i] += GS4I_C(k.x[i]);
-    e->residual = size > 0 ? k.residual * rest / size : 0;
+        gs4i_conjugate_gradients(k, rest > 0 ? e->tolerance * size / rest : 1, e->max_iterations);
+    for (i = 0; i < n; i++) e->x[i] += GS4I_C(k->x[i]);
+    e->residual = size > 0 ? k->residual * rest / size : 0;
     return result;
 }
 
@@ -13923,7 +13948,7 @@ typedef struct gs4i_face_beyond {
 typedef struct gs4i_fit {
     gs4i_scratch moved, beyond, vectors;
     int32_t moved_count, beyond_count; /* 0 included */
-    double *mass, *value;              /* by number */
+    double *mass, *diagonal, *value;   /* by number; near that of P^T M P, of what is moved */
     gs4i_krylov solve;
     int result; /* of solves within that of pressure */
 } gs4i_fit;
@@ -13949,13 +13974,14 @@ typedef struct gs4i_staggered {
     uint8_t *known[3];
     uint8_t *contact; /* of a cell, where something separates: a bit for each side; NULL else */
     gs4_real *cell;   /* quads, GS4I_CELL_FILL ... */
-    gs4_real *diagonal, *rhs, *pressure;   /* of [[poisson]] */
-    int compressible;                      /* some K is finite */
-    int is_safe;                           /* no particle needs a trial */
-    int bodies_separate;                   /* some do */
-    int is_viscous;                        /* sticky walls take hold of what moves along them */
-    int is_implicit;                       /* stress is in the solve */
-    int is_plain;                          /* acc is not split, and not remembered */
+    gs4_real *diagonal, *rhs, *pressure; /* of [[poisson]] */
+    int compressible;                    /* some K is finite */
+    int is_safe;                         /* no particle needs a trial */
+    int bodies_separate;                 /* some do */
+    int is_viscous;                      /* sticky walls take hold of what moves along them */
+    int is_implicit;                     /* stress is in the solve */
+    int is_plain;                        /* acc is not split, and not remembered */
+    int is_revised; /* contact: the solve starts from the pressure that it found before */
     int without_split, without_correction; /* for tests of what they are for */
     uint8_t *kind;                         /* gs4_cell */
     gs4i_elliptic system;                  /* the solver; [[krylov]] with a period or solids */
@@ -18279,7 +18305,7 @@ static void gs4i_classify_cells(int z, void *context)
         f->kind[i] = q[GS4I_CELL_FILL] > GS4I_C(GS4I_LIQUID_FILL) ? GS4_CELL_LIQUID : GS4_CELL_AIR;
         if (q[GS4I_CELL_SOLID] > GS4I_C(0.95)) f->kind[i] = GS4_CELL_SOLID;
         f->diagonal[i] = q[GS4I_CELL_COMPLIANCE] / pass->sim->integrator.s;
-        f->pressure[i] = 0;
+        if (!f->is_revised) f->pressure[i] = 0;
         for (a = 0; a < 3; a++)
             if (at[a] < f->from[a] || at[a] >= f->to[a])
                 f->kind[i] =
@@ -18666,8 +18692,28 @@ static int gs4i_fit_precondition(void *context, const double *r, double *out)
     const gs4i_fit *fit = (const gs4i_fit *)context;
     int32_t i;
     out[0] = 0;
-    for (i = 1; i < fit->moved_count; i++) out[i] = r[i] / fit->mass[i];
+    for (i = 1; i < fit->moved_count; i++) out[i] = r[i] / fit->diagonal[i];
     return GS4_OK;
+}
+
+/* sum m P^2 down each column of P, where ways that join count as two. */
+static void gs4i_fit_diagonal(gs4i_fit *fit)
+{
+    const gs4i_face_beyond *beyond = (const gs4i_face_beyond *)fit->beyond.data;
+    const size_t all = (size_t)(fit->beyond_count - 1 + fit->moved_count);
+    double *d = fit->diagonal;
+    int32_t i;
+    int n;
+    memcpy(fit->value + 1 - fit->beyond_count, fit->mass + 1 - fit->beyond_count, all * sizeof *d);
+    for (i = fit->beyond_count - 1; i; i--) {
+        const gs4i_face_beyond *q = beyond + i;
+        const double part = fit->value[-i] / (q->sides * q->sides);
+        for (n = 0; n < q->sides; n++) {
+            fit->value[q->one[n]] += q->linear ? 4 * part : part;
+            if (q->linear) fit->value[q->two[n]] += part;
+        }
+    }
+    memcpy(d, fit->value, (size_t)fit->moved_count * sizeof *d);
 }
 
 /* Of the folded forces, so much may be left over: momentum is conserved within it. About 12
@@ -18682,13 +18728,14 @@ static int gs4i_take_fit_vectors(gs4_sim *sim)
     gs4i_krylov *k = &fit->solve;
     const size_t moved = (size_t)fit->moved_count, all = moved + (size_t)fit->beyond_count - 1;
     k->x = (double *)gs4i_scratch_reserve(&sim->memory, &fit->vectors,
-                                          (4 * moved + 2 * all) * sizeof *k->x, 0);
+                                          (5 * moved + 2 * all) * sizeof *k->x, 0);
     if (!k->x) return GS4_ERROR_MEMORY;
     k->n = moved;
     k->r = k->x + moved;
     k->p = k->r + moved;
     k->q = k->p + moved;
-    fit->mass = k->q + moved + fit->beyond_count - 1;
+    fit->diagonal = k->q + moved;
+    fit->mass = fit->diagonal + moved + fit->beyond_count - 1;
     fit->value = fit->mass + all;
     k->apply = gs4i_fit_apply;
     k->precondition = gs4i_fit_precondition;
@@ -18729,6 +18776,7 @@ static int gs4i_begin_fit(gs4_sim *sim)
     fit->mass[0] = 0;
     for (n = 1 - fit->beyond_count; n < fit->moved_count; n++)
         if (n) fit->mass[n] = (double)gs4i_fitted_field(f, f->given, 4, n)[GS4I_FACE_MASS];
+    gs4i_fit_diagonal(fit);
     return GS4_OK;
 }
 
@@ -18843,7 +18891,7 @@ static void gs4i_flow_at_surface(void *context, const double *p, double *out)
     gs4i_staggered *f = &sim->staggered;
     const double inv_h = (double)sim->grid.inv_h, s = (double)sim->integrator.s;
     int32_t n;
-    gs4i_fit_pressure(sim, p, fmax(0.01 * (double)sim->desc.solver_tolerance, GS4I_FIT_TOLERANCE));
+    gs4i_fit_pressure(sim, p, fmax(0.01 * f->system.krylov.leeway, GS4I_FIT_TOLERANCE));
     for (n = 1; n < f->fit.moved_count; n++) {
         const gs4i_moved_face *q = (const gs4i_moved_face *)f->fit.moved.data + n;
         const double flow =
@@ -18944,9 +18992,10 @@ static void gs4i_pressure_rhs(int z, void *context)
     int at[3];
     size_t i;
     GS4I_BOX_PLANE(&f->box, GS4I_AT_CELL, z, at, i) {
-        f->pressure[i] = 0;
+        const int solved = f->kind[i] == GS4_CELL_LIQUID && !gs4i_is_copy(f, at);
+        if (!solved || pass->what != GS4I_FACE_STAGE) f->pressure[i] = 0;
         f->rhs[i] = 0;
-        if (f->kind[i] != GS4_CELL_LIQUID || gs4i_is_copy(f, at)) continue;
+        if (!solved) continue;
         f->rhs[i] = -gs4i_face_divergence(f, pass->what, at, inv_h);
         if (pass->what == GS4I_FACE_ACCELERATION)
             f->rhs[i] += gs4i_trace_of_square(f, at, inv_h);
@@ -20023,7 +20072,9 @@ static int gs4i_accelerate_faces(gs4_sim *sim, gs4i_node_pass *nodes,
     int n;
     memset(&pass, 0, sizeof pass);
     pass.sim = sim;
+    f->is_revised = 0;
     GS4I_TRY(find(sim, nodes));
+    f->is_revised = 1;
     for (n = 1; f->contact && n <= GS4I_REVISIONS && gs4i_revise_contact(sim, n == GS4I_REVISIONS);
          n++) {
         gs4i_scatter_again(sim, nodes);

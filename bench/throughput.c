@@ -1,7 +1,7 @@
 /* Nanoseconds a particle and step: one block of a million particles, 8 a cell, settled and
  * stirred, GS4 and symplectic Euler, beside a textbook MLS-MPM loop (plain_mpm.c) in the same
- * run; then viscoelastic liquids, solids, melting, threads, and what an empty domain around
- * costs.
+ * run; then viscoelastic liquids, solids, melting, threads, the partitioned scheme, and what an
+ * empty domain around costs.
  *   cc -O3 -march=native bench/throughput.c -I. -lm -lpthread -o throughput
  *   ./throughput [--particles N] [--steps N] [--repeats N]
  * CSV on standard output. */
@@ -19,8 +19,8 @@ typedef struct row {
     double sort_share;
 } row;
 
-static gs4_sim *scene(int edge, const int cells[3], gs4_integrator integrator, gs4_liquid liquid,
-                      gs4_solid solid, int threads, int stirred)
+static gs4_sim *scene(int edge, const int cells[3], gs4_scheme scheme, gs4_integrator integrator,
+                      gs4_liquid liquid, gs4_solid solid, int threads, int stirred)
 {
     gs4_sim_desc d = scene_cube(edge);
     gs4_material m = scene_liquid(1000, 1, 30);
@@ -29,6 +29,7 @@ static gs4_sim *scene(int edge, const int cells[3], gs4_integrator integrator, g
     int a, n;
     for (a = 0; a < 3; a++) d.cells[a] = cells[a];
     d.gravity = at(0, -9.81, 0);
+    d.scheme = scheme;
     d.integrator = integrator;
     d.threads = threads;
     d.now = bench_now;
@@ -189,6 +190,7 @@ int main(int count, char **values)
 {
     int particles = 1000000, steps = 5, repeats = 7, i, edge = 4;
     double gs4[2], euler[2], text[2], elastic[2], solid[3], melting[2], two;
+    double projected[3];
     for (i = 1; i + 1 < count; i += 2) {
         if (strcmp(values[i], "--particles") == 0)
             particles = atoi(values[i + 1]);
@@ -205,41 +207,51 @@ int main(int count, char **values)
         puts("scene,particles,min_ns,median_ns,of_which_sort_ns,bytes_a_particle,state_hash");
         for (i = 0; i < 2; i++) {
             text[i] = plain(i ? "textbook stirred" : "textbook settled", edge, i, steps, repeats);
-            gs4[i] =
-                report(i ? "gs4 stirred" : "gs4 settled",
-                       scene(edge, snug, GS4_INTEGRATOR_GS4, GS4_NEWTONIAN, GS4_NO_SOLID, 1, i),
-                       steps, repeats);
+            gs4[i] = report(i ? "gs4 stirred" : "gs4 settled",
+                            scene(edge, snug, GS4_EXPLICIT, GS4_INTEGRATOR_GS4, GS4_NEWTONIAN,
+                                  GS4_NO_SOLID, 1, i),
+                            steps, repeats);
             euler[i] = report(i ? "euler stirred" : "euler settled",
-                              scene(edge, snug, GS4_INTEGRATOR_SYMPLECTIC_EULER, GS4_NEWTONIAN,
-                                    GS4_NO_SOLID, 1, i),
+                              scene(edge, snug, GS4_EXPLICIT, GS4_INTEGRATOR_SYMPLECTIC_EULER,
+                                    GS4_NEWTONIAN, GS4_NO_SOLID, 1, i),
                               steps, repeats);
         }
-        elastic[0] =
-            report("gs4 Oldroyd-B settled",
-                   scene(edge, snug, GS4_INTEGRATOR_GS4, GS4_OLDROYD_B, GS4_NO_SOLID, 1, 0), steps,
-                   repeats);
-        elastic[1] = report("gs4 Pom-Pom settled",
-                            scene(edge, snug, GS4_INTEGRATOR_GS4, GS4_POM_POM, GS4_NO_SOLID, 1, 0),
-                            steps, repeats);
-        solid[0] =
-            report("gs4 neo-Hookean settled",
-                   scene(edge, snug, GS4_INTEGRATOR_GS4, GS4_NEWTONIAN, GS4_NEO_HOOKEAN, 1, 0),
-                   steps, repeats);
-        solid[1] =
-            report("gs4 fixed-corotated settled",
-                   scene(edge, snug, GS4_INTEGRATOR_GS4, GS4_NEWTONIAN, GS4_FIXED_COROTATED, 1, 0),
-                   steps, repeats);
-        solid[2] = report("euler neo-Hookean settled",
-                          scene(edge, snug, GS4_INTEGRATOR_SYMPLECTIC_EULER, GS4_NEWTONIAN,
+        elastic[0] = report(
+            "gs4 Oldroyd-B settled",
+            scene(edge, snug, GS4_EXPLICIT, GS4_INTEGRATOR_GS4, GS4_OLDROYD_B, GS4_NO_SOLID, 1, 0),
+            steps, repeats);
+        elastic[1] = report(
+            "gs4 Pom-Pom settled",
+            scene(edge, snug, GS4_EXPLICIT, GS4_INTEGRATOR_GS4, GS4_POM_POM, GS4_NO_SOLID, 1, 0),
+            steps, repeats);
+        solid[0] = report("gs4 neo-Hookean settled",
+                          scene(edge, snug, GS4_EXPLICIT, GS4_INTEGRATOR_GS4, GS4_NEWTONIAN,
                                 GS4_NEO_HOOKEAN, 1, 0),
+                          steps, repeats);
+        solid[1] = report("gs4 fixed-corotated settled",
+                          scene(edge, snug, GS4_EXPLICIT, GS4_INTEGRATOR_GS4, GS4_NEWTONIAN,
+                                GS4_FIXED_COROTATED, 1, 0),
+                          steps, repeats);
+        solid[2] = report("euler neo-Hookean settled",
+                          scene(edge, snug, GS4_EXPLICIT, GS4_INTEGRATOR_SYMPLECTIC_EULER,
+                                GS4_NEWTONIAN, GS4_NEO_HOOKEAN, 1, 0),
                           steps, repeats);
         melting[0] =
             report("gs4 melting, all flows", melting_scene(edge, GS4_NO_SOLID), steps, repeats);
         melting[1] = report("gs4 melting, neo-Hookean below", melting_scene(edge, GS4_NEO_HOOKEAN),
                             steps, repeats);
-        two = report("gs4 settled two threads",
-                     scene(edge, snug, GS4_INTEGRATOR_GS4, GS4_NEWTONIAN, GS4_NO_SOLID, 2, 0),
-                     steps, repeats);
+        two = report(
+            "gs4 settled two threads",
+            scene(edge, snug, GS4_EXPLICIT, GS4_INTEGRATOR_GS4, GS4_NEWTONIAN, GS4_NO_SOLID, 2, 0),
+            steps, repeats);
+        for (i = 0; i < 3; i++)
+            projected[i] = report(i == 0   ? "partitioned gs4 settled"
+                                  : i == 1 ? "partitioned backward Euler settled"
+                                           : "partitioned gs4 settled two threads",
+                                  scene(edge, snug, GS4_PARTITIONED,
+                                        i == 1 ? GS4_INTEGRATOR_BACKWARD_EULER : GS4_INTEGRATOR_GS4,
+                                        GS4_NEWTONIAN, GS4_NO_SOLID, i == 2 ? 2 : 1, 0),
+                                  steps, repeats);
     }
     printf("# textbook over gs4: settled %.2f, stirred %.2f; over symplectic Euler: %.2f, %.2f; "
            "two threads %.2f times one\n",
@@ -252,15 +264,20 @@ int main(int count, char **values)
     printf("# a quarter of it molten: %.2f with heat alone, %.2f with solids below the melting "
            "point\n",
            melting[0] / gs4[0], melting[1] / gs4[0]);
+    printf(
+        "# partitioned over explicit gs4: %.2f, with backward Euler %.2f; two threads %.2f times "
+        "one\n",
+        projected[0] / gs4[0], projected[1] / gs4[0], projected[0] / projected[2]);
     {
         const int small[3] = { 20, 20, 20 }, huge[3] = { 512, 256, 256 };
         const double a = report(
-            "50 k snug", scene(18, small, GS4_INTEGRATOR_GS4, GS4_NEWTONIAN, GS4_NO_SOLID, 1, 0),
+            "50 k snug",
+            scene(18, small, GS4_EXPLICIT, GS4_INTEGRATOR_GS4, GS4_NEWTONIAN, GS4_NO_SOLID, 1, 0),
             4 * steps, repeats);
-        const double b =
-            report("50 k in 33 million cells",
-                   scene(18, huge, GS4_INTEGRATOR_GS4, GS4_NEWTONIAN, GS4_NO_SOLID, 1, 0),
-                   4 * steps, repeats);
+        const double b = report(
+            "50 k in 33 million cells",
+            scene(18, huge, GS4_EXPLICIT, GS4_INTEGRATOR_GS4, GS4_NEWTONIAN, GS4_NO_SOLID, 1, 0),
+            4 * steps, repeats);
         printf("# empty space costs a factor of %.2f\n", b / a);
     }
     return 0;

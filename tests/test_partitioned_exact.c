@@ -51,7 +51,7 @@ static const double levels_time[LEVELS_TIMES] = { 1.8, 2.4, 3, 3.6, 4.2, 4.8 },
                     };
 
 /* Levels of particles of a volume each in a slice of the width `wide`, by quadratic B-splines. */
-static void exact_levels(const gs4_sim *sim, double h, double wide, double out[LEVELS_GAUGES])
+static void exact_levels(gs4_sim *sim, double h, double wide, double out[LEVELS_GAUGES])
 {
     const double each = gs4_get_stats(sim).mass / 1000 / gs4_get_stats(sim).particles;
     const gs4_view x = gs4_particles(sim, GS4_FIELD_POSITION);

@@ -31,6 +31,7 @@
 #include "test_partitioned_periodic.c"
 #include "test_partitioned_flows.c"
 #include "test_partitioned_exact.c"
+#include "test_partitioned_extremes.c"
 #include "test_semi_implicit.c"
 #include "test_semi_viscoelastic.c"
 #include "test_mesh.c"
@@ -125,6 +126,7 @@ int main(int count, char **values)
     run_partitioned_periodic();
     run_partitioned_flows();
     run_partitioned_exact();
+    run_partitioned_extremes();
     run_semi_implicit();
     run_semi_viscoelastic();
     run_mesh();

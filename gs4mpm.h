@@ -27161,4 +27161,6 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  * gs4_limit_name; gs4_stats has `refused`. gs4_advance tries half of what was refused, before
  * half of the limit, which a max_dt could keep the same. Semi-implicit: steps are limited by
  * what moves, not by a fall that viscosity holds; viscosity is not cut off at s mu/(rho h^2) of
- * 1e6 any more, beyond which all crept too fast; the residual counts volume beside what flows. */
+ * 1e6 any more, beyond which all crept too fast; the residual counts volume beside what flows.
+ * Partitioned: what flies past dry walls does not feel them, falls in uneven steps are exact, the
+ * limit of viscosity is that of the member. */

@@ -12115,6 +12115,7 @@ typedef struct gs4i_near_particle {
     /* the first node that it sees in the tile of its block; slot of its image, later the image's
      * number, or GS4I_NO_IMAGE, GS4I_HOLDS_NODES */
     int32_t base, image;
+    int32_t batch; /* of the first of a batch: GS4I_BATCH_IS_NEAR, GS4I_BATCH_HAS_IMAGES */
 } gs4i_near_particle;
 
 /* The image of a particle behind the surface of a sticky collider: gs4i_place_image_particle. */
@@ -14506,6 +14507,12 @@ enum {
     GS4I_HOLDS_NODES = -2
 };
 
+/* Of a batch: is any particle near a sticky body, or may be; has any an image? */
+enum {
+    GS4I_BATCH_IS_NEAR = 1,
+    GS4I_BATCH_HAS_IMAGES = 2
+};
+
 /* What is scattered. */
 enum {
     GS4I_IMAGE_MOMENTUM,
@@ -14655,9 +14662,11 @@ GS4I_INLINE int gs4i_is_clear(gs4_real d, gs4_real h)
 static gs4_real gs4i_near_decay(const gs4_sim *sim, const gs4i_collider *b, gs4_vec3 p, gs4_real d)
 {
     const gs4_real inv_h = sim->grid.inv_h,
-                   speed = GS4I_C(500) * gs4i_length(gs4i_collider_velocity(b, p)) * inv_h,
                    near = gs4i_max(gs4i_min((GS4I_IMAGE_REACH - d * inv_h) * GS4I_C(0.5), 1), 0);
-    return near * gs4i_min(speed, sim->integrator.fast_decay);
+    if (near == 0 || !gs4i_is_moving(b)) return 0;
+    return near
+           * gs4i_min(GS4I_C(500) * gs4i_length(gs4i_collider_velocity(b, p)) * inv_h,
+                      sim->integrator.fast_decay);
 }
 
 /* Four numbers of each node of a patch. Its distance d, such that sum w d is that of particles:
@@ -14953,7 +14962,7 @@ static const uint64_t *gs4i_find_clear_nodes(const gs4_sim *sim, int o, uint64_t
     memset(clear, 0xff, GS4I_TILE * sizeof *clear);
     for (k = 0; k < sim->boundary.collider_count; k++) {
         const gs4i_surface *surface;
-        uint64_t of[27], bits[GS4I_TILE];
+        uint64_t of[27], bits[GS4I_TILE], every = ~(uint64_t)0;
         if (!gs4i_sticks_by(sim, k, o)) continue;
         any = 1;
         surface = gs4i_surface_of(sim, k, o);
@@ -14964,7 +14973,9 @@ static const uint64_t *gs4i_find_clear_nodes(const gs4_sim *sim, int o, uint64_t
             of[i] = surface->kind == GS4I_SURFACE_FLAT ? 0
                     : patch < 0                        ? ~(uint64_t)0
                                                        : all[patch].clear;
+            every &= of[i];
         }
+        if (!~every) continue;
         gs4i_bits_of_tile(of, bits);
         for (i = 0; i < GS4I_TILE; i++) clear[i] &= bits[i];
     }
@@ -14995,18 +15006,23 @@ static int gs4i_is_in_sticky(const gs4_sim *sim, int o, gs4_vec3 p, int node, gs
     return 0;
 }
 
-/* Is any of the n particles from i on, of occupied block o, within three cells of a sticky body, or
- * may be? */
-static int gs4i_any_is_near(const gs4_sim *sim, int o, size_t i, int n)
+/* Is any of the batch from particle i on, of occupied block o, within three cells of a sticky body,
+ * or may be? */
+static int gs4i_any_is_near(const gs4_sim *sim, int o, size_t i)
 {
     const gs4i_image_particles *g = &sim->image_particles;
-    const gs4i_near_particle *near;
-    int b, any = 0;
-    if (!g->near) return 1;
-    near = (const gs4i_near_particle *)g->of_particles.data + ((const int32_t *)g->of.data)[o]
-           + (i - (size_t)sim->grid.first[o]);
-    for (b = 0; b < n; b++) any |= near[b].body >= 0 || near[b].base < 0;
-    return any;
+    const gs4i_near_particle *near = (const gs4i_near_particle *)g->of_particles.data;
+    return !g->near
+           || (near[((const int32_t *)g->of.data)[o] + (int32_t)(i - (size_t)sim->grid.first[o])]
+                   .batch
+               & GS4I_BATCH_IS_NEAR);
+}
+
+/* Does the node nearest to a particle say that it is outside? */
+GS4I_INLINE int gs4i_is_clear_base(const uint64_t clear[GS4I_TILE], int32_t base)
+{
+    const int node = base + GS4I_MIDDLE_NODE;
+    return base >= 0 && (clear[node >> 6] >> (node & 63) & 1);
 }
 
 /* Which of n particles of occupied block o are inside of a sticky body where they ended, at x? A
@@ -15020,12 +15036,15 @@ static unsigned gs4i_ended_inside(const gs4_sim *sim, int o, const uint64_t clea
     unsigned inside = 0;
     int b;
     gs4i_to_lanes(x, n, at);
+    gs4i_bases_at(&frame, at, s.base);
+    for (b = 0; b < n && gs4i_is_clear_base(clear, s.base[b]);) b++;
+    if (b == n) return 0;
     gs4i_stencils_at(&s, &frame, at);
     GS4I_BATCH_LOOP(b)
         away2[b] = s.xi[0][b] * s.xi[0][b] + s.xi[1][b] * s.xi[1][b] + s.xi[2][b] * s.xi[2][b];
     for (b = 0; b < n; b++) {
         const int node = s.base[b] < 0 ? -1 : s.base[b] + GS4I_MIDDLE_NODE;
-        if (node >= 0 && (clear[node >> 6] >> (node & 63) & 1)) continue;
+        if (gs4i_is_clear_base(clear, s.base[b])) continue;
         if (gs4i_is_in_sticky(sim, o, gs4i_vec3(x[4 * b], x[4 * b + 1], x[4 * b + 2]), node,
                               GS4I_NTH(away2, b)))
             inside |= 1u << b;
@@ -15033,24 +15052,30 @@ static unsigned gs4i_ended_inside(const gs4_sim *sim, int o, const uint64_t clea
     return inside;
 }
 
+/* Of a row of a tile what `four` has, `count` numbers; `none` and three times 0 where it is NULL. */
+GS4I_INLINE void gs4i_load_part(const gs4_real *four, int from, int count, gs4_real none,
+                                gs4_real *out)
+{
+    int k;
+    if (four) {
+        memcpy(out, four + from, (size_t)count * sizeof *out);
+        return;
+    }
+    memset(out, 0, (size_t)count * sizeof *out);
+    for (k = 0; k < count; k += 4) out[k] = none;
+}
+
 /* A tile from what the 27 blocks around it have, four numbers a node: `none` and three times 0
  * where there is nothing. */
 static void gs4i_load_around(const gs4_real *const of[27], gs4_real none, gs4_real *tile)
 {
-    static const int from[3] = { 8, 0, 0 }, to[3] = { 0, 8, 24 }, count[3] = { 8, 16, 8 };
-    int row, i, k;
+    int row;
     for (row = 0; row < GS4I_TILE * GS4I_TILE; row++, tile += 4 * GS4I_TILE) {
         const int y = (row & 7) + 2, z = (row >> 3) + 2, place = 4 * gs4i_place_of(0, y, z);
-        for (i = 0; i < 3; i++) {
-            const gs4_real *four = of[3 * (3 * (z >> 2) + (y >> 2)) + i];
-            gs4_real *out = tile + to[i];
-            if (four) {
-                memcpy(out, four + place + from[i], (size_t)count[i] * sizeof *out);
-                continue;
-            }
-            memset(out, 0, (size_t)count[i] * sizeof *out);
-            for (k = 0; k < count[i]; k += 4) out[k] = none;
-        }
+        const gs4_real *const *three = of + 3 * (3 * (z >> 2) + (y >> 2));
+        gs4i_load_part(three[0], place + 8, 8, none, tile);
+        gs4i_load_part(three[1], place, 16, none, tile + 8);
+        gs4i_load_part(three[2], place, 8, none, tile + 24);
     }
     memset(tile, 0, 16 * sizeof *tile);
 }
@@ -15077,7 +15102,10 @@ static int gs4i_find_near_nodes(const gs4_sim *sim, int collider, int o, uint64_
     for (i = 0; i < 27; i++) {
         const int patch = gs4i_patch_of(sim, collider, sim->grid.neighbour[27 * o + i]);
         of[i] = patch < 0 ? 0 : all[patch].near;
+        any |= of[i];
     }
+    if (!any) return 0;
+    any = 0;
     gs4i_bits_of_tile(of, near);
     for (i = 0; i < GS4I_TILE; i++) {
         near[i] |= near[i] >> 1 | near[i] >> 2;
@@ -15248,7 +15276,16 @@ static void gs4i_find_near_particles(int index, void *context)
     }
     for (k = 0; k < sim->boundary.collider_count; k++)
         if (gs4i_is_sticky(&sim->boundary.colliders[k])) gs4i_meet_body(sim, k, index, g);
-    for (k = 0; k < n; k++) *count += g[k].image >= 0;
+    for (k = 0; k < n; k += GS4I_BATCH) {
+        const int end = n - k < GS4I_BATCH ? n : k + GS4I_BATCH;
+        int i, near = 0, images = 0;
+        for (i = k; i < end; i++) {
+            near |= g[i].body >= 0 || g[i].base < 0;
+            images += g[i].image >= 0;
+        }
+        g[k].batch = (near ? GS4I_BATCH_IS_NEAR : 0) | (images ? GS4I_BATCH_HAS_IMAGES : 0);
+        *count += images;
+    }
 }
 
 /* Volume of the image over that of the particle: behind a ball of radius R and before it lie shells
@@ -15345,9 +15382,8 @@ static void gs4i_place_image_particles(int index, void *context)
         const int n = gs4i_batch_size(i, end);
         gs4i_batch q;
         gs4i_lanes x[3];
-        int b, c, any = 0;
-        for (b = 0; b < n; b++) any |= near[b].image >= 0;
-        if (!any) {
+        int b, c;
+        if (!(near->batch & GS4I_BATCH_HAS_IMAGES)) {
             near += n;
             continue;
         }
@@ -15763,6 +15799,7 @@ static void gs4i_make_odd(const gs4i_near_particles *near, int n, int solids, gs
                           gs4i_gathered *acc)
 {
     int b;
+    if (!(near->particle->batch & GS4I_BATCH_HAS_IMAGES)) return;
     for (b = 0; b < n; b++) {
         const gs4i_image_particle *g = gs4i_odd_image(near, b);
         if (!g) continue;
@@ -15821,6 +15858,7 @@ static void gs4i_reflect_forces(const gs4i_near_particles *near, int n, int with
                                 const gs4i_forces *f)
 {
     int b, c;
+    if (!(near->particle->batch & GS4I_BATCH_HAS_IMAGES)) return;
     gs4i_reflect_columns(near, n, f->x, f->y, f->z, 0);
     for (b = 0; b < n; b++) {
         gs4i_image_particle *g = gs4i_image_of(near, b);
@@ -15837,6 +15875,7 @@ static void gs4i_reflect_affine(const gs4i_near_particles *near, int n, const gs
                                 const gs4i_affine_forces *f, gs4_real h)
 {
     int b, c, a;
+    if (!(near->particle->batch & GS4I_BATCH_HAS_IMAGES)) return;
     gs4i_reflect_columns(near, n, f->x, f->y, f->z, 1);
     for (b = 0; b < n; b++) {
         gs4i_image_particle *g = gs4i_image_of(near, b);
@@ -16693,7 +16732,7 @@ static void gs4i_correct_contact(gs4_sim *sim, int block, const uint64_t *clear,
                             : NULL;
     const int touches =
         gs4i_may_touch(&sim->boundary, o->x, n, sim->grid.h, sim->desc.scheme != GS4_EXPLICIT);
-    const unsigned inside = clear && gs4i_any_is_near(sim, block, i, n)
+    const unsigned inside = clear && gs4i_any_is_near(sim, block, i)
                                 ? gs4i_ended_inside(sim, block, clear, o->x, n)
                                 : 0;
     int b;

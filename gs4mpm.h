@@ -15333,6 +15333,12 @@ static void gs4i_place_image_particle(const gs4_sim *sim, gs4_vec3 p,
     g->slot = near->image;
 }
 
+/* Does the body of an image turn? */
+GS4I_INLINE int gs4i_has_spin(const gs4i_image_particle *g)
+{
+    return g->spin[0] != 0 || g->spin[1] != 0 || g->spin[2] != 0;
+}
+
 /* Columns of spin x (I - n n), how the body's velocity changes along its surface. */
 GS4I_INLINE void gs4i_surface_spin(const gs4i_image_particle *g, gs4_real turn[3][3])
 {
@@ -15782,7 +15788,7 @@ GS4I_INLINE void gs4i_make_gradient_odd(const gs4i_image_particle *g, int b, int
     column[0] = u->dx + 4 * b;
     column[1] = u->dy + 4 * b;
     column[2] = u->dz + 4 * b;
-    if (!what) gs4i_surface_spin(g, turn);
+    if (!what && gs4i_has_spin(g)) gs4i_surface_spin(g, turn);
     for (c = 0; c < 3; c++)
         across[c] = g->seen[what][1][c] * g->n[0] + g->seen[what][2][c] * g->n[1]
                     + g->seen[what][3][c] * g->n[2];
@@ -15881,15 +15887,17 @@ static void gs4i_reflect_affine(const gs4i_near_particles *near, int n, const gs
         gs4i_image_particle *g = gs4i_image_of(near, b);
         gs4_real turn[3][3];
         if (!g) continue;
-        gs4i_surface_spin(g, turn);
         for (c = 0; c < 3; c++) {
             const gs4_real at_x = f->middle[4 * b + c]
                                   + f->x[4 * b + c] * GS4I_NTH_CONST(s->xi[0], b)
                                   + f->y[4 * b + c] * GS4I_NTH_CONST(s->xi[1], b)
                                   + f->z[4 * b + c] * GS4I_NTH_CONST(s->xi[2], b);
             g->carried[0][c] = 2 * g->x[3] * g->v[c] - g->part * at_x;
-            for (a = 0; a < 3; a++) g->carried[1 + a][c] += 2 * g->x[3] * h * turn[a][c];
         }
+        if (!gs4i_has_spin(g)) continue;
+        gs4i_surface_spin(g, turn);
+        for (a = 0; a < 3; a++)
+            for (c = 0; c < 3; c++) g->carried[1 + a][c] += 2 * g->x[3] * h * turn[a][c];
     }
 }
 

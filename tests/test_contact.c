@@ -976,6 +976,55 @@ static void test_contact_ended(void)
     }
 }
 
+/* Particles that no node says are near a body are passed over: what the others have is what all have
+ * that ask every node. Three balls; particles everywhere in their block. */
+static void test_contact_near(void)
+{
+    int n, o, i;
+    for (n = 0; n < 3; n++) {
+        gs4_sim_desc d = contact_desc(n % 2, GS4_WALL_SLIP);
+        const gs4_material m = scene_liquid(1000, 0.1, 12);
+        const gs4_fill fill = scene_fill(at(0, 0, 0));
+        gs4_sim *sim = physics_create(&d, &m);
+        int wrong = 0, passed = 0, near = 0;
+        gs4_collider c;
+        memset(&c, 0, sizeof c);
+        c.shape = gs4_sphere(at(0.613, 0.589, 0.607), (gs4_real)((1.3 + 1.1 * n) * CONTACT_H));
+        CHECK_RESULT(sim, gs4_add_collider(sim, &c), 0);
+        CHECK(gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1.2, 1.2, 1.2)), &fill) > 0);
+        CHECK_RESULT(sim, gs4_step(sim, (gs4_real)0.2 * gs4_stable_dt(sim)), 0);
+        for (o = 0; o < sim->grid.occupied; o++) {
+            const gs4i_frame f = gs4i_tile_frame(&sim->grid, sim->grid.occupied_block[o]);
+            gs4_real tile[4 * 512 + 64];
+            uint64_t bits[8], all[8];
+            const int any = gs4i_find_near_nodes(sim, 0, o, bits);
+            if (gs4i_surface_of(sim, 0, o)->kind != GS4I_SURFACE_CURVED) continue;
+            if (!any) memset(bits, 0, sizeof bits);
+            memset(all, 0xff, sizeof all);
+            gs4i_load_patches(sim, 0, o, tile);
+            for (i = sim->grid.first[o]; i < sim->grid.first[o + 1]; i++) {
+                const gs4_real reach = 3 * sim->grid.h;
+                gs4i_near_particle g[2];
+                gs4i_lanes x[4];
+                int32_t base[16];
+                gs4i_to_lanes(sim->particles.position + 4 * i, 1, x);
+                gs4i_bases_at(&f, x, base);
+                memset(g, 0, sizeof g);
+                g[0].base = g[1].base = base[0];
+                g[0].d = g[1].d = reach;
+                g[0].body = g[1].body = -1;
+                gs4i_meet_patches(&sim->grid, 0, &f, tile, bits, x, 1, g);
+                gs4i_meet_patches(&sim->grid, 0, &f, tile, all, x, 1, g + 1);
+                wrong += memcmp(g, g + 1, sizeof *g) != 0;
+                near += g[1].body == 0;
+                passed += base[0] >= 0 && !(bits[base[0] >> 6] >> (base[0] & 63) & 1);
+            }
+        }
+        CHECK(wrong == 0 && near > 100 && passed > 100);
+        gs4_destroy(sim);
+    }
+}
+
 /* --- bodies of revolution --------------------------------------------------------------------- */
 
 /* How far the hole of a pipe is: radius 0.35 about the axis of the frame's normal. */
@@ -1988,6 +2037,7 @@ static void run_contact(void)
     RUN_FULL(test_contact_calls);
     RUN_ONCE(test_contact_images);
     RUN_ONCE(test_contact_ended);
+    RUN_ONCE(test_contact_near);
     RUN_ONCE(test_contact_sticky_wall);
     RUN_FULL(test_contact_leaves);
     RUN_FULL(test_contact_carries);

@@ -15052,7 +15052,7 @@ static unsigned gs4i_ended_inside(const gs4_sim *sim, int o, const uint64_t clea
     return inside;
 }
 
-/* Of a row of a tile what `four` has, `count` numbers; `none` and three times 0 where it is NULL. */
+/* Of a row of a tile what `four` has, `count` numbers; where NULL `none` and three times 0. */
 GS4I_INLINE void gs4i_load_part(const gs4_real *four, int from, int count, gs4_real none,
                                 gs4_real *out)
 {

@@ -976,8 +976,8 @@ static void test_contact_ended(void)
     }
 }
 
-/* Particles that no node says are near a body are passed over: what the others have is what all have
- * that ask every node. Three balls; particles everywhere in their block. */
+/* Particles that no node says are near a body are passed over: what the others have is what all
+ * have that ask every node. Three balls; particles everywhere in their block. */
 static void test_contact_near(void)
 {
     int n, o, i;

@@ -381,7 +381,7 @@ static void test_volume_after_flow(void)
     of = kicks;
     for (k = 0; k < 4; k++) {
         of.axis = k % 3;
-        of.high = 6 + k * 0.5;
+        of.high = 6 + k * 0.25;
         volume_after(physics_integrators[0], of);
     }
     of = kicks;

@@ -18486,40 +18486,57 @@ GS4I_INLINE void gs4i_extrapolate_face(const gs4i_staggered_pass *pass, int c, c
     f->known[c][i] = (uint8_t)pass->layer;
 }
 
-/* Is any face of axis c known in row (y, z), or in the rows beside it? */
-static int gs4i_is_known_near(const gs4i_staggered *f, int c, int y, int z)
+enum {
+    GS4I_FACE_RUN = 64
+};
+
+/* Which of the GS4I_FACE_RUN faces of axis c from face x of row (y, z) on, as far as that goes, have
+ * a known one beside them, or do themselves? */
+static void gs4i_find_beside_known(const gs4i_staggered *f, int c, int x, int y, int z,
+                                   uint8_t beside[GS4I_FACE_RUN])
 {
-    const int nx = gs4i_box_length(&f->box, 1 << c, 0);
-    int side, x, any = 0;
-    for (side = 0; side < 5; side++) {
-        const int b = y + (side == 1) - (side == 2), d = z + (side == 3) - (side == 4);
+    const int nx = gs4i_box_length(&f->box, 1 << c, 0) - x;
+    int side, i;
+    memset(beside, 0, GS4I_FACE_RUN);
+    for (side = 0; side < 6; side++) {
+        const int up = side & 1 ? 1 : -1, b = y + (side / 2 == 1) * up,
+                  d = z + (side / 2 == 2) * up, shift = (side / 2 == 0) * up, from = x + shift < 0,
+                  rest = nx - (shift > 0), to = rest < GS4I_FACE_RUN ? rest : GS4I_FACE_RUN;
         const uint8_t *known;
         if (b < 0 || b >= gs4i_box_length(&f->box, 1 << c, 1)) continue;
         if (d < 0 || d >= gs4i_box_length(&f->box, 1 << c, 2)) continue;
-        known = f->known[c] + gs4i_box_index(&f->box, 1 << c, 0, b, d);
-        for (x = 0; x < nx; x++) any |= known[x];
+        known = f->known[c] + gs4i_box_index(&f->box, 1 << c, x, b, d);
+        for (i = from; i < to; i++) beside[i] |= known[i + shift];
     }
-    return any;
+}
+
+static void gs4i_extrapolate_row(const gs4i_staggered_pass *pass, int c, int y, int z)
+{
+    const gs4i_staggered *f = &pass->sim->staggered;
+    const ptrdiff_t nx = gs4i_box_length(&f->box, 1 << c, 0),
+                    step[3] = { 1, nx, nx * gs4i_box_length(&f->box, 1 << c, 1) };
+    const size_t row = gs4i_box_index(&f->box, 1 << c, 0, y, z);
+    const int end = f->to[0] + (c == 0);
+    uint8_t beside[GS4I_FACE_RUN];
+    int at[3], first;
+    at[1] = y;
+    at[2] = z;
+    for (first = f->from[0]; first < end; first += GS4I_FACE_RUN) {
+        gs4i_find_beside_known(f, c, first, y, z, beside);
+        for (at[0] = first; at[0] < end && at[0] < first + GS4I_FACE_RUN; at[0]++)
+            if (beside[at[0] - first] && !f->known[c][row + (size_t)at[0]])
+                gs4i_extrapolate_face(pass, c, at, step, row + (size_t)at[0]);
+    }
 }
 
 static void gs4i_extrapolate_layer(int z, void *context)
 {
     const gs4i_staggered_pass *pass = (const gs4i_staggered_pass *)context;
     const gs4i_staggered *f = &pass->sim->staggered;
-    int c, at[3];
-    for (c = 0; c < 3; c++) {
-        const ptrdiff_t nx = gs4i_box_length(&f->box, 1 << c, 0),
-                        step[3] = { 1, nx, nx * gs4i_box_length(&f->box, 1 << c, 1) };
-        at[2] = z;
-        if (z < f->from[2] || z >= f->to[2] + (c == 2)) continue;
-        for (at[1] = f->from[1]; at[1] < f->to[1] + (c == 1); at[1]++) {
-            const size_t row = gs4i_box_index(&f->box, 1 << c, 0, at[1], z);
-            if (!gs4i_is_known_near(f, c, at[1], z)) continue;
-            for (at[0] = f->from[0]; at[0] < f->to[0] + (c == 0); at[0]++)
-                if (!f->known[c][row + (size_t)at[0]])
-                    gs4i_extrapolate_face(pass, c, at, step, row + (size_t)at[0]);
-        }
-    }
+    int c, y;
+    for (c = 0; c < 3; c++)
+        for (y = f->from[1]; y < f->to[1] + (c == 1); y++)
+            if (z >= f->from[2] && z < f->to[2] + (c == 2)) gs4i_extrapolate_row(pass, c, y, z);
 }
 
 /* The first `numbers` from the known faces to those around and behind the walls. */

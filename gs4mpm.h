@@ -18496,8 +18496,8 @@ enum {
     GS4I_FACE_RUN = 64
 };
 
-/* Which of the GS4I_FACE_RUN faces of axis c from face x of row (y, z) on, as far as that goes, have
- * a known one beside them, or do themselves? */
+/* Which faces of axis c in row (y, z), GS4I_FACE_RUN of them or fewer from face x on, have a known
+ * one beside them? */
 static void gs4i_find_beside_known(const gs4i_staggered *f, int c, int x, int y, int z,
                                    uint8_t beside[GS4I_FACE_RUN])
 {

@@ -301,7 +301,8 @@
  * 65 in ropes and folded sheets, 40 in porous matter and spray, 90 in pools with inclusions 1e6
  * times stiffer (bench/stokes.c). A step that does not converge is refused.
  *     On slippery planes liquid slides with g sin within 1 %, from s mu/(rho h^2) = 0.3 on within
- * 2.5 %; shear waves between such, wherever they cut cells, fall within 1 % of the exact. Where that is far above 1 bodies with a curved surface brake what turns along it, as faces
+ * 2.5 %; shear waves between such, wherever they cut cells, fall within 1 % of the exact. Where
+ * s mu/(rho h^2) is far above 1 bodies with a curved surface brake what turns along it, as faces
  * are flat within a cell: a bucket of 13 cells across at 1/1000 of the rate of a sticky one.
  *     Steps go from a fall to creeping: waves on a pool of 16 cells fall level at the exact rate
  * within 1 % in steps of a tenth of their time constant, whatever the viscosity, at

@@ -20705,8 +20705,8 @@ static void gs4i_scatter_viscosity(int index, void *context)
     gs4i_report_liquids(r.report, &r.seen);
 }
 
-/* Share of cell i that slippery bodies leave open, as if they had one flat surface in it: a third of
- * the sum over its sides of area times distance from the centre. */
+/* Share of cell i that slippery bodies leave open, as if they had one flat surface in it: a third
+ * of the sum over its sides of area times distance from the centre. */
 static gs4_real gs4i_open_share_of_cell(const gs4i_staggered *f, size_t i)
 {
     const gs4_real solid = f->cell[4 * i + GS4I_CELL_SOLID];

@@ -804,7 +804,7 @@ static void semi_check_frictionless(void)
 }
 static void test_semi_frictionless(void) { semi_check(semi_check_frictionless); }
 
-/* What is left after a time of a wave of shear, number k, per velocity: rho u' = - F mu k^2 u - k s,
+/* What a time leaves of a wave of shear, number k, per velocity: rho u' = - F mu k^2 u - k s,
  * t s' + s = (1 - F) mu k u. */
 static double semi_wave_left(const gs4_material *m, double k, double time)
 {

@@ -25633,15 +25633,6 @@ GS4_API GS4I_COLD int gs4_add_material(gs4_sim *sim, const gs4_material *materia
     return gs4i_add_material(sim, material);
 }
 
-GS4_API GS4I_COLD int gs4_set_gravity(gs4_sim *sim, gs4_vec3 gravity)
-{
-    GS4I_TRY(gs4i_check_idle(sim));
-    GS4I_TRY(gs4i_check3(&sim->error, "gravity", gravity));
-    gs4i_restart(sim);
-    gs4i_set_gravity(sim, gravity);
-    return GS4_OK;
-}
-
 GS4_API GS4I_COLD int gs4_set_viscosity(gs4_sim *sim, int material, gs4_real viscosity)
 {
     gs4i_scene scene;
@@ -25690,6 +25681,16 @@ static GS4I_COLD int gs4i_check_edit(gs4_sim *sim)
     gs4i_settle_edit(sim);
     gs4i_note_speed(sim, gs4i_top_speed(p));
     sim->needs_check = 0;
+    return GS4_OK;
+}
+
+GS4_API GS4I_COLD int gs4_set_gravity(gs4_sim *sim, gs4_vec3 gravity)
+{
+    GS4I_TRY(gs4i_check_idle(sim));
+    GS4I_TRY(gs4i_check3(&sim->error, "gravity", gravity));
+    GS4I_TRY(gs4i_check_edit(sim)); /* default speeds of sound go by gravity and top speed so far */
+    gs4i_restart(sim);
+    gs4i_set_gravity(sim, gravity);
     return GS4_OK;
 }
 

@@ -499,6 +499,7 @@ static void any_desc(gs4_sim_desc *d)
     int a;
     make_desc(&r.s, d, threads);
     if (one_in(4)) make_partitioned(d);
+    if (d->scheme == GS4_PARTITIONED && one_in(2)) d->scheme = GS4_SEMI_IMPLICIT;
     for (a = 0; a < 3; a++)
         if (!one_in(3)) d->cells[a] = r.s.cells[a] = one_in(8) ? pick(15, 24) : pick(4, 10);
     if (one_in(4)) d->max_particles = pick(1, MOST_PARTICLES);
@@ -537,6 +538,15 @@ static void make_yielding(gs4_material *m)
     m->herschel_bulkley.creep_rate = number(1, 100, 10);
 }
 
+/* The semi-implicit scheme has no solids. */
+static void make_never_solid(gs4_material *m)
+{
+    m->solid = GS4_NO_SOLID;
+    m->shear_modulus = m->yield_compression = m->yield_stretch = 0;
+    m->can_melt = 0;
+    m->melting_temperature = m->latent_heat = 0;
+}
+
 static void any_material(gs4_material *m)
 {
     static const char *const names[] = {
@@ -548,7 +558,8 @@ static void any_material(gs4_material *m)
     if ((m->solid == GS4_NO_SOLID || m->can_melt) && one_in(5)) make_yielding(m);
     if (one_in(5) && gs4_material_preset(names[pick(0, COUNT(names) - 1)], m) < 0)
         check(strlen(gs4_last_error(NULL)) > 10, "a sentence about presets", 0);
-    if (r.desc.scheme == GS4_PARTITIONED) make_incompressible(m);
+    if (r.desc.scheme == GS4_SEMI_IMPLICIT && !one_in(8)) make_never_solid(m);
+    if (r.desc.scheme != GS4_EXPLICIT) make_incompressible(m);
     disturb(m, of_material, COUNT(of_material));
     if (m->viscosity_fn) m->viscosity_fn = any_viscosity;
     m->liquid = (gs4_liquid)any_int((int)m->liquid);

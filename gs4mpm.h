@@ -26171,6 +26171,7 @@ GS4_API int gs4_advance_within(gs4_sim *sim, gs4_real duration, const gs4_budget
                                double *done)
 {
     uint64_t before;
+    double began;
     size_t used;
     gs4i_text t;
     int result;
@@ -26180,9 +26181,11 @@ GS4_API int gs4_advance_within(gs4_sim *sim, gs4_real duration, const gs4_budget
     GS4I_TRY(gs4i_check_budget(sim, budget));
     GS4I_TRY(gs4i_check_edit(sim));
     before = sim->steps;
+    began = sim->time;
     sim->time_left = (double)duration;
     result = gs4i_advance(sim, budget);
-    if (done) *done = (double)duration - sim->time_left;
+    /* steps far below `duration` leave time_left as it is */
+    if (done) *done = sim->time_left > 0 ? sim->time - began : (double)duration;
     if (result == GS4_OK || sim->steps == before) return result;
     /* what it did nevertheless */
     used = strlen(sim->error.text);

@@ -2009,6 +2009,18 @@ static void test_contact_budget(void)
     CHECK_CLOSE(sum, (double)duration, 1e-6);
     CHECK_CLOSE(gs4_get_stats(sim).time, (double)duration, 1e-6);
     gs4_destroy(sim);
+
+    /* steps that are nothing beside what was asked for count */
+    physics_scheme = GS4_SEMI_IMPLICIT;
+    sim = physics_create(&d, &m);
+    physics_scheme = GS4_EXPLICIT;
+    CHECK(gs4_add_particles(sim, gs4_box(at(0.3, 0.3, 0.3), at(0.6, 0.6, 0.6)), &f) > 0);
+    b.steps = 3;
+    b.seconds = 0;
+    CHECK_RESULT(sim, gs4_advance_within(sim, (gs4_real)9e17, &b, &done), GS4_OK);
+    CHECK_BETWEEN(done, 1e-9, 1);
+    CHECK(done == gs4_get_stats(sim).time);
+    gs4_destroy(sim);
 }
 
 /* --- what ended behind a surface -------------------------------------------------------------- */

@@ -1,6 +1,5 @@
-/* Random scenes, calls and edits, many of them absurd: `fuzz [first_seed] [count]` (1, 100;
- * count 0:
- * without end). Prints how many scenes and calls there were, or the seed of what failed and the
+/* Random scenes, calls and edits, many of them absurd: `fuzz [first_seed] [count]` (1, 100; count
+ * 0: without end). Prints how many scenes and calls there were, or the seed of what failed and the
  * line that repeats it; a sanitizer's report is followed by that line too. Build it with
  *     cc -O1 -g -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all
  *        -DGS4_PTHREADS -pthread -I. tests/fuzz.c -o fuzz -lm
@@ -16,9 +15,8 @@
  *   - time goes forward, by what was asked for
  *   - memory that was given back is what was asked for; after gs4_destroy all of it
  * Of three seeds one runs on 2 or 3 threads, too, one without other calls than steps that were
- * refused, and one
- * with tasks in reverse order and, now and then, another simulation that goes on from a checkpoint.
- * Each must give the same results and hashes, call by call. */
+ * refused, and one with tasks in reverse order and, now and then, another simulation that goes on
+ * from a checkpoint. Each must give the same results and hashes, call by call. */
 #if !defined(_POSIX_C_SOURCE) && !defined(_WIN32)
 #define _POSIX_C_SOURCE 200112L
 #endif

@@ -221,8 +221,8 @@
  *     dJ/dt gets c0/(200 h) (max(1.08/f, 0.9) - J~), at most 0,
  * with both explicit integrators, and pressure makes room: the depth is 0.998, after 100 jolts
  * 0.988. Fresh fillings have J f up to 1.03; they, smooth flow and surfaces stay below 1.08 and are
- * left alone, films and spray too. It adds less than 1e-3 to the energy; with symplectic Euler,
- * where noise of J does not decay, up to 5e-3 in a minute of rest after 100 jolts. Not so in scenes
+ * left alone, films and spray too. It adds less than 1e-3 to the energy, but for symplectic Euler,
+ * where noise of J does not decay: 4e-3 in a minute of rest after 100 jolts. Not so in scenes
  * with solids, with sharp_gradients or with densities that differ by more than 1 %, nor within
  * reach of sticky colliders.
  *

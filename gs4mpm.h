@@ -19782,17 +19782,15 @@ static void gs4i_store_affine(const gs4i_particles *p, size_t i, int n, const gs
 /* Single numbers: tile += gx dw/dx + gy dw/dy + gz dw/dz, for particle n of a batch. */
 GS4I_INLINE void gs4i_scatter_slope(gs4_real *tile, const gs4i_stencils *s, int n, gs4i_lanes g[3])
 {
-    const gs4_real x[4] = { GS4I_NTH_CONST(s->w[0][0], n), GS4I_NTH_CONST(s->w[0][1], n),
-                            GS4I_NTH_CONST(s->w[0][2], n), 0 },
-                   d[4] = { GS4I_NTH_CONST(s->d[0][0], n), GS4I_NTH_CONST(s->d[0][1], n),
-                            GS4I_NTH_CONST(s->d[0][2], n), 0 };
+    const gs4i_quad x = { GS4I_LANES(GS4I_NTH_CONST(s->w[0][0], n), GS4I_NTH_CONST(s->w[0][1], n),
+                                     GS4I_NTH_CONST(s->w[0][2], n), 0) },
+                    d = { GS4I_LANES(GS4I_NTH_CONST(s->d[0][0], n), GS4I_NTH_CONST(s->d[0][1], n),
+                                     GS4I_NTH_CONST(s->d[0][2], n), 0) };
     gs4i_quad p0, p1, p2, a, b, r, t;
     int j, k;
-    GS4I_LOAD(t, x);
-    GS4I_LOAD(p0, d);
-    GS4I_SPLAT_MUL(p0, GS4I_NTH_CONST(g[0], n), p0);
-    GS4I_SPLAT_MUL(p1, GS4I_NTH_CONST(g[1], n), t);
-    GS4I_SPLAT_MUL(p2, GS4I_NTH_CONST(g[2], n), t);
+    GS4I_SPLAT_MUL(p0, GS4I_NTH_CONST(g[0], n), d);
+    GS4I_SPLAT_MUL(p1, GS4I_NTH_CONST(g[1], n), x);
+    GS4I_SPLAT_MUL(p2, GS4I_NTH_CONST(g[2], n), x);
     tile += s->base[n];
     for (j = 0; j < 3; j++) {
         GS4I_SPLAT_MUL(a, GS4I_NTH_CONST(s->w[1][j], n), p0);

@@ -8828,7 +8828,8 @@ typedef struct gs4i_particles {
     gs4_real *rate;     /* 4: dv/dt, dJ/dt; NULL for symplectic Euler */
     /* 4 each: column j of the velocity gradient, dv_i/dx_j; NULL for GS4 */
     gs4_real *affine[3];
-    /* partitioned: the same of the step before; affine[0] has the pressure (Pa) as its fourth */
+    /* partitioned: affine[0] has the pressure (Pa) as its fourth; with GS4 also the same of the step
+     * before */
     gs4_real *affine_before[3];
     int with_affine, with_affine_before;
     /* 12: non-local stress xx yy zz xy xz yz (Pa) and its rate; 15 where it is in a solve, see
@@ -17954,8 +17955,8 @@ static void gs4i_mirror_faces(gs4_sim *sim, gs4_real *const field[3], gs4i_mirro
 
 /* --- S3 --------------------------------------------------------------------------------------- */
 
-/* C at the stage, from those of the last two: C + (C - before) times the ratio of steps; |C| dt at
- * most 1/4, or a splash without viscosity blows up. */
+/* C at the stage, from those of the last two: C + (C - before) times the ratio of steps; with
+ * backward Euler the last. |C| dt is at most 1/4, or a splash without viscosity blows up. */
 static void gs4i_stage_affine(const gs4_sim *sim, size_t i, int n, gs4i_gradient C)
 {
     const gs4i_particles *p = &sim->particles;
@@ -17964,9 +17965,10 @@ static void gs4i_stage_affine(const gs4_sim *sim, size_t i, int n, gs4i_gradient
     gs4i_lanes bound;
     int k, b;
     gs4i_gradient_lanes(p->affine[0] + 4 * i, p->affine[1] + 4 * i, p->affine[2] + 4 * i, n, C);
-    gs4i_gradient_lanes(p->affine_before[0] + 4 * i, p->affine_before[1] + 4 * i,
-                        p->affine_before[2] + 4 * i, n, before);
-    for (k = 0; k < 9; k++)
+    if (p->with_affine_before)
+        gs4i_gradient_lanes(p->affine_before[0] + 4 * i, p->affine_before[1] + 4 * i,
+                            p->affine_before[2] + 4 * i, n, before);
+    for (k = 0; k < 9 && p->with_affine_before; k++)
         GS4I_BATCH_LOOP(b) {
             const gs4i_wide change = C[k / 3][k % 3][b] - before[k / 3][k % 3][b];
             C[k / 3][k % 3][b] += ratio * change;
@@ -19773,8 +19775,9 @@ static void gs4i_store_affine(const gs4i_particles *p, size_t i, int n, const gs
     int a;
     for (a = 0; a < 3; a++) {
         const gs4_real *now = a == 0 ? slope->dx : a == 1 ? slope->dy : slope->dz;
-        memcpy(p->affine_before[a] + 4 * i, is_first ? now : p->affine[a] + 4 * i,
-               4 * (size_t)n * sizeof *now);
+        if (p->with_affine_before)
+            memcpy(p->affine_before[a] + 4 * i, is_first ? now : p->affine[a] + 4 * i,
+                   4 * (size_t)n * sizeof *now);
         memcpy(p->affine[a] + 4 * i, now, 4 * (size_t)n * sizeof *now);
     }
 }
@@ -22078,7 +22081,8 @@ static void gs4i_fill_one(gs4_sim *sim, const gs4_real at[3], gs4_vec3 centre, c
     const size_t i = (size_t)sim->particles.count;
     const gs4_vec3 v = gs4i_add(f->velocity, gs4i_cross(w, gs4i_sub(x, centre)));
     /* the next step finds C from 0: see gs4i_find_affine */
-    const int is_found = sim->needs_spin && sim->particles.with_affine_before;
+    const int is_found =
+        sim->needs_spin && sim->particles.with_affine && sim->particles.with_rates;
     int k;
     if (!gs4i_add_particle(sim, x, v, mass, f)) return;
     for (k = 0; k < 3 && sim->particles.affine[k] && !is_found; k++)
@@ -23535,10 +23539,11 @@ static void gs4i_forget_spin(gs4_sim *sim)
     const gs4i_particles *p = &sim->particles;
     size_t i;
     int k;
-    for (i = 0; i < (size_t)p->count && p->with_affine_before; i++)
+    for (i = 0; i < (size_t)p->count && p->with_affine && p->with_rates; i++)
         for (k = 0; k < 3; k++) { /* the fourth of them is the pressure */
             memset(p->affine[k] + 4 * i, 0, 3 * sizeof(gs4_real));
-            memset(p->affine_before[k] + 4 * i, 0, 3 * sizeof(gs4_real));
+            if (p->with_affine_before)
+                memset(p->affine_before[k] + 4 * i, 0, 3 * sizeof(gs4_real));
         }
     for (i = 0; i < (size_t)p->count && p->deformation_reals; i++)
         gs4i_set_spin(&sim->particles, i, gs4i_vec3(0, 0, 0));
@@ -24383,7 +24388,7 @@ static int gs4i_particle_is_sound(const gs4_sim *sim, const gs4i_head *h, size_t
     /* the largest that gs4_add_points takes */
     sound = sound && x[3] <= 9 * h1 * h1 * h1 * sim->constants[p->material[i]].density;
     for (k = 0; k < 3 && p->affine[k]; k++)
-        sound &= gs4i_are_rates(p->affine[k] + 4 * i, p->with_affine_before ? 4 : 3);
+        sound &= gs4i_are_rates(p->affine[k] + 4 * i, p->with_rates ? 4 : 3);
     for (k = 0; k < 3 && p->affine_before[k]; k++)
         sound &= gs4i_are_rates(p->affine_before[k] + 4 * i, 3);
     if (p->with_rates) {
@@ -25408,7 +25413,8 @@ static int gs4i_init(gs4_sim *sim)
     memcpy(sim->boundary.walls, d->walls, sizeof d->walls);
     sim->particles.with_rates = d->integrator != GS4_INTEGRATOR_SYMPLECTIC_EULER;
     sim->particles.with_affine = !sim->particles.with_rates || d->scheme != GS4_EXPLICIT;
-    sim->particles.with_affine_before = d->scheme != GS4_EXPLICIT;
+    sim->particles.with_affine_before =
+        d->scheme != GS4_EXPLICIT && d->integrator == GS4_INTEGRATOR_GS4;
     sim->particles.with_subgrid =
         sim->particles.with_rates && d->scheme == GS4_EXPLICIT && gs4i_finite(d->flip_decay_time);
 

@@ -537,14 +537,6 @@ static void make_yielding(gs4_material *m)
 }
 
 /* The semi-implicit scheme has no solids. */
-static void make_never_solid(gs4_material *m)
-{
-    m->solid = GS4_NO_SOLID;
-    m->shear_modulus = m->yield_compression = m->yield_stretch = 0;
-    m->can_melt = 0;
-    m->melting_temperature = m->latent_heat = 0;
-}
-
 static void any_material(gs4_material *m)
 {
     static const char *const names[] = {
@@ -556,7 +548,6 @@ static void any_material(gs4_material *m)
     if ((m->solid == GS4_NO_SOLID || m->can_melt) && one_in(5)) make_yielding(m);
     if (one_in(5) && gs4_material_preset(names[pick(0, COUNT(names) - 1)], m) < 0)
         check(strlen(gs4_last_error(NULL)) > 10, "a sentence about presets", 0);
-    if (r.desc.scheme == GS4_SEMI_IMPLICIT && !one_in(8)) make_never_solid(m);
     if (r.desc.scheme != GS4_EXPLICIT) make_incompressible(m);
     disturb(m, of_material, COUNT(of_material));
     if (m->viscosity_fn) m->viscosity_fn = any_viscosity;

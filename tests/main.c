@@ -34,6 +34,7 @@
 #include "test_partitioned_extremes.c"
 #include "test_semi_implicit.c"
 #include "test_semi_viscoelastic.c"
+#include "test_semi_solids.c"
 #include "test_mesh.c"
 #include "test_reference.c"
 
@@ -129,6 +130,7 @@ int main(int count, char **values)
     run_partitioned_extremes();
     run_semi_implicit();
     run_semi_viscoelastic();
+    run_semi_solids();
     run_mesh();
     RUN_ONCE(test_reference);
     RUN_FULL(test_stability);

@@ -8865,8 +8865,8 @@ typedef struct gs4i_particles {
     gs4_real *rate;     /* 4: dv/dt, dJ/dt; NULL for symplectic Euler */
     /* 4 each: column j of the velocity gradient, dv_i/dx_j; NULL for GS4 */
     gs4_real *affine[3];
-    /* partitioned: affine[0] has the pressure (Pa) as its fourth; with GS4 also the same of the step
-     * before */
+    /* partitioned: affine[0] has the pressure (Pa) as its fourth; with GS4 the same of the step
+     * before, too */
     gs4_real *affine_before[3];
     int with_affine, with_affine_before;
     /* 12: non-local stress xx yy zz xy xz yz (Pa) and its rate; 15 where it is in a solve, see
@@ -22432,8 +22432,7 @@ static void gs4i_fill_one(gs4_sim *sim, const gs4_real at[3], gs4_vec3 centre, c
     const size_t i = (size_t)sim->particles.count;
     const gs4_vec3 v = gs4i_add(f->velocity, gs4i_cross(w, gs4i_sub(x, centre)));
     /* the next step finds C from 0: see gs4i_find_affine */
-    const int is_found =
-        sim->needs_spin && sim->particles.with_affine && sim->particles.with_rates;
+    const int is_found = sim->needs_spin && sim->particles.with_affine && sim->particles.with_rates;
     int k;
     if (!gs4i_add_particle(sim, x, v, mass, f)) return;
     for (k = 0; k < 3 && sim->particles.affine[k] && !is_found; k++)
@@ -23893,8 +23892,7 @@ static void gs4i_forget_spin(gs4_sim *sim)
     for (i = 0; i < (size_t)p->count && p->with_affine && p->with_rates; i++)
         for (k = 0; k < 3; k++) { /* the fourth of them is the pressure */
             memset(p->affine[k] + 4 * i, 0, 3 * sizeof(gs4_real));
-            if (p->with_affine_before)
-                memset(p->affine_before[k] + 4 * i, 0, 3 * sizeof(gs4_real));
+            if (p->with_affine_before) memset(p->affine_before[k] + 4 * i, 0, 3 * sizeof(gs4_real));
         }
     for (i = 0; i < (size_t)p->count && p->deformation_reals; i++)
         gs4i_set_spin(&sim->particles, i, gs4i_vec3(0, 0, 0));
@@ -27632,7 +27630,8 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  * New: the partitioned scheme, for liquids of any bulk modulus; checkpoints know the scheme.
  * New: the semi-implicit scheme, for liquids with or without heat; gs4_stats has
  * viscous_iterations. Its colliders may slip and separate, too; it has solids, and gs4_stats their
- * elastic_iterations.
+ * elastic_iterations. Backward Euler has no velocity gradients of the step before, so checkpoints
+ * of implicit scenes with it that were written before cannot be read.
  * Coulomb friction holds without a creep. New: poses, gs4_advance_within, gs4_set_gravity,
  * gs4_set_viscosity, gs4_remove_particles; Herschel-Bulkley liquids and presets of such, with which
  * gs4_material has new members: checkpoints written before cannot be read. A step that gs4_advance

@@ -230,7 +230,7 @@ static void test_semi_solids_stiff(void)
 {
     static const gs4_wall floors[3] = { GS4_WALL_SLIP, GS4_WALL_STICK, GS4_WALL_SEPARATE };
     int n, k, i;
-    for (n = 0; n < (test_slow ? 12 : 4); n++) {
+    for (n = 0; n < (test_slow ? 12 : 3); n++) {
         const int a = n % 3, solves = n & 1;
         const double g = 9.81, dt = 1.0 / 240;
         gs4_sim_desc d = semi_cube(20);
@@ -289,7 +289,7 @@ static void test_semi_solids_stiff(void)
 static void test_semi_solids_gap(void)
 {
     int n, i, k;
-    for (n = 0; n < (test_slow ? 6 : 2); n++) {
+    for (n = 0; n < (test_slow ? 6 : 1); n++) {
         const int a = (n + 1) % 3, b = (a + 1) % 3; /* down, and across the gap */
         const double g = 10;
         gs4_sim_desc d = semi_cube(16);

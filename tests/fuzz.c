@@ -536,7 +536,6 @@ static void make_yielding(gs4_material *m)
     m->herschel_bulkley.creep_rate = number(1, 100, 10);
 }
 
-/* The semi-implicit scheme has no solids. */
 static void any_material(gs4_material *m)
 {
     static const char *const names[] = {

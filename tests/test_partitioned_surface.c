@@ -150,20 +150,15 @@ static void test_partitioned_surface_order(void)
     }
 }
 
-/* Elastic spheres ring with k sqrt(G/rho), and never gain; what is left after `periods`. */
-static double surface_ring(int R, int spheroidal, int a, int periods, double *frequency)
+/* A sphere rings for `periods` of as many steps: frequency over k sqrt(G/rho), and the most that is
+ * seen of the mode in the last of them. */
+static double surface_ring_of(gs4_sim *sim, int R, int spheroidal, int a, int steps, int periods,
+                              double *frequency)
 {
-    const double period = 2 * 3.14159265358979 / surface_wave_number[spheroidal];
-    gs4_material m = scene_liquid(1, 0, 0);
-    gs4_sim *sim;
-    double dt, before = 1, first = 0, last = 0, most = 0;
-    int i, steps, crossings = 0;
-    m.incompressible = 1;
-    m.solid = GS4_NEO_HOOKEAN;
-    m.shear_modulus = 1;
-    sim = surface_sphere(&m, GS4_PARTITIONED, R, spheroidal, a);
-    steps = (int)ceil(1.5 * period / (double)gs4_stable_dt(sim));
-    dt = period / steps;
+    const double period = 2 * 3.14159265358979 / surface_wave_number[spheroidal],
+                 dt = period / steps;
+    double before = 1, first = 0, last = 0, most = 0;
+    int i, crossings = 0;
     for (i = 1; i <= periods * steps; i++) {
         double now;
         if (gs4_step(sim, (gs4_real)dt) != GS4_OK) break;
@@ -177,11 +172,26 @@ static double surface_ring(int R, int spheroidal, int a, int periods, double *fr
     }
     CHECK_RESULT(sim, i <= periods * steps ? GS4_ERROR_UNSTABLE : GS4_OK, GS4_OK);
     *frequency = (crossings - 1) * 0.5 * period / (last - first);
-    gs4_destroy(sim);
     if (test_filter[0])
         printf("%d cells, spheroidal %d, axis %d: frequency %.4f, left %.4f\n", R, spheroidal, a,
                *frequency, most);
+    gs4_destroy(sim);
     return most;
+}
+
+/* Elastic spheres ring with k sqrt(G/rho), and never gain; what is left after `periods`. */
+static double surface_ring(int R, int spheroidal, int a, int periods, double *frequency)
+{
+    const double period = 2 * 3.14159265358979 / surface_wave_number[spheroidal];
+    gs4_material m = scene_liquid(1, 0, 0);
+    gs4_sim *sim;
+    m.incompressible = 1;
+    m.solid = GS4_NEO_HOOKEAN;
+    m.shear_modulus = 1;
+    sim = surface_sphere(&m, GS4_PARTITIONED, R, spheroidal, a);
+    return surface_ring_of(sim, R, spheroidal, a,
+                           (int)ceil(1.5 * period / (double)gs4_stable_dt(sim)), periods,
+                           frequency);
 }
 
 static void test_partitioned_surface_ring(void)

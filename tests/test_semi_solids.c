@@ -1,44 +1,18 @@
 /* Solids under the semi-implicit scheme: their stress is in the solve. */
 
-/* Spheres of R cells ring for some periods in steps of w_dt/w: frequency over k sqrt(G/rho), and
- * the most that is seen of the mode in the last period. */
+/* Spheres of R cells ring in steps of w_dt/w, see surface_ring_of. */
 static double semi_solids_ring(int R, int spheroidal, int a, double w_dt, double rho, int periods,
                                double *frequency)
 {
-    const double w = surface_wave_number[spheroidal], pi = 3.14159265358979;
-    const int steps = (int)(2 * pi / w_dt + 0.5);
     gs4_material m = scene_liquid(1, 0, 0);
     gs4_sim *sim;
-    double dt = 2 * pi / w / steps, before = 1, first = 0, last = 0, most = 0;
-    int i, crossings = 0, solves = 0, products = 0;
     m.incompressible = 1;
     m.solid = GS4_NEO_HOOKEAN;
     m.shear_modulus = 1;
     sim = surface_sphere(&m, GS4_SEMI_IMPLICIT, R, spheroidal, a);
     sim->desc.rho_inf = (gs4_real)rho;
-    for (i = 1; i <= periods * steps; i++) {
-        double now;
-        if (gs4_step(sim, (gs4_real)dt) != GS4_OK) break;
-        now = surface_share(sim, R, spheroidal, a);
-        solves += gs4_get_stats(sim).elastic_iterations;
-        products += gs4_get_stats(sim).viscous_iterations;
-        if (before * now <= 0) {
-            last = (i - now / (now - before)) * dt;
-            if (!crossings++) first = last;
-        }
-        if (i > (periods - 1) * steps) most = fmax(most, fabs(now));
-        before = now;
-    }
-    CHECK_RESULT(sim, i <= periods * steps ? GS4_ERROR_UNSTABLE : GS4_OK, GS4_OK);
-    *frequency = (crossings - 1) * pi / w / (last - first);
-    gs4_destroy(sim);
-    if (test_filter[0])
-        printf("%d cells, spheroidal %d, axis %d, w dt %.1f, rho %.0f: frequency %.4f, left %.4f; "
-               "a step %.1f "
-               "solves, %.1f products\n",
-               R, spheroidal, a, w_dt, rho, *frequency, most, (double)solves / i,
-               (double)products / i);
-    return most;
+    return surface_ring_of(sim, R, spheroidal, a, (int)(2 * 3.14159265358979 / w_dt + 0.5), periods,
+                           frequency);
 }
 
 /* The member (0, 0) itself is (w dt)^2/3 low, (1, 0) by a quarter of that. */
@@ -223,9 +197,9 @@ static double semi_solids_energy(gs4_sim *sim, const gs4_material *m, int a, dou
     return s.kinetic_energy + solid_elastic_energy(sim, m) + s.mass * g * *height;
 }
 
-/* A cube of 1e8 Pa, cells of 1 cm, falls on floors in steps of 1/240 s, which an explicit scheme
- * could not do in 400: free fall is exact to rounding, it loses energy alone, and stays what it
- * is. The member (1/2, 0) lets it bounce, (0, 0) hardly. */
+/* A cube of 1e8 Pa, cells of 1 cm, falls on floors in steps of 1/240 s: free fall is exact to
+ * rounding, it loses energy alone, and stays what it is. The member (1/2, 0) lets it bounce, (0, 0)
+ * hardly. */
 static void test_semi_solids_stiff(void)
 {
     static const gs4_wall floors[3] = { GS4_WALL_SLIP, GS4_WALL_STICK, GS4_WALL_SEPARATE };
@@ -288,7 +262,7 @@ static void test_semi_solids_stiff(void)
  * never has more than its energy. */
 static void test_semi_solids_gap(void)
 {
-    int n, i, k;
+    int n, k;
     for (n = 0; n < (test_slow ? 6 : 1); n++) {
         const int a = (n + 1) % 3, b = (a + 1) % 3; /* down, and across the gap */
         const double g = 10;

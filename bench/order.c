@@ -5,7 +5,7 @@
  * as in tests/test_semi_viscoelastic.c, and a drop that falls on a sticky floor (Re 4.8, 7.7 cells
  * across), where cells do become liquid and air.
  *   cc -O3 -march=native bench/order.c -I. -Iexamples -lm -o order
- *   ./order [--steps N] [--out FILE]        ten minutes; most steps to an end, 512; 64: three minutes
+ *   ./order [--steps N] [--out FILE]   ten minutes; most steps to an end, 512; 64: three minutes
  * Error: rms over particles, by what the run has changed, against the limit of the same scheme, to
  * which its last halving of dt points; `limit` is how far the one before points from there. Of the
  * drop that falls it is against the finest run, and `limit` is what the last halving changes.

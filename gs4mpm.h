@@ -283,9 +283,10 @@
  * included, as their stress has: what strains gives back what it took, and total stress vanishes at
  * free surfaces. A neo-Hookean beam of 5 x 5 cells, stretched to up to twice its length or twisted,
  * then let go, never has more than its energy, and 3/4 or more of it after 0.01 s. Fixed-
- * corotated ones soften where they shrink: stretched to twice, 1.03. Cantilevers of 4 cells at
- * K/G = 1e4 or infinite sink within 7 % of beam theory, of 6 within 3 %, where particles lie as
- * they are filled in whole cells; where surfaces cut cells up to 1.53 (explicit 1.34) at 4 cells.
+ * corotated ones soften where they shrink: stretched to twice, 1.03. Cantilevers of 4 cells, six
+ * times as long, at K/G = 1e4 or infinite sink within 7 % of beam theory, of 6 cells within 3 %,
+ * where particles lie as they are filled in whole cells; ten times as long, of 4 cells, 1.09; where
+ * surfaces cut cells up to 1.53 (explicit 1.34) at 4 cells.
  * Pools beside solids in one scene have their pressure within some % at the surface.
  *
  * THE SEMI-IMPLICIT SCHEME has viscosity in the same solve, so that no step follows that either;

@@ -23848,14 +23848,18 @@ static int gs4i_check_stage(gs4_sim *sim)
 {
     gs4i_report r = gs4i_all_reports(sim);
     const char *by;
+    gs4i_text t;
     if (r.bad) return gs4i_fail_bad(sim, &r);
     sim->stage_limit = gs4i_stable_dt(sim, &r, &by);
-    if (sim->integrator.dt > GS4I_C(1.25) * sim->stage_limit)
-        return gs4i_fail_value(&sim->error, GS4_ERROR_UNSTABLE,
-                               "viscosity or compression rose during the step: dt ",
-                               (double)sim->integrator.dt,
-                               " s is beyond the stability limit there; the step was not taken");
-    return GS4_OK;
+    if (!(sim->integrator.dt > GS4I_C(1.25) * sim->stage_limit)) return GS4_OK;
+    t = gs4i_begin_error(&sim->error);
+    gs4i_put(&t, by);
+    gs4i_put(&t, " rose during the step: dt ");
+    gs4i_put_real(&t, (double)sim->integrator.dt);
+    gs4i_put(&t, " s is beyond the stability limit there, ");
+    gs4i_put_real(&t, (double)sim->stage_limit);
+    gs4i_put(&t, " s; the step was not taken");
+    return gs4i_end_error(&sim->error, GS4_ERROR_UNSTABLE);
 }
 
 /* --- the end of a step ------------------------------------------------------------------------ */

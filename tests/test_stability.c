@@ -414,6 +414,7 @@ static void test_thickening_within_a_step(void)
             viscosity = (gs4_real)rise[i];
             CHECK_RESULT(sim, gs4_step(sim, dt), rise[i] < 1.25 ? GS4_OK : GS4_ERROR_UNSTABLE);
             CHECK((gs4_state_hash(sim) == before) == (rise[i] > 1.25));
+            if (rise[i] > 1.25) CHECK(strstr(gs4_last_error(sim), "viscosity rose during"));
         }
         gs4_destroy(sim);
     }

@@ -32,7 +32,7 @@ static gs4_vec3 vec(double x, double y, double z)
 static void hear(int level, const char *message, void *user)
 {
     (void)user;
-    if (level > 0) strncpy(said, message, sizeof said - 1);
+    if (level == 1) strncpy(said, message, sizeof said - 1);
 }
 
 /* A rope of honey, 8 mm thick, falls on a plate. */

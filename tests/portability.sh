@@ -10,7 +10,7 @@ cd "$(dirname "$0")/.." || exit 1
 CC=${CC:-cc}
 
 quick='few_layout few_warnings few_hashes'
-full='warnings tsan fused scenes hashes asan fuzz arm hashes_double wasm windows tiny musl i386 form layout names units snippets link frames examples'
+full='warnings tsan fused scenes hashes asan fuzz arm hashes_double wasm windows tiny musl i386 form layout names units snippets link frames examples web'
 
 # A transfer kernel may be longer than 60 lines; nothing else. This one is a transpose, spelled out.
 long_functions='gs4i_from_lanes'
@@ -215,10 +215,10 @@ compiles_until() { prefix "$1" > "$tmp/prefix.c" && $CC -std=c99 -fsyntax-only -
 # .clang-format, and what it does not hold: comments within 100 columns (manual and reference tables aside)
 form() {
     have clang-format || return
-    sources=$(ls gs4mpm.h tests/*.[ch] bench/*.[ch] bench/peers/*.c examples/*.[ch])
+    sources=$(ls gs4mpm.h tests/*.[ch] bench/*.[ch] bench/peers/*.c examples/*.[ch] examples/web/*.c)
     check "all sources have the form of .clang-format" clang-format --dry-run --Werror $sources
     awk 'FNR == 1 { data = 0 } /clang-format off/ { data = 1 } /clang-format on/ { data = 0 }
-         length > 100 && !data { print FILENAME ":" FNR }' $sources > "$tmp/m"
+         length > 100 && !data { print FILENAME ":" FNR }' $sources examples/web/*.html examples/web/*.mjs > "$tmp/m"
     check "no line is wider than 100 columns" refused grep . "$tmp/m"
 }
 
@@ -488,9 +488,12 @@ windows() {
     wineserver -w                                                      # until it has written its last
     [ ! -s "$tmp/wined.log" ] || cat "$tmp/wined.log"
 }
-wasm() {
+have_wasi() {
     have clang && have node || return
-    echo 'int main(void) { return 0; }' | clang --target=wasm32-wasi -x c - -o "$tmp/wasi" 2> /dev/null || { skip "needs wasi-libc, lld and libclang-rt for wasm32"; return; }
+    echo 'int main(void) { return 0; }' | clang --target=wasm32-wasi -x c - -o "$tmp/wasi" 2> /dev/null || { skip "needs wasi-libc, lld and libclang-rt for wasm32"; return 1; }
+}
+wasm() {
+    have_wasi || return
     cat > "$tmp/run.mjs" << 'END'
 import { readFileSync } from 'node:fs';
 import { WASI } from 'node:wasi';
@@ -588,6 +591,15 @@ examples() {
     done
     check "examples/minimal.c writes" sh -c 'cd "$1" && ./minimal && [ -s honey.ply ]' sh "$tmp"
     check "examples/rheometer.c writes" sh -c '"$1/rheometer" --out "$1" && [ -s "$1/rheometer.csv" ] && [ -s "$1/rheometer.svg" ]' sh "$tmp"
+}
+
+# The page of examples/web in headless Chromium: three scenes, hashes of this machine, sentences of refused steps. Pictures of a page
+# that fails are left in out/. Optimized less than build.sh does, which compiles in half the time.
+web() {
+    have_wasi && have chromium || return
+    check "native" $CC -std=c99 -O1 -Dalways_inline=unused -Wall -Wextra -Werror -I. examples/web/web.c -o "$tmp/web" -lm
+    check "page" env CFLAGS='-O1 -msimd128 -Dalways_inline=unused' sh examples/web/build.sh "$tmp/web.html" || return
+    check "in Chromium" node examples/web/check.mjs "$tmp/web.html" "$tmp/web" "$tmp" || { mkdir -p out && cp "$tmp"/*.png out/; }
 }
 
 # ==== main =====================================================================================================

@@ -9,7 +9,9 @@ mkdir -p "$(dirname "$page")"
 wasm=$(mktemp)
 trap 'rm -f "$wasm"' EXIT
 exports=
-for f in start step viscosity time hash text look; do exports="$exports -Wl,--export=web_$f"; done
+for f in start step viscosity time hash error limit said look; do
+    exports="$exports -Wl,--export=web_$f"
+done
 # A reactor: functions to call, and no main. No call of the library's that is left needs a system.
 # shellcheck disable=SC2086
 clang --target=wasm32-wasi -mexec-model=reactor ${CFLAGS:--O3 -msimd128} -DNDEBUG -w -I. \

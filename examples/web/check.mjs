@@ -37,7 +37,13 @@ browser.stdio[4].setEncoding('utf8').on('data', text => {
             complaints.push(JSON.stringify(params).slice(0, 300));
     }
 });
-browser.on('error', e => { console.log('FAILED', e.message); process.exit(1); });
+function give_up(why) {
+    console.log('FAILED', why);
+    browser.kill();
+    process.exit(1);
+}
+browser.on('error', e => give_up(e.message));
+setTimeout(give_up, 300e3, 'nothing for five minutes').unref();
 const sleep = ms => new Promise(done => setTimeout(done, ms));
 async function value(expression) {
     const r = await call('Runtime.evaluate', { expression, returnByValue: true });
@@ -46,7 +52,7 @@ async function value(expression) {
     return r.result.value;
 }
 async function until(expression) {
-    for (let i = 0; i < 400; ++i, await sleep(100)) if (await value(expression)) return;
+    for (let i = 0; i < 1200; ++i, await sleep(100)) if (await value(expression)) return;
     throw Error('never came: ' + expression);
 }
 async function open(base, settings) {
@@ -113,7 +119,7 @@ async function all(server) {
     for (const domain of ['Page', 'Runtime', 'Log']) await call(domain + '.enable');
     const disk = 'file://' + page;
 
-    let [, n] = await play('pour', disk, { scene: 0, cells: 20, viscosity: 10, end: 2 });
+    let [, n] = await play('pour', disk, { scene: 0, cells: 16, viscosity: 10, end: 2 });
     const given = n[8] / (Math.PI * 0.004 ** 2 * (0.11 * 2 + 0.006));
     check('pour: what the emitter gave', Math.abs(given - 1) < 0.05, given);
     const share = sum(n) / (1420 * n[8] * (9.81 * 0.071 + 0.11 ** 2 / 2));

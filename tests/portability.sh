@@ -596,7 +596,7 @@ examples() {
 # The page of examples/web in headless Chromium: three scenes, hashes of this machine, sentences of refused steps. Pictures of a page
 # that fails are left in out/. Optimized less than build.sh does, which compiles in half the time.
 web() {
-    have_wasi && have chromium || return
+    have_wasi && have "${CHROMIUM:-chromium}" || return
     check "native" $CC -std=c99 -O1 -Dalways_inline=unused -Wall -Wextra -Werror -I. examples/web/web.c -o "$tmp/web" -lm
     check "page" env CFLAGS='-O1 -msimd128 -Dalways_inline=unused' sh examples/web/build.sh "$tmp/web.html" || return
     check "in Chromium" node examples/web/check.mjs "$tmp/web.html" "$tmp/web" "$tmp" || { mkdir -p out && cp "$tmp"/*.png out/; }

@@ -138,7 +138,13 @@ async function all(server) {
     [a, b] = await play('bounce', base, { scene: 2, cells: 20, viscosity: 0, end: 0.2 });
     check('bounce: energy', sum(b) / sum(a) > 0.8 && sum(b) / sum(a) < 1.002, sum(b) / sum(a));
     await refuse('combination', base, { ...drop, scheme: 0, integrator: 1 });
+    await value('set("integrator", 0), set("scheme", 2), start(), 0');
+    await until('frame && frame.time > 0');
+    check('combination: the next one runs', await value('$("error").textContent') === '');
     await refuse('long_step', disk, { ...drop, scheme: 0, dt: 0.01 });
+    await value('set("dt", 0), change(), 0');
+    await until('frame.time > 0');
+    check('long_step: it goes on in shorter ones', await value('$("error").textContent') === '');
 }
 const server = createServer((request, response) => {
     response.writeHead(200, { 'content-type': 'text/html' });

@@ -18,7 +18,7 @@ function check(what, good, ...seen) {
 const home = mkdtempSync(join(tmpdir(), 'web-'));
 const browser = spawn(process.env.CHROMIUM || 'chromium', ['--headless=new', '--no-sandbox',
     '--remote-debugging-pipe', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
-    '--disable-dev-shm-usage', '--window-size=1280,800', `--user-data-dir=${home}`, 'about:blank'],
+    '--disable-dev-shm-usage', `--user-data-dir=${home}`, 'about:blank'],
     { stdio: ['ignore', 'ignore', 'ignore', 'pipe', 'pipe'] });
 const waits = new Map(), complaints = [];
 let count = 0, session, rest = '';
@@ -55,13 +55,18 @@ async function until(expression) {
     for (let i = 0; i < 1200; ++i, await sleep(100)) if (await value(expression)) return;
     throw Error('never came: ' + expression);
 }
+// Small while it plays, as all is drawn by the processor here
+const size = (width, height) => call('Emulation.setDeviceMetricsOverride',
+    { width, height, deviceScaleFactor: 1, mobile: false });
 async function open(base, settings) {
+    await size(820, 300);
     await call('Page.navigate', { url: 'about:blank' });
     await call('Page.navigate', { url: `${base}#${new URLSearchParams(settings)}` });
     await until('document.readyState === "complete" && typeof frame !== "undefined"');
 }
 async function picture(name) {
-    await sleep(600);                                   // the status line comes twice a second
+    await size(1280, 720);
+    await sleep(700);                                   // the status line comes twice a second
     const { data } = await call('Page.captureScreenshot', { format: 'png' });
     writeFileSync(join(out, name), Buffer.from(data, 'base64'));
 }

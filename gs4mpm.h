@@ -64,6 +64,7 @@
  *                                                    [[scene]]     what is given to it; emitters
  *                                                    [[step]]      one step: gs4i_make_step
  *                                                    [[files]]     frames and checkpoints
+ *                                                    [[surface]]   the surface as triangles
  *                                                    [[public]]    values checked, then the work
  *
  * UNITS AND CONVENTIONS. SI, or any consistent system. L_ij = dv_i/dx_j, D = (L + L^T)/2.
@@ -577,9 +578,12 @@ typedef double gs4_real;
 #define gs4_stable_dt gs4_stable_dt_f64
 #define gs4_state_hash gs4_state_hash_f64
 #define gs4_step gs4_step_f64
+#define gs4_surface gs4_surface_f64
+#define gs4_surface_free gs4_surface_free_f64
 #define gs4_version gs4_version_f64
 #define gs4_write_ply gs4_write_ply_f64
 #define gs4_write_raw gs4_write_raw_f64
+#define gs4_write_surface gs4_write_surface_f64
 #else
 typedef float gs4_real;
 #endif
@@ -1044,6 +1048,25 @@ GS4_API gs4_stats gs4_get_stats(gs4_sim *sim);
  * whatever else writes there; symbolic links stay. Only a program that is killed leaves a .tmp. */
 GS4_API int gs4_write_ply(gs4_sim *sim, const char *path);
 GS4_API int gs4_write_raw(gs4_sim *sim, const char *path);
+
+/* The surface of the material: closed triangles, counter-clockwise from outside, a closed piece for
+ * each drop; see SURFACES. `field` is what to colour it by, GS4_FIELD_POSITION for nothing; of
+ * vectors and tensors the size. Arrays come from the allocator; they are the caller's until
+ * gs4_surface_free, before gs4_destroy. What was in `surface` is overwritten. Nothing where there
+ * are no particles: counts of 0. */
+typedef struct gs4_triangles {
+    int vertex_count, triangle_count;
+    gs4_real *positions, *normals; /* x y z of each vertex, m; of unit length */
+    gs4_real *values;   /* a number of the field for each vertex; NULL: none was wanted */
+    uint8_t *materials; /* id of its material, the only one that counts in its value */
+    int *triangles;     /* 3 vertices each */
+} gs4_triangles;
+GS4_API int gs4_surface(gs4_sim *sim, gs4_field field, gs4_triangles *surface);
+GS4_API void gs4_surface_free(gs4_sim *sim, gs4_triangles *surface); /* NULL is fine */
+
+/* The same as PLY: x y z, nx ny nz, temperature in scenes with heat or else speed, material; faces
+ * vertex_indices. Written as frames are. */
+GS4_API int gs4_write_surface(gs4_sim *sim, const char *path);
 
 /* Checkpoints: the whole state, into a simulation with the same description, materials, colliders
  * and emitters. It continues bit for bit. */
@@ -25041,6 +25064,1099 @@ static GS4I_COLD int gs4i_load(gs4_sim *sim, const char *path)
     return result;
 }
 
+/* ==== [[surface]] the surface of the material as triangles ===================================== *
+ *
+ * How full nodes are, f: the volume of the particles over h^3 by trilinear weights, in blocks of a
+ * box of its own, so that no scheme's grid matters. It is 1 in the midst and 1/2 at a flat surface.
+ *     level = f/(2 T),   T = min(1/2, 0.6 M), M the largest f of the node and the 26 around it
+ * A node is inside where its level is above 1/2. So what is thinner than a cell has a surface, too,
+ * around its fullest nodes; at all others T = 1/2. Between two nodes the surface is where the
+ * distances cross that a level means beside a flat surface:
+ *     level = 1 - (1 - d)^2/2 at the depth d, 0 <= d <= 1; outside likewise
+ * Triangles are those of surface nets (Gibson, "Constrained Elastic Surface Nets", MICCAI 1998):
+ * a vertex in each cube of 8 nodes that the surface crosses, at the mean of the crossings of its
+ * edges, and a quad around each edge that it crosses, of the vertices of the four cubes there. That
+ * is closed and has one sheet at each edge and vertex where no face of a cube has two nodes inside
+ * aslant, and no cube two of them at opposite corners or all others (well-composed sets, Latecki
+ * 1997); there nodes count as inside, the fullest first, until none is left.
+ *     Vertices are smoothed by Taubin's lambda and mu (SIGGRAPH 1995), which keeps waves that are
+ * longer than some cells, and with them volume. Then those of each piece move along their normals,
+ * all by the same distance, until it has the volume of its particles. Small pieces are scaled.
+ *     At walls f continues as its mirror image. A cube that reaches behind a wall has its vertex on
+ * the wall, where it stays; quads there lie in the wall, and count neither for smoothing nor for
+ * normals of what is off it. */
+
+/* --- how full nodes are ----------------------------------------------------------------------- */
+
+/* 5^3 nodes, x fastest: those of the block and, until gs4i_occupied_share has shared them out, one
+ * more at the upper end of each axis, so that a particle adds to one block alone. */
+#define GS4I_OCCUPIED_SIDE 5
+#define GS4I_OCCUPIED_NODES (GS4I_OCCUPIED_SIDE * GS4I_OCCUPIED_SIDE * GS4I_OCCUPIED_SIDE)
+
+typedef struct gs4i_occupied_block {
+    float f[GS4I_OCCUPIED_NODES];
+    float fill, inner; /* sum of f of the inner nodes, and how many these are */
+    uint8_t is_inner[GS4I_BLOCK_NODES];
+} gs4i_occupied_block;
+
+typedef struct gs4i_occupied {
+    const gs4_sim *sim;
+    int low[3], blocks[3]; /* the box around all that has f, from cell `low` on; in blocks */
+    int64_t stride[3];
+    uint32_t *place; /* per block of the box: 1 + its place; 0: nothing is there */
+    gs4i_occupied_block *block;
+    int count, capacity;
+    size_t table;
+    /* of particles as they are now, J included, not at rest; the cube of 8 nodes that each is in,
+     * GS4I_BLOCK_NODES times the place of its block less 1 + the node before it; a cell more before
+     * the box */
+    int with_cubes, margin;
+    uint32_t *cube;
+} gs4i_occupied;
+
+/* What cell x of an axis adds to the number of a block, and to that of a node in it. */
+typedef struct gs4i_occupied_cell {
+    int64_t block; /* below 0: it is beyond the box */
+    int node;
+} gs4i_occupied_cell;
+
+/* Cell x of an axis, or that inside the domain whose image it is. Open walls have none. */
+GS4I_INLINE int gs4i_inside_walls(const gs4_sim *sim, int axis, int x)
+{
+    const int n = sim->grid.cells[axis];
+    const gs4_wall wall = sim->desc.walls[2 * axis + (x >= n)];
+    return (x >= 0 && x < n) || wall == GS4_WALL_OPEN ? x : gs4i_mirrored(wall, x, n);
+}
+
+GS4I_INLINE gs4i_occupied_cell gs4i_occupied_cell_of(const gs4i_occupied *o, int axis, int x)
+{
+    static const int stride[3] = { 1, GS4I_OCCUPIED_SIDE, GS4I_OCCUPIED_SIDE * GS4I_OCCUPIED_SIDE };
+    const int at = gs4i_inside_walls(o->sim, axis, x) - o->low[axis];
+    gs4i_occupied_cell c;
+    c.block =
+        at < 0 || at >> 2 >= o->blocks[axis] ? -(int64_t)o->table : (at >> 2) * o->stride[axis];
+    c.node = (at & 3) * stride[axis];
+    return c;
+}
+
+/* The lower of the two nodes beside a particle along an axis, and the share of the other. */
+GS4I_INLINE int gs4i_node_below(gs4_real x, gs4_real origin, gs4_real inv_h, float *share)
+{
+    const gs4_real at = (x - origin) * inv_h + GS4I_C(0.5); /* from -1 on */
+    *share = (float)(at - GS4I_C((int)at));
+    return (int)at - 1;
+}
+
+/* The box around the nodes of all particles. -1: one of them is outside of the grid. */
+static int gs4i_occupied_box(gs4i_memory *memory, gs4i_occupied *o)
+{
+    const gs4i_grid *g = &o->sim->grid;
+    const gs4i_particles *p = &o->sim->particles;
+    const gs4_real origin[3] = { g->origin.x, g->origin.y, g->origin.z };
+    gs4_real low[4], high[4], finite[4] = { 0, 0, 0, 0 };
+    float share;
+    size_t i;
+    int a;
+    memcpy(low, p->position, sizeof low);
+    memcpy(high, p->position, sizeof high);
+    for (i = 0; i < (size_t)p->count; i++) {
+        const gs4_real *x = p->position + 4 * i;
+        for (a = 0; a < 4; a++) {
+            low[a] = gs4i_min(low[a], x[a]);
+            high[a] = gs4i_max(high[a], x[a]);
+            finite[a] += x[a] - x[a];
+        }
+    }
+    if (!gs4i_is_in_domain(g, low) || !gs4i_is_in_domain(g, high)
+        || !(finite[0] + finite[1] + finite[2] == 0))
+        return GS4_ERROR_ARGUMENT;
+    for (a = 0, o->table = 1; a < 3; a++) {
+        const int from = gs4i_node_below(low[a], origin[a], g->inv_h, &share),
+                  to = gs4i_node_below(high[a], origin[a], g->inv_h, &share) + 1;
+        const int wraps = g->periodic[a] && (from < 0 || to >= g->cells[a]);
+        o->low[a] = (wraps ? -1 : from) - o->margin;
+        o->blocks[a] = (((wraps ? g->cells[a] + 1 : to - from) + o->margin) >> 2) + 1;
+        o->stride[a] = (int64_t)o->table;
+        o->table *= (size_t)o->blocks[a];
+    }
+    o->place = (uint32_t *)gs4i_alloc(memory, o->table, sizeof *o->place);
+    if (o->with_cubes) o->cube = (uint32_t *)gs4i_alloc(memory, (size_t)p->count, sizeof *o->cube);
+    return o->place && (o->cube || !o->with_cubes) ? GS4_OK : GS4_ERROR_MEMORY;
+}
+
+/* The block, NULL: nothing is there. */
+GS4I_INLINE gs4i_occupied_block *gs4i_occupied_block_at(const gs4i_occupied *o, int64_t number)
+{
+    return number < 0 || !o->place[number] ? NULL : o->block + o->place[number] - 1;
+}
+
+/* The block, which begins empty. NULL: there is no memory. */
+GS4I_INLINE gs4i_occupied_block *gs4i_occupied_block_for(gs4i_memory *memory, gs4i_occupied *o,
+                                                         int64_t number)
+{
+    if (!o->place[number]) {
+        void *grown = gs4i_grow(memory, o->block, o->count, &o->capacity, sizeof *o->block);
+        if (!grown) return NULL;
+        o->block = (gs4i_occupied_block *)grown;
+        o->place[number] = (uint32_t)++o->count;
+    }
+    return o->block + o->place[number] - 1;
+}
+
+/* All particles give to f. */
+static int gs4i_occupied_add(gs4i_memory *memory, gs4i_occupied *o)
+{
+    const int up_y = GS4I_OCCUPIED_SIDE, up_z = up_y * GS4I_OCCUPIED_SIDE;
+    const gs4i_particles *p = &o->sim->particles;
+    const gs4_vec3 origin = o->sim->grid.origin;
+    const gs4_real inv_h = o->sim->grid.inv_h, cells = inv_h * inv_h * inv_h;
+    size_t i;
+    for (i = 0; i < (size_t)p->count; i++) {
+        const gs4_real *at = p->position + 4 * i;
+        const float volume = (float)(at[3] * o->sim->constants[p->material[i]].inv_density * cells)
+                             * (o->cube ? (float)p->velocity[4 * i + 3] : 1.0f);
+        float sx, sy, sz, low[2], high[2], *f;
+        const int x = gs4i_node_below(at[0], origin.x, inv_h, &sx) - o->low[0],
+                  y = gs4i_node_below(at[1], origin.y, inv_h, &sy) - o->low[1],
+                  z = gs4i_node_below(at[2], origin.z, inv_h, &sz) - o->low[2];
+        gs4i_occupied_block *block = gs4i_occupied_block_for(
+            memory, o, (x >> 2) + (y >> 2) * o->stride[1] + (z >> 2) * o->stride[2]);
+        if (!block) return GS4_ERROR_MEMORY;
+        if (o->cube)
+            o->cube[i] =
+                (uint32_t)(block - o->block) * GS4I_BLOCK_NODES + (uint32_t)gs4i_place_of(x, y, z);
+        f = block->f + ((x & 3) + (y & 3) * up_y + (z & 3) * up_z);
+        high[0] = volume * sz;
+        low[0] = volume - high[0];
+        low[1] = low[0] * sy;
+        low[0] -= low[1];
+        high[1] = high[0] * sy;
+        high[0] -= high[1];
+        f[0] += low[0] - low[0] * sx;
+        f[1] += low[0] * sx;
+        f[up_y] += low[1] - low[1] * sx;
+        f[up_y + 1] += low[1] * sx;
+        f[up_z] += high[0] - high[0] * sx;
+        f[up_z + 1] += high[0] * sx;
+        f[up_z + up_y] += high[1] - high[1] * sx;
+        f[up_z + up_y + 1] += high[1] * sx;
+    }
+    return GS4_OK;
+}
+
+/* The cell where block b begins along an axis. */
+GS4I_INLINE int gs4i_occupied_first(const gs4i_occupied *o, size_t b, int axis)
+{
+    return o->low[axis] + 4 * (int)(b / (size_t)o->stride[axis] % (size_t)o->blocks[axis]);
+}
+
+/* What block b has beyond its end or behind a wall goes to where it belongs. */
+static int gs4i_occupied_share(gs4i_memory *memory, gs4i_occupied *o, size_t b)
+{
+    gs4i_occupied_cell cell[3][GS4I_OCCUPIED_SIDE];
+    int i, a;
+    if (!o->place[b]) return GS4_OK;
+    for (a = 0; a < 3; a++)
+        for (i = 0; i < GS4I_OCCUPIED_SIDE; i++)
+            cell[a][i] = gs4i_occupied_cell_of(o, a, gs4i_occupied_first(o, b, a) + i);
+    for (i = 0; i < GS4I_OCCUPIED_NODES; i++) {
+        const gs4i_occupied_cell *x = &cell[0][i % GS4I_OCCUPIED_SIDE],
+                                 *y = &cell[1][i / GS4I_OCCUPIED_SIDE % GS4I_OCCUPIED_SIDE],
+                                 *z = &cell[2][i / (GS4I_OCCUPIED_SIDE * GS4I_OCCUPIED_SIDE)];
+        const int64_t to = x->block + y->block + z->block;
+        const int node = x->node + y->node + z->node;
+        float *f = &o->block[o->place[b] - 1].f[i];
+        const float share = *f;
+        gs4i_occupied_block *block;
+        if (share == 0 || (to == (int64_t)b && node == i)) continue;
+        *f = 0;
+        block = gs4i_occupied_block_for(memory, o, to);
+        if (!block) return GS4_ERROR_MEMORY;
+        block->f[node] += share;
+    }
+    return GS4_OK;
+}
+
+/* f of node (i, j, k) of block b and of those around it, i from -1 to 4: f[i + 1 + 6 (j + 1) + 36
+ * (k + 1)]. */
+static void gs4i_occupied_window(const gs4i_occupied *o, size_t b, float f[6 * 6 * 6])
+{
+    gs4i_occupied_cell cell[3][6];
+    int i, a, n;
+    for (a = 0; a < 3; a++)
+        for (i = 0; i < 6; i++)
+            cell[a][i] = gs4i_occupied_cell_of(o, a, gs4i_occupied_first(o, b, a) + i - 1);
+    for (n = 0; n < 36; n++) {
+        const gs4i_occupied_cell *y = &cell[1][n % 6], *z = &cell[2][n / 6];
+        for (i = 0; i < 6; i++) {
+            const gs4i_occupied_block *block =
+                gs4i_occupied_block_at(o, cell[0][i].block + y->block + z->block);
+            f[6 * n + i] = block ? block->f[cell[0][i].node + y->node + z->node] : 0;
+        }
+    }
+}
+
+/* Node n of a block of 4^3 among the 5^3. */
+GS4I_INLINE int gs4i_occupied_node(int n)
+{
+    return n % 4 + GS4I_OCCUPIED_SIDE * (n / 4 % 4 + GS4I_OCCUPIED_SIDE * (n / 16));
+}
+
+/* --- the surface ------------------------------------------------------------------------------ */
+
+/* Chosen by measurement (tests/test_surface.c): less than 0.6 leaves fewer holes in what is as thin
+ * as a cell, more is nearer to its thickness. */
+#define GS4I_THIN_FILL 0.6f
+
+/* Passes and weights of Taubin's smoothing: it keeps what is longer than some 8 cells. Chosen so
+ * that the normals of a stirred pool are within 2 degrees. */
+#define GS4I_SMOOTHINGS 12
+#define GS4I_SMOOTHING_LAMBDA 0.6f
+#define GS4I_SMOOTHING_MU -0.63f
+
+/* Pieces with less than so many cells along each axis are scaled. */
+#define GS4I_SMALL_PIECE 4.0f
+
+typedef struct gs4i_net_block {
+    float level[GS4I_BLOCK_NODES];
+    int32_t vertex[GS4I_BLOCK_NODES]; /* 1 + the vertex of the cube behind the node, 0: none */
+    int32_t piece[GS4I_BLOCK_NODES];  /* a node of the same piece; -1 - the piece, if it is last */
+    uint64_t inside;                  /* a bit for each node */
+} gs4i_net_block;
+
+/* A vertex, in cells from the first node of the box on. */
+typedef struct gs4i_net_vertex {
+    float at[3], normal[3], sum[3]; /* sum: of neighbours, or of areas */
+    float value, weight;            /* of particles in its cube */
+    int32_t piece;
+    uint16_t neighbours;
+    uint8_t walls, material; /* a bit for each axis along which it is held */
+} gs4i_net_vertex;
+
+/* How much of the material is in a piece, and what encloses it. */
+typedef struct gs4i_net_piece {
+    double volume, enclosed, slope; /* cells^3; of `enclosed` as vertices move along normals */
+    float low[3], high[3];          /* its box */
+    float wall[3][2];               /* the least and the greatest place where walls hold it */
+    float centre[3], scale[3], offset;
+} gs4i_net_piece;
+
+typedef struct gs4i_net {
+    gs4_sim *sim;
+    gs4i_occupied o;
+    gs4i_net_block *block; /* as o.block */
+    int capacity;
+    uint8_t fill[256]; /* of 8 nodes, those that make them well-composed; 0: they are */
+    gs4i_net_vertex *vertex;
+    int32_t (*quad)[4];
+    gs4i_net_piece *piece;
+    int vertices, quads, free_quads, pieces; /* free quads come first, then those in walls */
+    int quad_capacity;
+} gs4i_net;
+
+/* The block, which begins without material. NULL: there is no memory. */
+static gs4i_net_block *gs4i_net_block_for(gs4i_net *s, int64_t number)
+{
+    gs4i_memory *memory = &s->sim->memory;
+    const int count = s->o.count;
+    if (!gs4i_occupied_block_for(memory, &s->o, number)) return NULL;
+    if (s->o.capacity > s->capacity) {
+        gs4i_net_block *grown =
+            (gs4i_net_block *)gs4i_alloc(memory, (size_t)s->o.capacity, sizeof *grown);
+        if (!grown) return NULL;
+        if (s->block) memcpy(grown, s->block, (size_t)count * sizeof *grown);
+        gs4i_free(memory, s->block, (size_t)s->capacity, sizeof *grown);
+        s->block = grown;
+        s->capacity = s->o.capacity;
+    }
+    return s->block + s->o.place[number] - 1;
+}
+
+/* The surface's part of a block, NULL: nothing is there. */
+GS4I_INLINE gs4i_net_block *gs4i_net_block_at(const gs4i_net *s, int64_t number)
+{
+    return number < 0 || !s->o.place[number] ? NULL : s->block + s->o.place[number] - 1;
+}
+
+/* Number of the block of node x of the box, below 0: it is beyond. */
+GS4I_INLINE int64_t gs4i_net_block_of(const gs4i_net *s, const int x[3])
+{
+    const gs4i_occupied *o = &s->o;
+    int64_t number = 0;
+    int a;
+    for (a = 0; a < 3; a++) {
+        if (x[a] < 0 || x[a] >> 2 >= o->blocks[a]) return -1;
+        number += (x[a] >> 2) * o->stride[a];
+    }
+    return number;
+}
+
+/* Levels of the nodes of block b, and which are inside. */
+static void gs4i_net_levels(gs4i_net *s, size_t b)
+{
+    const gs4i_occupied_block *from = gs4i_occupied_block_at(&s->o, (int64_t)b);
+    gs4i_net_block *to = gs4i_net_block_at(s, (int64_t)b);
+    float f[6 * 6 * 6], most[6 * 6 * 6];
+    int i, n, stride, thin = 0;
+    for (n = 0; n < GS4I_BLOCK_NODES; n++)
+        thin |= !(from->f[gs4i_occupied_node(n)] * GS4I_THIN_FILL >= 0.5f);
+    if (thin) {
+        gs4i_occupied_window(&s->o, b, f);
+        memcpy(most, f, sizeof most);
+        for (stride = 1; stride <= 36; stride *= 6) /* of a node and the two after it */
+            for (i = 0; i + 2 * stride < 6 * 6 * 6; i++) {
+                const float next = most[i + stride] > most[i] ? most[i + stride] : most[i];
+                most[i] = most[i + 2 * stride] > next ? most[i + 2 * stride] : next;
+            }
+    }
+    for (n = 0; n < GS4I_BLOCK_NODES; n++) {
+        const float here = from->f[gs4i_occupied_node(n)],
+                    M = thin ? most[n % 4 + 6 * (n / 4 % 4) + 36 * (n / 16)] : 1,
+                    T = GS4I_THIN_FILL * M < 0.5f ? GS4I_THIN_FILL * M : 0.5f;
+        to->level[n] = here > 0 && here < FLT_MAX ? here / (2 * T) : 0;
+        if (to->level[n] > 0.5f) to->inside |= (uint64_t)1 << n;
+    }
+}
+
+/* Of every 8 nodes, bit x + 2 y + 4 z each, those of which one has to be inside, too. */
+static void gs4i_net_rules(gs4i_net *s)
+{
+    static const uint8_t face[6][2] = { { 0x09, 0x06 }, { 0x90, 0x60 }, { 0x21, 0x12 },
+                                        { 0x84, 0x48 }, { 0x41, 0x14 }, { 0x82, 0x28 } };
+    int c, i;
+    for (c = 0; c < 256; c++) {
+        s->fill[c] = 0;
+        for (i = 0; i < 12; i++) {
+            const int pair = face[i / 2][i & 1], both = face[i / 2][0] | face[i / 2][1];
+            if ((c & both) == pair) s->fill[c] |= (uint8_t)(both & ~pair);
+        }
+        for (i = 0; i < 4; i++) {
+            const int pair = 1 << i | 0x80 >> i;
+            if (c == pair || c == (pair ^ 255)) s->fill[c] |= (uint8_t)(c ^ 255);
+        }
+    }
+}
+
+/* Which nodes are inside, around the cubes of a block: bit x of row[z][y], each from 0 to 4. 0:
+ * all or none is, so the surface crosses none of its cubes. */
+static int gs4i_net_rows(const gs4i_net *s, size_t b, uint8_t row[5][5])
+{
+    const gs4i_occupied *o = &s->o;
+    uint64_t inside[8], any = 0, all = ~(uint64_t)0;
+    int i, a, y, z;
+    for (i = 0; i < 8; i++) {
+        int64_t number = (int64_t)b;
+        for (a = 0; a < 3 && number >= 0; a++) {
+            if (!(i >> a & 1)) continue;
+            number = (int)(b / (size_t)o->stride[a] % (size_t)o->blocks[a]) + 1 < o->blocks[a]
+                         ? number + o->stride[a]
+                         : -1;
+        }
+        inside[i] = number >= 0 && o->place[number] ? s->block[o->place[number] - 1].inside : 0;
+        any |= inside[i];
+        all &= inside[i];
+    }
+    if (!any || !~all) return 0;
+    for (z = 0; z < 5; z++)
+        for (y = 0; y < 5; y++) {
+            const int beyond = 2 * (y >> 2) + 4 * (z >> 2), first = 4 * (y & 3) + 16 * (z & 3);
+            row[z][y] =
+                (uint8_t)((inside[beyond] >> first & 15) | (inside[beyond + 1] >> first & 1) << 4);
+        }
+    return 1;
+}
+
+/* The 8 nodes of cube n of a block, as in gs4i_net_rules. */
+GS4I_INLINE int gs4i_net_cube(uint8_t row[5][5], int n)
+{
+    const int x = n & 3, y = n >> 2 & 3, z = n >> 4;
+    return (row[z][y] >> x & 3) | (row[z][y + 1] >> x & 3) << 2 | (row[z + 1][y] >> x & 3) << 4
+           | (row[z + 1][y + 1] >> x & 3) << 6;
+}
+
+/* Cube n of block b, in nodes of the box. */
+GS4I_INLINE void gs4i_net_place(const gs4i_net *s, size_t b, int n, int x[3])
+{
+    int a;
+    for (a = 0; a < 3; a++)
+        x[a] = gs4i_occupied_first(&s->o, b, a) - s->o.low[a] + (n >> 2 * a & 3);
+}
+
+/* The fullest of the nodes that would do is inside from now on. */
+static int gs4i_net_fill(gs4i_net *s, const int x[3], int nodes)
+{
+    float most = -1;
+    int64_t best = 0;
+    int c, node = 0;
+    for (c = 0; c < 8; c++) {
+        const int at[3] = { x[0] + (c & 1), x[1] + (c >> 1 & 1), x[2] + (c >> 2) };
+        const int64_t number = gs4i_net_block_of(s, at);
+        const int n = gs4i_place_of(at[0], at[1], at[2]);
+        const gs4i_net_block *block;
+        if (!(nodes >> c & 1) || number < 0) continue;
+        block = gs4i_net_block_for(s, number);
+        if (!block) return GS4_ERROR_MEMORY;
+        if (!(block->level[n] > most)) continue;
+        most = block->level[n];
+        best = number;
+        node = n;
+    }
+    s->block[s->o.place[best] - 1].inside |= (uint64_t)1 << node;
+    return GS4_OK;
+}
+
+/* Makes the nodes inside well-composed, and numbers the vertices. */
+static int gs4i_net_number(gs4i_net *s)
+{
+    uint8_t row[5][5];
+    int x[3], n, a, again = 1;
+    size_t b;
+    while (again) {
+        again = s->vertices = s->quads = 0;
+        for (b = 0; b < s->o.table; b++) {
+            gs4i_net_block *block = gs4i_net_block_at(s, (int64_t)b);
+            if (!gs4i_net_rows(s, b, row)) continue;
+            if (!block) block = gs4i_net_block_for(s, (int64_t)b);
+            if (!block) return GS4_ERROR_MEMORY;
+            for (n = 0; n < GS4I_BLOCK_NODES && !again; n++) {
+                const int cube = gs4i_net_cube(row, n);
+                block->vertex[n] = cube == 0 || cube == 255 ? 0 : ++s->vertices;
+                for (a = 0; a < 3; a++) s->quads += (cube & 1) != (cube >> (1 << a) & 1);
+            }
+            for (n = 0; n < GS4I_BLOCK_NODES; n++) {
+                const int cube = gs4i_net_cube(row, n);
+                if (!s->fill[cube]) continue;
+                gs4i_net_place(s, b, n, x);
+                if (gs4i_net_fill(s, x, s->fill[cube]) != GS4_OK) return GS4_ERROR_MEMORY;
+                again = 1;
+                gs4i_net_rows(s, b, row);
+            }
+        }
+        if (s->vertices > INT32_MAX / 8) return GS4_ERROR_MEMORY;
+    }
+    s->quad_capacity = s->quads;
+    s->vertex =
+        (gs4i_net_vertex *)gs4i_alloc(&s->sim->memory, (size_t)s->vertices, sizeof *s->vertex);
+    s->quad = (int32_t(*)[4])gs4i_alloc(&s->sim->memory, (size_t)s->quads, sizeof *s->quad);
+    return s->vertex && s->quad ? GS4_OK : GS4_ERROR_MEMORY;
+}
+
+/* Depth in cells that a level means beside a flat surface, -1 to 1. */
+GS4I_INLINE float gs4i_net_depth(float level)
+{
+    if (level > 0.5f) return level < 1 ? 1 - sqrtf(2 * (1 - level)) : 1;
+    return level > 0 ? sqrtf(2 * level) - 1 : -1;
+}
+
+/* Is node x of the box beyond a wall along an axis? */
+GS4I_INLINE int gs4i_net_beyond(const gs4i_net *s, int axis, int x)
+{
+    const int at = s->o.low[axis] + x, n = s->sim->grid.cells[axis];
+    return (at < 0 || at >= n) && s->sim->desc.walls[2 * axis + (at >= n)] != GS4_WALL_OPEN;
+}
+
+/* The vertex of a cube: where and on which walls it is. */
+static void gs4i_net_place_vertex(const gs4i_net *s, const int x[3], int cube, gs4i_net_vertex *v)
+{
+    float depth[8], sum[3] = { 0, 0, 0 };
+    int a, c, crossings = 0;
+    for (c = 0; c < 8; c++) {
+        const int at[3] = { x[0] + (c & 1), x[1] + (c >> 1 & 1), x[2] + (c >> 2) };
+        const gs4i_net_block *block = gs4i_net_block_at(s, gs4i_net_block_of(s, at));
+        const float d =
+            gs4i_net_depth(block ? block->level[gs4i_place_of(at[0], at[1], at[2])] : 0);
+        /* one that was filled is hardly inside */
+        depth[c] = cube >> c & 1 ? (d > 0.05f ? d : 0.05f) : (d < 0 ? d : 0);
+    }
+    for (a = 0; a < 3; a++)
+        if (gs4i_net_beyond(s, a, x[a]) || gs4i_net_beyond(s, a, x[a] + 1))
+            v->walls |= (uint8_t)(1 << a);
+    for (a = 0; a < 3; a++)
+        for (c = 0; c < 8 && !(v->walls >> a & 1); c++) {
+            const int other = c | 1 << a;
+            int k;
+            if (other == c || (cube >> c & 1) == (cube >> other & 1)) continue;
+            for (k = 0; k < 3; k++)
+                sum[k] += k == a ? depth[c] / (depth[c] - depth[other]) : (float)(c >> k & 1);
+            crossings++;
+        }
+    for (a = 0; a < 3; a++)
+        v->at[a] =
+            (float)x[a] + (v->walls >> a & 1 || !crossings ? 0.5f : sum[a] / (float)crossings);
+}
+
+/* Vertex of the cube at node x. */
+GS4I_INLINE int32_t gs4i_net_vertex_at(const gs4i_net *s, int x, int y, int z)
+{
+    const int at[3] = { x, y, z };
+    const int64_t number = gs4i_net_block_of(s, at);
+    return gs4i_net_block_at(s, number)->vertex[gs4i_place_of(x, y, z)] - 1;
+}
+
+/* The quads around those edges of cube x that begin at its first node; counter-clockwise from
+ * outside. */
+static void gs4i_net_add_quads(gs4i_net *s, const int x[3], int cube)
+{
+    int a, k;
+    for (a = 0; a < 3; a++) {
+        const int u = (a + 1) % 3, v = (a + 2) % 3, is_inside = cube & 1;
+        int32_t quad[4];
+        int walls = 7;
+        if (is_inside == (cube >> (1 << a) & 1)) continue;
+        for (k = 0; k < 4; k++) {
+            int at[3];
+            memcpy(at, x, sizeof at);
+            at[u] -= k == 1 || k == 2;
+            at[v] -= k >= 2;
+            quad[is_inside ? k : 3 - k] = gs4i_net_vertex_at(s, at[0], at[1], at[2]);
+        }
+        for (k = 0; k < 4; k++) walls &= s->vertex[quad[k]].walls;
+        memcpy(s->quad[walls ? --s->quads : s->free_quads++], quad, sizeof quad);
+    }
+}
+
+/* All vertices and quads. */
+static void gs4i_net_build(gs4i_net *s)
+{
+    uint8_t row[5][5];
+    int pass, n, k, x[3];
+    size_t b;
+    for (pass = 0; pass < 2; pass++)
+        for (b = 0; b < s->o.table; b++) {
+            const gs4i_net_block *block = gs4i_net_block_at(s, (int64_t)b);
+            if (!block || !gs4i_net_rows(s, b, row)) continue;
+            for (n = 0; n < GS4I_BLOCK_NODES; n++) {
+                if (!block->vertex[n]) continue;
+                gs4i_net_place(s, b, n, x);
+                if (pass)
+                    gs4i_net_add_quads(s, x, gs4i_net_cube(row, n));
+                else
+                    gs4i_net_place_vertex(s, x, gs4i_net_cube(row, n),
+                                          &s->vertex[block->vertex[n] - 1]);
+            }
+        }
+    s->quads = s->quad_capacity;
+    for (n = 0; n < s->free_quads; n++)
+        for (k = 0; k < 4; k++) s->vertex[s->quad[n][k]].neighbours += 2;
+}
+
+/* One pass of smoothing: each vertex goes by `share` of the way to the mean of its neighbours. */
+static void gs4i_net_smooth(gs4i_net *s, float share)
+{
+    int i, k, a;
+    for (i = 0; i < s->free_quads; i++)
+        for (k = 0; k < 4; k++) {
+            float *sum = s->vertex[s->quad[i][k]].sum;
+            const float *left = s->vertex[s->quad[i][(k + 3) & 3]].at,
+                        *right = s->vertex[s->quad[i][(k + 1) & 3]].at;
+            for (a = 0; a < 3; a++) sum[a] += left[a] + right[a];
+        }
+    for (i = 0; i < s->vertices; i++) {
+        gs4i_net_vertex *v = &s->vertex[i];
+        for (a = 0; a < 3; a++) {
+            if (v->neighbours && !(v->walls >> a & 1))
+                v->at[a] += share * (v->sum[a] / (float)v->neighbours - v->at[a]);
+            v->sum[a] = 0;
+        }
+    }
+}
+
+/* --- pieces ----------------------------------------------------------------------------------- */
+
+/* The last node of the piece of a node. */
+static int32_t gs4i_net_root(gs4i_net *s, int32_t node)
+{
+    for (;;) {
+        int32_t *next = &s->block[node / GS4I_BLOCK_NODES].piece[node % GS4I_BLOCK_NODES], *after;
+        if (*next < 0) return node;
+        after = &s->block[*next / GS4I_BLOCK_NODES].piece[*next % GS4I_BLOCK_NODES];
+        if (*after < 0) return *next;
+        node = *next = *after;
+    }
+}
+
+static int32_t *gs4i_net_piece_of(gs4i_net *s, int32_t node)
+{
+    const int32_t root = gs4i_net_root(s, node);
+    return &s->block[root / GS4I_BLOCK_NODES].piece[root % GS4I_BLOCK_NODES];
+}
+
+static void gs4i_net_join(gs4i_net *s, int32_t a, int32_t b)
+{
+    a = gs4i_net_root(s, a);
+    b = gs4i_net_root(s, b);
+    if (a != b) s->block[b / GS4I_BLOCK_NODES].piece[b % GS4I_BLOCK_NODES] = a;
+}
+
+/* Number of a node of the box among those of all blocks, -1: it is in none. */
+static int32_t gs4i_net_node(const gs4i_net *s, int x, int y, int z)
+{
+    const int at[3] = { x, y, z };
+    const int64_t number = gs4i_net_block_of(s, at);
+    return number < 0 || !s->o.place[number]
+               ? -1
+               : (int32_t)(s->o.place[number] - 1) * GS4I_BLOCK_NODES + gs4i_place_of(x, y, z);
+}
+
+/* Joins the nodes of block b that are inside to those after them along each axis, and others to the
+ * fullest around them: so all that is around a piece counts to it. */
+static void gs4i_net_join_block(gs4i_net *s, size_t b)
+{
+    const gs4i_net_block *block = gs4i_net_block_at(s, (int64_t)b);
+    const int32_t first = (int32_t)(s->o.place[b] - 1) * GS4I_BLOCK_NODES;
+    int n, a, i, x[3];
+    for (n = 0; n < GS4I_BLOCK_NODES; n++) {
+        const float f = s->o.block[s->o.place[b] - 1].f[gs4i_occupied_node(n)];
+        float most = f;
+        int32_t fullest = -1;
+        if (!(block->inside >> n & 1) && !(f > 0)) continue;
+        gs4i_net_place(s, b, n, x);
+        for (a = 0; a < 3 && block->inside >> n & 1; a++) {
+            const int32_t next =
+                gs4i_net_node(s, x[0] + (a == 0), x[1] + (a == 1), x[2] + (a == 2));
+            if (next >= 0
+                && s->block[next / GS4I_BLOCK_NODES].inside >> next % GS4I_BLOCK_NODES & 1)
+                gs4i_net_join(s, first + n, next);
+        }
+        for (i = 0; i < 27 && !(block->inside >> n & 1); i++) {
+            const int32_t near =
+                gs4i_net_node(s, x[0] + i % 3 - 1, x[1] + i / 3 % 3 - 1, x[2] + i / 9 - 1);
+            const float g = near < 0 ? 0
+                                     : s->o.block[near / GS4I_BLOCK_NODES]
+                                           .f[gs4i_occupied_node(near % GS4I_BLOCK_NODES)];
+            if (!(g > most)) continue;
+            most = g;
+            fullest = near;
+        }
+        if (fullest >= 0) gs4i_net_join(s, fullest, first + n);
+    }
+}
+
+/* Finds the pieces: how much is in each, and which a vertex is of. */
+static int gs4i_net_find_pieces(gs4i_net *s)
+{
+    int32_t i, n;
+    size_t b;
+    if (s->o.count > INT32_MAX / GS4I_BLOCK_NODES) return GS4_ERROR_MEMORY;
+    for (i = 0; i < s->o.count; i++)
+        for (n = 0; n < GS4I_BLOCK_NODES; n++) s->block[i].piece[n] = -1;
+    for (b = 0; b < s->o.table; b++)
+        if (s->o.place[b]) gs4i_net_join_block(s, b);
+    for (i = 0; i < s->o.count; i++)
+        for (n = 0; n < GS4I_BLOCK_NODES; n++)
+            if (s->block[i].inside >> n & 1 && s->block[i].piece[n] == -1)
+                s->block[i].piece[n] = -2 - s->pieces++;
+    s->piece = (gs4i_net_piece *)gs4i_alloc(&s->sim->memory, (size_t)s->pieces, sizeof *s->piece);
+    if (!s->piece) return GS4_ERROR_MEMORY;
+    for (b = 0; b < s->o.table; b++) {
+        uint8_t row[5][5];
+        int x[3], c;
+        if (!s->o.place[b]) continue;
+        i = (int32_t)s->o.place[b] - 1;
+        for (n = 0; n < GS4I_BLOCK_NODES; n++) {
+            const float f = s->o.block[i].f[gs4i_occupied_node(n)];
+            const int32_t piece = f > 0 ? -2 - *gs4i_net_piece_of(s, i * GS4I_BLOCK_NODES + n) : -1;
+            if (piece >= 0) s->piece[piece].volume += (double)f;
+        }
+        if (!gs4i_net_rows(s, b, row)) continue;
+        for (n = 0; n < GS4I_BLOCK_NODES; n++) {
+            const int cube = gs4i_net_cube(row, n);
+            if (!s->block[i].vertex[n]) continue;
+            for (c = 0; !(cube >> c & 1); c++) {
+            }
+            gs4i_net_place(s, b, n, x);
+            s->vertex[s->block[i].vertex[n] - 1].piece =
+                -2
+                - *gs4i_net_piece_of(
+                    s, gs4i_net_node(s, x[0] + (c & 1), x[1] + (c >> 1 & 1), x[2] + (c >> 2)));
+        }
+    }
+    return GS4_OK;
+}
+
+/* --- normals and volume ----------------------------------------------------------------------- */
+
+/* Twice the area of a quad, along its normal: the same by either diagonal. */
+GS4I_INLINE void gs4i_net_area(const gs4i_net *s, const int32_t quad[4], float area[3])
+{
+    const float *p = s->vertex[quad[0]].at, *q = s->vertex[quad[1]].at, *r = s->vertex[quad[2]].at,
+                *t = s->vertex[quad[3]].at;
+    const float a[3] = { r[0] - p[0], r[1] - p[1], r[2] - p[2] },
+                b[3] = { t[0] - q[0], t[1] - q[1], t[2] - q[2] };
+    area[0] = a[1] * b[2] - a[2] * b[1];
+    area[1] = a[2] * b[0] - a[0] * b[2];
+    area[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+/* Normals of vertices: of free quads alone where there are any, so that they lie in the walls that
+ * hold them. `sum`: areas, of free quads. */
+static void gs4i_net_normals(gs4i_net *s)
+{
+    float area[3], size;
+    int i, k, a;
+    for (i = 0; i < s->vertices; i++) memset(s->vertex[i].sum, 0, sizeof s->vertex[i].sum);
+    for (i = 0; i < s->quads; i++) {
+        gs4i_net_area(s, s->quad[i], area);
+        for (k = 0; k < 4; k++) {
+            gs4i_net_vertex *v = &s->vertex[s->quad[i][k]];
+            for (a = 0; a < 3; a++)
+                if (i < s->free_quads ? !(v->walls >> a & 1) : !v->neighbours) v->sum[a] += area[a];
+        }
+    }
+    for (i = 0; i < s->vertices; i++) {
+        gs4i_net_vertex *v = &s->vertex[i];
+        size = sqrtf(v->sum[0] * v->sum[0] + v->sum[1] * v->sum[1] + v->sum[2] * v->sum[2]);
+        for (a = 0; a < 3; a++) v->normal[a] = size > 0 ? v->sum[a] / size : a == 0 ? 1.0f : 0.0f;
+    }
+}
+
+/* `enclosed` of all pieces by (1/6) p . (q x r) over triangles: of a quad (1/12) the sum over both
+ * ways to cut it, so that no diagonal matters. */
+static void gs4i_net_enclosed(gs4i_net *s)
+{
+    int i, k, a;
+    for (i = 0; i < s->pieces; i++) s->piece[i].enclosed = 0;
+    for (i = 0; i < s->quads; i++) {
+        double sum = 0;
+        float area[3];
+        gs4i_net_area(s, s->quad[i], area);
+        for (a = 0; a < 3; a++)
+            for (k = 0; k < 4; k++) sum += (double)s->vertex[s->quad[i][k]].at[a] * (double)area[a];
+        s->piece[s->vertex[s->quad[i][0]].piece].enclosed += sum / 24;
+    }
+}
+
+/* Boxes of pieces, and slopes, by the normals that vertices have. */
+static void gs4i_net_measure(gs4i_net *s)
+{
+    int i, a;
+    for (i = 0; i < s->pieces; i++)
+        for (a = 0; a < 3; a++) {
+            s->piece[i].low[a] = s->piece[i].wall[a][0] = FLT_MAX;
+            s->piece[i].high[a] = s->piece[i].wall[a][1] = -FLT_MAX;
+        }
+    for (i = 0; i < s->vertices; i++) {
+        const gs4i_net_vertex *v = &s->vertex[i];
+        gs4i_net_piece *p = &s->piece[v->piece];
+        for (a = 0; a < 3; a++) {
+            const float x = v->at[a];
+            p->low[a] = x < p->low[a] ? x : p->low[a];
+            p->high[a] = x > p->high[a] ? x : p->high[a];
+            if (v->walls >> a & 1) {
+                p->wall[a][0] = x < p->wall[a][0] ? x : p->wall[a][0];
+                p->wall[a][1] = x > p->wall[a][1] ? x : p->wall[a][1];
+            }
+            /* an eighth: areas are twice as large, and a quarter of each quad is a vertex's */
+            if (v->neighbours) p->slope += (double)(v->normal[a] * v->sum[a]) / 8;
+        }
+    }
+}
+
+/* What vertices of a piece do: small ones are scaled, about the walls that hold them; others move
+ * along their normals, by half a cell at most. */
+static void gs4i_net_plan(gs4i_net_piece *p, int first)
+{
+    const double ratio = p->enclosed > 0 ? p->volume / p->enclosed : 1;
+    int a, is_small = 1, free_axes = 0;
+    p->offset = p->slope > 0 ? (float)((p->volume - p->enclosed) / p->slope) : 0;
+    p->offset = p->offset < -0.5f ? -0.5f : p->offset > 0.5f ? 0.5f : p->offset;
+    for (a = 0; a < 3; a++) {
+        is_small &= p->high[a] - p->low[a] < GS4I_SMALL_PIECE;
+        free_axes += !(p->wall[a][1] > p->wall[a][0]);
+        p->scale[a] = 1;
+        p->centre[a] = p->wall[a][1] < p->wall[a][0] ? (p->low[a] + p->high[a]) / 2 : p->wall[a][0];
+    }
+    if (!is_small || !free_axes) return;
+    p->offset = 0;
+    for (a = 0; a < 3 && first; a++)
+        if (!(p->wall[a][1] > p->wall[a][0])) p->scale[a] = (float)pow(ratio, 1.0 / free_axes);
+}
+
+/* Gives each piece the volume of its particles. */
+static void gs4i_net_set_volume(gs4i_net *s)
+{
+    int pass, i, a;
+    gs4i_net_normals(s);
+    gs4i_net_measure(s);
+    for (pass = 0; pass < 3; pass++) {
+        gs4i_net_enclosed(s);
+        for (i = 0; i < s->pieces; i++) gs4i_net_plan(&s->piece[i], pass == 0);
+        for (i = 0; i < s->vertices; i++) {
+            gs4i_net_vertex *v = &s->vertex[i];
+            const gs4i_net_piece *p = &s->piece[v->piece];
+            for (a = 0; a < 3; a++) {
+                if (v->neighbours) v->at[a] += p->offset * v->normal[a];
+                v->at[a] = p->centre[a] + p->scale[a] * (v->at[a] - p->centre[a]);
+            }
+        }
+    }
+    gs4i_net_normals(s);
+}
+
+/* --- materials and values --------------------------------------------------------------------- */
+
+/* The vertex of the cube that particle i is in, NULL: the surface is not near. */
+GS4I_INLINE gs4i_net_vertex *gs4i_net_vertex_near(const gs4i_net *s, size_t i)
+{
+    const uint32_t cube = s->o.cube[i];
+    const int32_t v = s->block[cube / GS4I_BLOCK_NODES].vertex[cube % GS4I_BLOCK_NODES];
+    return v ? &s->vertex[v - 1] : NULL;
+}
+
+/* Both vertices of a side of a quad, of all sides one after another. */
+GS4I_INLINE void gs4i_net_side(const gs4i_net *s, int i, gs4i_net_vertex *of[2])
+{
+    of[0] = &s->vertex[s->quad[i / 4][i & 3]];
+    of[1] = &s->vertex[s->quad[i / 4][(i + 1) & 3]];
+}
+
+/* Vertices have the material of the nearest particle in their cube; where none is, that of a
+ * neighbour. sum[0]: the distance squared. */
+static void gs4i_net_find_materials(gs4i_net *s)
+{
+    const gs4i_particles *p = &s->sim->particles;
+    const gs4i_grid *g = &s->sim->grid;
+    gs4i_net_vertex *v, *of[2];
+    int i, k, again = 1;
+    for (i = 0; i < s->vertices; i++) s->vertex[i].sum[0] = FLT_MAX;
+    for (i = 0; i < p->count; i++) {
+        const gs4_real *x = p->position + 4 * (size_t)i;
+        float d[3];
+        v = gs4i_net_vertex_near(s, (size_t)i);
+        if (!v) continue;
+        d[0] = (float)((x[0] - g->origin.x) * g->inv_h) - 0.5f - (float)s->o.low[0] - v->at[0];
+        d[1] = (float)((x[1] - g->origin.y) * g->inv_h) - 0.5f - (float)s->o.low[1] - v->at[1];
+        d[2] = (float)((x[2] - g->origin.z) * g->inv_h) - 0.5f - (float)s->o.low[2] - v->at[2];
+        d[0] = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+        if (!(d[0] < v->sum[0])) continue;
+        v->sum[0] = d[0];
+        v->material = p->material[i];
+    }
+    while (again)
+        for (again = i = 0; i < 4 * s->quads; i++) {
+            gs4i_net_side(s, i, of);
+            for (k = 0; k < 2; k++) {
+                if (!(of[k]->sum[0] < FLT_MAX) || of[1 - k]->sum[0] < FLT_MAX) continue;
+                of[1 - k]->sum[0] = of[k]->sum[0];
+                of[1 - k]->material = of[k]->material;
+                again = 1;
+            }
+        }
+}
+
+/* A number of a field: the size of vectors and tensors. */
+GS4I_INLINE float gs4i_net_size_of(const gs4_view *field, size_t i)
+{
+    const gs4_real *x = field->data + i * (size_t)field->stride;
+    double sum = 0;
+    int c;
+    if (field->components == 1) return (float)x[0];
+    for (c = 0; c < field->components; c++)
+        sum += (field->components == 6 && c > 2 ? 2 : 1) * (double)x[c] * (double)x[c];
+    return (float)sqrt(sum);
+}
+
+/* Means of a field over the particles of the vertex's material in its cube and in those around it
+ * that the surface crosses, by two passes. Vertices without any have the value of a neighbour. */
+static void gs4i_net_find_values(gs4i_net *s, const gs4_view *field)
+{
+    gs4i_net_vertex *v, *of[2];
+    int i, k, pass, again = 1;
+    for (i = 0; i < field->count; i++) {
+        v = gs4i_net_vertex_near(s, (size_t)i);
+        if (!v || v->material != s->sim->particles.material[i]) continue;
+        v->value += gs4i_net_size_of(field, (size_t)i);
+        v->weight += 1;
+    }
+    for (pass = 0; pass < 2; pass++) {
+        for (i = 0; i < s->vertices; i++) {
+            v = &s->vertex[i];
+            v->sum[0] = 4 * v->value; /* a side counts twice */
+            v->sum[1] = 4 * v->weight;
+        }
+        for (i = 0; i < 4 * s->quads; i++) {
+            gs4i_net_side(s, i, of);
+            if (of[0]->material != of[1]->material) continue;
+            for (k = 0; k < 2; k++) {
+                of[k]->sum[0] += of[1 - k]->value;
+                of[k]->sum[1] += of[1 - k]->weight;
+            }
+        }
+        for (i = 0; i < s->vertices; i++) {
+            v = &s->vertex[i];
+            v->value = v->sum[0];
+            v->weight = v->sum[1];
+        }
+    }
+    for (i = 0; i < s->vertices; i++)
+        if (s->vertex[i].weight > 0) s->vertex[i].value /= s->vertex[i].weight;
+    for (pass = 1; again; pass = 0) /* of its own material first, then of any */
+        for (again = pass, i = 0; i < 4 * s->quads; i++) {
+            gs4i_net_side(s, i, of);
+            for (k = 0; k < 2; k++) {
+                if (!(of[k]->weight > 0) || of[1 - k]->weight > 0) continue;
+                if (pass && of[k]->material != of[1 - k]->material) continue;
+                of[1 - k]->weight = 1;
+                of[1 - k]->value = of[k]->value;
+                again = 1;
+            }
+        }
+}
+
+/* --- what is given out ------------------------------------------------------------------------ */
+
+static void gs4i_triangles_free(gs4i_memory *m, gs4_triangles *t)
+{
+    const size_t n = (size_t)t->vertex_count;
+    gs4i_free(m, t->positions, n, 3 * sizeof(gs4_real));
+    gs4i_free(m, t->normals, n, 3 * sizeof(gs4_real));
+    gs4i_free(m, t->values, n, sizeof(gs4_real));
+    gs4i_free(m, t->materials, n, 1);
+    gs4i_free(m, t->triangles, (size_t)t->triangle_count, 3 * sizeof(int));
+    memset(t, 0, sizeof *t);
+}
+
+/* Quads are cut along the shorter diagonal. */
+static void gs4i_net_cut(const gs4i_net *s, int *triangles)
+{
+    int i, k, a;
+    for (i = 0; i < s->quads; i++) {
+        static const int corner[2][6] = { { 0, 1, 2, 0, 2, 3 }, { 1, 2, 3, 1, 3, 0 } };
+        const int32_t *q = s->quad[i];
+        float length[2] = { 0, 0 };
+        for (k = 0; k < 2; k++)
+            for (a = 0; a < 3; a++) {
+                const float d = s->vertex[q[k + 2]].at[a] - s->vertex[q[k]].at[a];
+                length[k] += d * d;
+            }
+        for (k = 0; k < 6; k++) triangles[6 * i + k] = (int)q[corner[length[1] < length[0]][k]];
+    }
+}
+
+static int gs4i_net_give(const gs4i_net *s, int with_values, gs4_triangles *t)
+{
+    gs4i_memory *m = &s->sim->memory;
+    const gs4i_grid *g = &s->sim->grid;
+    const gs4_real origin[3] = { g->origin.x, g->origin.y, g->origin.z };
+    const size_t n = (size_t)s->vertices;
+    int i, a;
+    t->vertex_count = s->vertices;
+    t->triangle_count = 2 * s->quads;
+    t->positions = (gs4_real *)gs4i_alloc(m, n, 3 * sizeof(gs4_real));
+    t->normals = (gs4_real *)gs4i_alloc(m, n, 3 * sizeof(gs4_real));
+    t->values = with_values ? (gs4_real *)gs4i_alloc(m, n, sizeof(gs4_real)) : NULL;
+    t->materials = (uint8_t *)gs4i_alloc(m, n, 1);
+    t->triangles = (int *)gs4i_alloc(m, (size_t)t->triangle_count, 3 * sizeof(int));
+    if (!t->positions || !t->normals || (with_values && !t->values) || !t->materials
+        || !t->triangles)
+        return GS4_ERROR_MEMORY;
+    for (i = 0; i < s->vertices; i++) {
+        const gs4i_net_vertex *v = &s->vertex[i];
+        for (a = 0; a < 3; a++) {
+            const gs4_real end = GS4I_C(g->cells[a]),
+                           x = GS4I_C(s->o.low[a]) + GS4I_C(v->at[a]) + GS4I_C(0.5);
+            t->positions[3 * i + a] =
+                origin[a]
+                + g->h
+                      * (x < 0 && s->sim->desc.walls[2 * a] != GS4_WALL_OPEN         ? 0
+                         : x > end && s->sim->desc.walls[2 * a + 1] != GS4_WALL_OPEN ? end
+                                                                                     : x);
+            t->normals[3 * i + a] = GS4I_C(v->normal[a]);
+        }
+        if (with_values) t->values[i] = GS4I_C(v->value);
+        t->materials[i] = v->material;
+    }
+    gs4i_net_cut(s, t->triangles);
+    return GS4_OK;
+}
+
+static int gs4i_net_fill_blocks(gs4i_net *s)
+{
+    gs4i_occupied *o = &s->o;
+    int result = gs4i_occupied_box(&s->sim->memory, o), i;
+    size_t b;
+    if (result != GS4_OK) return result;
+    GS4I_TRY(gs4i_occupied_add(&s->sim->memory, o));
+    for (b = 0; b < o->table; b++) GS4I_TRY(gs4i_occupied_share(&s->sim->memory, o, b));
+    s->block = (gs4i_net_block *)gs4i_alloc(&s->sim->memory, (size_t)o->capacity, sizeof *s->block);
+    if (!s->block) return GS4_ERROR_MEMORY;
+    s->capacity = o->capacity;
+    for (b = 0; b < o->table; b++)
+        if (o->place[b]) gs4i_net_levels(s, b);
+    gs4i_net_rules(s);
+    GS4I_TRY(gs4i_net_number(s));
+    gs4i_net_build(s);
+    GS4I_TRY(gs4i_net_find_pieces(s));
+    for (i = 0; i < GS4I_SMOOTHINGS; i++) {
+        gs4i_net_smooth(s, GS4I_SMOOTHING_LAMBDA);
+        gs4i_net_smooth(s, GS4I_SMOOTHING_MU);
+    }
+    gs4i_net_set_volume(s);
+    return GS4_OK;
+}
+
+/* The surface, coloured by a field; one without data: by none. */
+static int gs4i_make_surface(gs4_sim *sim, const gs4_view *field, gs4_triangles *t)
+{
+    gs4i_memory *m = &sim->memory;
+    gs4i_net s;
+    int result;
+    memset(&s, 0, sizeof s);
+    s.sim = sim;
+    s.o.sim = sim;
+    s.o.with_cubes = s.o.margin = 1;
+    result = gs4i_net_fill_blocks(&s);
+    if (result == GS4_OK && sim->material_count > 1) gs4i_net_find_materials(&s);
+    if (result == GS4_OK && field->data) gs4i_net_find_values(&s, field);
+    if (result == GS4_OK) result = gs4i_net_give(&s, field->data != NULL, t);
+    gs4i_free(m, s.o.place, s.o.table, sizeof *s.o.place);
+    gs4i_free(m, s.o.block, (size_t)s.o.capacity, sizeof *s.o.block);
+    gs4i_free(m, s.o.cube, (size_t)sim->particles.count, sizeof *s.o.cube);
+    gs4i_free(m, s.block, (size_t)s.capacity, sizeof *s.block);
+    gs4i_free(m, s.vertex, (size_t)s.vertices, sizeof *s.vertex);
+    gs4i_free(m, s.quad, (size_t)s.quad_capacity, sizeof *s.quad);
+    gs4i_free(m, s.piece, (size_t)s.pieces, sizeof *s.piece);
+    if (result != GS4_OK) gs4i_triangles_free(m, t);
+    return result == GS4_ERROR_MEMORY ? gs4i_fail_memory(&sim->error) : result;
+}
+
+/* PLY with vertices and faces, as gs4i_write_ply. */
+static GS4I_COLD int gs4i_write_triangles(gs4_sim *sim, const gs4_triangles *t, const char *value,
+                                          const char *path)
+{
+    static const uint8_t three = 3;
+    const size_t r = sizeof(gs4_real);
+    const gs4i_column vertex[] = { { NULL, NULL, NULL, t->positions, r, 3, 3 * r },
+                                   { NULL, NULL, NULL, t->normals, r, 3, 3 * r },
+                                   { NULL, NULL, NULL, t->values, r, 1, r },
+                                   { NULL, NULL, NULL, t->materials, 1, 1, 1 } },
+                      face[] = { { NULL, NULL, NULL, &three, 1, 1, 0 },
+                                 { NULL, NULL, NULL, t->triangles, 4, 3, 12 } };
+    static const char *const name[7] = { "x", "y", "z", "nx", "ny", "nz", NULL };
+    gs4i_file f;
+    gs4i_text text;
+    char head[640];
+    int k;
+    GS4I_TRY(gs4i_file_open(sim, &f, path));
+    text = gs4i_text_into(head, sizeof head);
+    gs4i_put(&text, "ply\nformat binary_little_endian 1.0\ncomment gs4mpm " GS4_VERSION_STRING
+                    "\ncomment time ");
+    gs4i_put_real(&text, sim->time);
+    gs4i_put(&text, "\nelement vertex ");
+    gs4i_put_integer(&text, t->vertex_count);
+    for (k = 0; k < 7; k++) {
+        gs4i_put(&text, sizeof(gs4_real) == 4 ? "\nproperty float " : "\nproperty double ");
+        gs4i_put(&text, name[k] ? name[k] : value);
+    }
+    gs4i_put(&text, "\nproperty uchar material\nelement face ");
+    gs4i_put_integer(&text, t->triangle_count);
+    gs4i_put(&text, "\nproperty list uchar int vertex_indices\nend_header\n");
+    gs4i_file_put(&f, head, strlen(head));
+    gs4i_put_records(&f, vertex, 4, t->vertex_count);
+    gs4i_put_records(&f, face, 2, t->triangle_count);
+    return gs4i_file_close(sim, &f);
+}
+
 /* ==== [[public]] every value checked, then the work =========================================== */
 
 /* --- rules ---------------------------------------------------------------------------------------
@@ -26660,214 +27776,18 @@ GS4_API const uint8_t *gs4_particle_materials(const gs4_sim *sim)
 
 #define GS4I_INNER_FILL 0.55f
 
-/* 5^3 nodes, x fastest: those of the block and, until gs4i_occupied_share has shared them out, one
- * more at the upper end of each axis, so that a particle adds to one block alone. */
-#define GS4I_OCCUPIED_SIDE 5
-#define GS4I_OCCUPIED_NODES (GS4I_OCCUPIED_SIDE * GS4I_OCCUPIED_SIDE * GS4I_OCCUPIED_SIDE)
-
-typedef struct gs4i_occupied_block {
-    float f[GS4I_OCCUPIED_NODES];
-    float fill, inner; /* sum of f of the inner nodes, and how many these are */
-    uint8_t is_inner[GS4I_BLOCK_NODES];
-} gs4i_occupied_block;
-
-typedef struct gs4i_occupied {
-    const gs4_sim *sim;
-    int low[3], blocks[3]; /* the box around all that has f, from cell `low` on; in blocks */
-    int64_t stride[3];
-    uint32_t *place; /* per block of the box: 1 + its place; 0: nothing is there */
-    gs4i_occupied_block *block;
-    int count, capacity;
-    size_t table;
-} gs4i_occupied;
-
-/* What cell x of an axis adds to the number of a block, and to that of a node in it. */
-typedef struct gs4i_occupied_cell {
-    int64_t block; /* below 0: it is beyond the box */
-    int node;
-} gs4i_occupied_cell;
-
-/* Cell x of an axis, or that inside the domain whose image it is. Open walls have none. */
-GS4I_INLINE int gs4i_inside_walls(const gs4_sim *sim, int axis, int x)
-{
-    const int n = sim->grid.cells[axis];
-    const gs4_wall wall = sim->desc.walls[2 * axis + (x >= n)];
-    return (x >= 0 && x < n) || wall == GS4_WALL_OPEN ? x : gs4i_mirrored(wall, x, n);
-}
-
-GS4I_INLINE gs4i_occupied_cell gs4i_occupied_cell_of(const gs4i_occupied *o, int axis, int x)
-{
-    static const int stride[3] = { 1, GS4I_OCCUPIED_SIDE, GS4I_OCCUPIED_SIDE * GS4I_OCCUPIED_SIDE };
-    const int at = gs4i_inside_walls(o->sim, axis, x) - o->low[axis];
-    gs4i_occupied_cell c;
-    c.block =
-        at < 0 || at >> 2 >= o->blocks[axis] ? -(int64_t)o->table : (at >> 2) * o->stride[axis];
-    c.node = (at & 3) * stride[axis];
-    return c;
-}
-
-/* The lower of the two nodes beside a particle along an axis, and the share of the other. */
-GS4I_INLINE int gs4i_node_below(gs4_real x, gs4_real origin, gs4_real inv_h, float *share)
-{
-    const gs4_real at = (x - origin) * inv_h + GS4I_C(0.5); /* from -1 on */
-    *share = (float)(at - GS4I_C((int)at));
-    return (int)at - 1;
-}
-
-/* The box around the nodes of all particles. -1: one of them is outside of the grid. */
-static int gs4i_occupied_box(gs4i_memory *memory, gs4i_occupied *o)
-{
-    const gs4i_grid *g = &o->sim->grid;
-    const gs4i_particles *p = &o->sim->particles;
-    const gs4_real origin[3] = { g->origin.x, g->origin.y, g->origin.z };
-    gs4_real low[4], high[4], finite[4] = { 0, 0, 0, 0 };
-    float share;
-    size_t i;
-    int a;
-    memcpy(low, p->position, sizeof low);
-    memcpy(high, p->position, sizeof high);
-    for (i = 0; i < (size_t)p->count; i++) {
-        const gs4_real *x = p->position + 4 * i;
-        for (a = 0; a < 4; a++) {
-            low[a] = gs4i_min(low[a], x[a]);
-            high[a] = gs4i_max(high[a], x[a]);
-            finite[a] += x[a] - x[a];
-        }
-    }
-    if (!gs4i_is_in_domain(g, low) || !gs4i_is_in_domain(g, high)
-        || !(finite[0] + finite[1] + finite[2] == 0))
-        return GS4_ERROR_ARGUMENT;
-    for (a = 0, o->table = 1; a < 3; a++) {
-        const int from = gs4i_node_below(low[a], origin[a], g->inv_h, &share),
-                  to = gs4i_node_below(high[a], origin[a], g->inv_h, &share) + 1;
-        const int wraps = g->periodic[a] && (from < 0 || to >= g->cells[a]);
-        o->low[a] = wraps ? -1 : from;
-        o->blocks[a] = ((wraps ? g->cells[a] + 1 : to - from) >> 2) + 1;
-        o->stride[a] = (int64_t)o->table;
-        o->table *= (size_t)o->blocks[a];
-    }
-    o->place = (uint32_t *)gs4i_alloc(memory, o->table, sizeof *o->place);
-    return o->place ? GS4_OK : GS4_ERROR_MEMORY;
-}
-
-/* The block, NULL: nothing is there. */
-GS4I_INLINE gs4i_occupied_block *gs4i_occupied_block_at(const gs4i_occupied *o, int64_t number)
-{
-    return number < 0 || !o->place[number] ? NULL : o->block + o->place[number] - 1;
-}
-
-/* The block, which begins empty. NULL: there is no memory. */
-GS4I_INLINE gs4i_occupied_block *gs4i_occupied_block_for(gs4i_memory *memory, gs4i_occupied *o,
-                                                         int64_t number)
-{
-    if (!o->place[number]) {
-        void *grown = gs4i_grow(memory, o->block, o->count, &o->capacity, sizeof *o->block);
-        if (!grown) return NULL;
-        o->block = (gs4i_occupied_block *)grown;
-        o->place[number] = (uint32_t)++o->count;
-    }
-    return o->block + o->place[number] - 1;
-}
-
-/* All particles give to f. */
-static int gs4i_occupied_add(gs4i_memory *memory, gs4i_occupied *o)
-{
-    const int up_y = GS4I_OCCUPIED_SIDE, up_z = up_y * GS4I_OCCUPIED_SIDE;
-    const gs4i_particles *p = &o->sim->particles;
-    const gs4_vec3 origin = o->sim->grid.origin;
-    const gs4_real inv_h = o->sim->grid.inv_h, cells = inv_h * inv_h * inv_h;
-    size_t i;
-    for (i = 0; i < (size_t)p->count; i++) {
-        const gs4_real *at = p->position + 4 * i;
-        const float volume = (float)(at[3] * o->sim->constants[p->material[i]].inv_density * cells);
-        float sx, sy, sz, low[2], high[2], *f;
-        const int x = gs4i_node_below(at[0], origin.x, inv_h, &sx) - o->low[0],
-                  y = gs4i_node_below(at[1], origin.y, inv_h, &sy) - o->low[1],
-                  z = gs4i_node_below(at[2], origin.z, inv_h, &sz) - o->low[2];
-        gs4i_occupied_block *block = gs4i_occupied_block_for(
-            memory, o, (x >> 2) + (y >> 2) * o->stride[1] + (z >> 2) * o->stride[2]);
-        if (!block) return GS4_ERROR_MEMORY;
-        f = block->f + ((x & 3) + (y & 3) * up_y + (z & 3) * up_z);
-        high[0] = volume * sz;
-        low[0] = volume - high[0];
-        low[1] = low[0] * sy;
-        low[0] -= low[1];
-        high[1] = high[0] * sy;
-        high[0] -= high[1];
-        f[0] += low[0] - low[0] * sx;
-        f[1] += low[0] * sx;
-        f[up_y] += low[1] - low[1] * sx;
-        f[up_y + 1] += low[1] * sx;
-        f[up_z] += high[0] - high[0] * sx;
-        f[up_z + 1] += high[0] * sx;
-        f[up_z + up_y] += high[1] - high[1] * sx;
-        f[up_z + up_y + 1] += high[1] * sx;
-    }
-    return GS4_OK;
-}
-
-/* The cell where block b begins along an axis. */
-GS4I_INLINE int gs4i_occupied_first(const gs4i_occupied *o, size_t b, int axis)
-{
-    return o->low[axis] + 4 * (int)(b / (size_t)o->stride[axis] % (size_t)o->blocks[axis]);
-}
-
-/* What block b has beyond its end or behind a wall goes to where it belongs. */
-static int gs4i_occupied_share(gs4i_memory *memory, gs4i_occupied *o, size_t b)
-{
-    gs4i_occupied_cell cell[3][GS4I_OCCUPIED_SIDE];
-    int i, a;
-    if (!o->place[b]) return GS4_OK;
-    for (a = 0; a < 3; a++)
-        for (i = 0; i < GS4I_OCCUPIED_SIDE; i++)
-            cell[a][i] = gs4i_occupied_cell_of(o, a, gs4i_occupied_first(o, b, a) + i);
-    for (i = 0; i < GS4I_OCCUPIED_NODES; i++) {
-        const gs4i_occupied_cell *x = &cell[0][i % GS4I_OCCUPIED_SIDE],
-                                 *y = &cell[1][i / GS4I_OCCUPIED_SIDE % GS4I_OCCUPIED_SIDE],
-                                 *z = &cell[2][i / (GS4I_OCCUPIED_SIDE * GS4I_OCCUPIED_SIDE)];
-        const int64_t to = x->block + y->block + z->block;
-        const int node = x->node + y->node + z->node;
-        float *f = &o->block[o->place[b] - 1].f[i];
-        const float share = *f;
-        gs4i_occupied_block *block;
-        if (share == 0 || (to == (int64_t)b && node == i)) continue;
-        *f = 0;
-        block = gs4i_occupied_block_for(memory, o, to);
-        if (!block) return GS4_ERROR_MEMORY;
-        block->f[node] += share;
-    }
-    return GS4_OK;
-}
-
 /* least[i + 4 (j + 4 k)]: the least f of node (i, j, k) of block b and of the 26 around it. */
 static void gs4i_occupied_least(const gs4i_occupied *o, size_t b, float *least)
 {
-    gs4i_occupied_cell cell[3][6];
     float f[6 * 6 * 6];
-    int i, a, stride, n;
-    for (a = 0; a < 3; a++)
-        for (i = 0; i < 6; i++)
-            cell[a][i] = gs4i_occupied_cell_of(o, a, gs4i_occupied_first(o, b, a) + i - 1);
-    for (n = 0; n < 36; n++) {
-        const gs4i_occupied_cell *y = &cell[1][n % 6], *z = &cell[2][n / 6];
-        for (i = 0; i < 6; i++) {
-            const gs4i_occupied_block *block =
-                gs4i_occupied_block_at(o, cell[0][i].block + y->block + z->block);
-            f[6 * n + i] = block ? block->f[cell[0][i].node + y->node + z->node] : 0;
-        }
-    }
+    int i, stride, n;
+    gs4i_occupied_window(o, b, f);
     for (stride = 1; stride <= 36; stride *= 6) /* of a node and the two after it */
         for (i = 0; i + 2 * stride < 6 * 6 * 6; i++) {
             const float next = f[i + stride] < f[i] ? f[i + stride] : f[i];
             f[i] = f[i + 2 * stride] < next ? f[i + 2 * stride] : next;
         }
     for (n = 0; n < GS4I_BLOCK_NODES; n++) least[n] = f[n % 4 + 6 * (n / 4 % 4) + 36 * (n / 16)];
-}
-
-/* Node n of a block of 4^3 among the 5^3. */
-GS4I_INLINE int gs4i_occupied_node(int n)
-{
-    return n % 4 + GS4I_OCCUPIED_SIDE * (n / 4 % 4 + GS4I_OCCUPIED_SIDE * (n / 16));
 }
 
 /* Finds the inner nodes of block b, where anything is. What has f below 0.5 is a cloud, not a
@@ -27078,6 +27998,53 @@ GS4_API int gs4_write_raw(gs4_sim *sim, const char *path)
     GS4I_TRY(gs4i_check_idle(sim));
     GS4I_TRY(gs4i_check_edit(sim));
     return gs4i_write_raw(sim, path);
+}
+
+static int gs4i_get_surface(gs4_sim *sim, gs4_field field, gs4_triangles *surface)
+{
+    gs4_view view;
+    memset(&view, 0, sizeof view);
+    GS4I_TRY(gs4i_check_edit(sim));
+    GS4I_TRY(gs4i_require_value(
+        &sim->error, (int)field >= 0 && (int)field <= (int)GS4_FIELD_PRESSURE, "field is ",
+        (double)(int)field, "; it must be one of gs4_field, GS4_FIELD_POSITION for no colour"));
+    if (!sim->particles.count) return GS4_OK;
+    if (field != GS4_FIELD_POSITION) {
+        view = gs4_particles(sim, field);
+        GS4I_TRY(gs4i_require_value(
+            &sim->error, view.data != NULL, "the scene has no such field as ", (double)(int)field,
+            ", by which the surface is to be coloured; GS4_FIELD_POSITION: by none"));
+    }
+    return gs4i_make_surface(sim, &view, surface);
+}
+
+GS4_API int gs4_surface(gs4_sim *sim, gs4_field field, gs4_triangles *surface)
+{
+    if (surface) memset(surface, 0, sizeof *surface);
+    GS4I_TRY(gs4i_check_idle(sim));
+    GS4I_TRY(gs4i_require(&sim->error, surface != NULL,
+                          "surface is NULL; it must be a place for the triangles"));
+    return gs4i_get_surface(sim, field, surface);
+}
+
+GS4_API void gs4_surface_free(gs4_sim *sim, gs4_triangles *surface)
+{
+    if (!sim || !surface || gs4i_is_busy(sim)) return;
+    gs4i_triangles_free(&sim->memory, surface);
+}
+
+GS4_API int gs4_write_surface(gs4_sim *sim, const char *path)
+{
+    gs4_triangles t;
+    int result;
+    memset(&t, 0, sizeof t);
+    GS4I_TRY(gs4i_check_idle(sim));
+    GS4I_TRY(gs4i_get_surface(
+        sim, sim->particles.with_heat ? GS4_FIELD_TEMPERATURE : GS4_FIELD_VELOCITY, &t));
+    result =
+        gs4i_write_triangles(sim, &t, sim->particles.with_heat ? "temperature" : "speed", path);
+    gs4i_triangles_free(&sim->memory, &t);
+    return result;
 }
 
 GS4_API int gs4_save(gs4_sim *sim, const char *path)
@@ -27562,7 +28529,11 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_SEEN
 #undef GS4I_SLABS
 #undef GS4I_SLOW_DECAY
+#undef GS4I_SMALL_PIECE
 #undef GS4I_SMALL_STEP
+#undef GS4I_SMOOTHINGS
+#undef GS4I_SMOOTHING_LAMBDA
+#undef GS4I_SMOOTHING_MU
 #undef GS4I_SOLID_WAVES
 #undef GS4I_SOUND_EIGENVALUE
 #undef GS4I_SPLAT_MAD
@@ -27587,6 +28558,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_SURFACE_DEPTH
 #undef GS4I_THREAD_LOCAL
 #undef GS4I_MIDDLE_NODE
+#undef GS4I_THIN_FILL
 #undef GS4I_TILE
 #undef GS4I_TILE_REALS
 #undef GS4I_TINY

@@ -25094,6 +25094,7 @@ static GS4I_COLD int gs4i_load(gs4_sim *sim, const char *path)
 #define GS4I_OCCUPIED_NODES (GS4I_OCCUPIED_SIDE * GS4I_OCCUPIED_SIDE * GS4I_OCCUPIED_SIDE)
 
 typedef struct gs4i_occupied_block {
+    int64_t number;
     float f[GS4I_OCCUPIED_NODES];
     float fill, inner; /* sum of f of the inner nodes, and how many these are */
     uint8_t is_inner[GS4I_BLOCK_NODES];
@@ -25198,6 +25199,7 @@ GS4I_INLINE gs4i_occupied_block *gs4i_occupied_block_for(gs4i_memory *memory, gs
         void *grown = gs4i_grow(memory, o->block, o->count, &o->capacity, sizeof *o->block);
         if (!grown) return NULL;
         o->block = (gs4i_occupied_block *)grown;
+        o->block[o->count].number = number;
         o->place[number] = (uint32_t)++o->count;
     }
     return o->block + o->place[number] - 1;
@@ -25317,12 +25319,12 @@ GS4I_INLINE int gs4i_occupied_node(int n)
 /* Pieces with less than so many cells along each axis are scaled. */
 #define GS4I_SMALL_PIECE 4.0f
 
-typedef struct gs4i_net_block {
+typedef struct gs4i_net_block_data {
     float level[GS4I_BLOCK_NODES];
     int32_t vertex[GS4I_BLOCK_NODES]; /* 1 + the vertex of the cube behind the node, 0: none */
     int32_t piece[GS4I_BLOCK_NODES];  /* a node of the same piece; -1 - the piece, if it is last */
     uint64_t inside;                  /* a bit for each node */
-} gs4i_net_block;
+} gs4i_net_block_data;
 
 /* A vertex, in cells from the first node of the box on. */
 typedef struct gs4i_net_vertex {
@@ -25344,7 +25346,7 @@ typedef struct gs4i_net_piece {
 typedef struct gs4i_net {
     gs4_sim *sim;
     gs4i_occupied o;
-    gs4i_net_block *block; /* as o.block */
+    gs4i_net_block_data *block; /* as o.block */
     int capacity;
     uint8_t fill[256]; /* of 8 nodes, those that make them well-composed; 0: they are */
     gs4i_net_vertex *vertex;
@@ -25354,61 +25356,75 @@ typedef struct gs4i_net {
     int quad_capacity;
 } gs4i_net;
 
-/* The block, which begins without material. NULL: there is no memory. */
-static gs4i_net_block *gs4i_net_block_for(gs4i_net *s, int64_t number)
+/* Makes block `number`, which begins without material, unless it is there. */
+static int gs4i_net_block(gs4i_net *s, int64_t number)
 {
     gs4i_memory *memory = &s->sim->memory;
     const int count = s->o.count;
-    if (!gs4i_occupied_block_for(memory, &s->o, number)) return NULL;
-    if (s->o.capacity > s->capacity) {
-        gs4i_net_block *grown =
-            (gs4i_net_block *)gs4i_alloc(memory, (size_t)s->o.capacity, sizeof *grown);
-        if (!grown) return NULL;
-        if (s->block) memcpy(grown, s->block, (size_t)count * sizeof *grown);
-        gs4i_free(memory, s->block, (size_t)s->capacity, sizeof *grown);
-        s->block = grown;
-        s->capacity = s->o.capacity;
-    }
-    return s->block + s->o.place[number] - 1;
+    gs4i_net_block_data *grown;
+    if (!gs4i_occupied_block_for(memory, &s->o, number) || s->o.capacity > INT32_MAX / 64)
+        return GS4_ERROR_MEMORY;
+    if (s->o.capacity <= s->capacity) return GS4_OK;
+    grown = (gs4i_net_block_data *)gs4i_alloc(memory, (size_t)s->o.capacity, sizeof *grown);
+    if (!grown) return GS4_ERROR_MEMORY;
+    if (s->block) memcpy(grown, s->block, (size_t)count * sizeof *grown);
+    gs4i_free(memory, s->block, (size_t)s->capacity, sizeof *grown);
+    s->block = grown;
+    s->capacity = s->o.capacity;
+    return GS4_OK;
 }
 
-/* The surface's part of a block, NULL: nothing is there. */
-GS4I_INLINE gs4i_net_block *gs4i_net_block_at(const gs4i_net *s, int64_t number)
-{
-    return number < 0 || !s->o.place[number] ? NULL : s->block + s->o.place[number] - 1;
-}
-
-/* Number of the block of node x of the box, below 0: it is beyond. */
-GS4I_INLINE int64_t gs4i_net_block_of(const gs4i_net *s, const int x[3])
+/* place[i + 3 j + 9 k]: the block before (0), at (1) or behind (2) block b along each axis; -1:
+ * there is none. */
+static void gs4i_net_around(const gs4i_net *s, int b, int32_t place[27])
 {
     const gs4i_occupied *o = &s->o;
-    int64_t number = 0;
-    int a;
-    for (a = 0; a < 3; a++) {
-        if (x[a] < 0 || x[a] >> 2 >= o->blocks[a]) return -1;
-        number += (x[a] >> 2) * o->stride[a];
+    const int64_t number = o->block[b].number;
+    int at[3], a, i;
+    for (a = 0; a < 3; a++) at[a] = (int)(number / o->stride[a] % o->blocks[a]);
+    for (i = 0; i < 27; i++) {
+        const int x = at[0] + i % 3 - 1, y = at[1] + i / 3 % 3 - 1, z = at[2] + i / 9 - 1;
+        place[i] =
+            x < 0 || y < 0 || z < 0 || x >= o->blocks[0] || y >= o->blocks[1] || z >= o->blocks[2]
+                ? -1
+                : (int32_t)o->place[x + y * o->stride[1] + z * o->stride[2]] - 1;
     }
-    return number;
+}
+
+/* Number of node (x, y, z) of a block, from -4 to 7, among those of all blocks; -1: it is in none.
+ */
+GS4I_INLINE int32_t gs4i_net_node(const int32_t place[27], int x, int y, int z)
+{
+    const int32_t block = place[((x + 4) >> 2) + 3 * ((y + 4) >> 2) + 9 * ((z + 4) >> 2)];
+    return block < 0 ? -1 : block * GS4I_BLOCK_NODES + gs4i_place_of(x, y, z);
+}
+
+/* What there is of node n of all blocks. */
+#define GS4I_NET_OF(member, n) (s->block[(n) / GS4I_BLOCK_NODES].member[(n) % GS4I_BLOCK_NODES])
+GS4I_INLINE int gs4i_net_is_inside(const gs4i_net *s, int32_t n)
+{
+    return n >= 0 && (int)(s->block[n / GS4I_BLOCK_NODES].inside >> n % GS4I_BLOCK_NODES & 1);
+}
+GS4I_INLINE float gs4i_net_f(const gs4i_net *s, int32_t n)
+{
+    return n < 0 ? 0 : s->o.block[n / GS4I_BLOCK_NODES].f[gs4i_occupied_node(n % GS4I_BLOCK_NODES)];
 }
 
 /* Levels of the nodes of block b, and which are inside. */
-static void gs4i_net_levels(gs4i_net *s, size_t b)
+static void gs4i_net_levels(gs4i_net *s, int b)
 {
-    const gs4i_occupied_block *from = gs4i_occupied_block_at(&s->o, (int64_t)b);
-    gs4i_net_block *to = gs4i_net_block_at(s, (int64_t)b);
-    float f[6 * 6 * 6], most[6 * 6 * 6];
+    const gs4i_occupied_block *from = &s->o.block[b];
+    gs4i_net_block_data *to = &s->block[b];
+    float most[6 * 6 * 6];
     int i, n, stride, thin = 0;
     for (n = 0; n < GS4I_BLOCK_NODES; n++)
         thin |= !(from->f[gs4i_occupied_node(n)] * GS4I_THIN_FILL >= 0.5f);
-    if (thin) {
-        gs4i_occupied_window(&s->o, b, f);
-        memcpy(most, f, sizeof most);
-        for (stride = 1; stride <= 36; stride *= 6) /* of a node and the two after it */
-            for (i = 0; i + 2 * stride < 6 * 6 * 6; i++) {
-                const float next = most[i + stride] > most[i] ? most[i + stride] : most[i];
-                most[i] = most[i + 2 * stride] > next ? most[i + 2 * stride] : next;
-            }
-    }
+    if (thin) gs4i_occupied_window(&s->o, (size_t)from->number, most);
+    for (stride = 1; stride <= 36 && thin; stride *= 6) /* of a node and the two after it */
+        for (i = 0; i + 2 * stride < 6 * 6 * 6; i++) {
+            const float next = most[i + stride] > most[i] ? most[i + stride] : most[i];
+            most[i] = most[i + 2 * stride] > next ? most[i + 2 * stride] : next;
+        }
     for (n = 0; n < GS4I_BLOCK_NODES; n++) {
         const float here = from->f[gs4i_occupied_node(n)],
                     M = thin ? most[n % 4 + 6 * (n / 4 % 4) + 36 * (n / 16)] : 1,
@@ -25418,55 +25434,60 @@ static void gs4i_net_levels(gs4i_net *s, size_t b)
     }
 }
 
+/* Makes the blocks before block b where cubes begin that have nodes of it. */
+static int gs4i_net_margin(gs4i_net *s, int b)
+{
+    static const uint64_t first[3] = { 0x1111111111111111u, 0x000f000f000f000fu, 0xffffu };
+    int i, a;
+    for (i = 1; i < 8; i++) {
+        uint64_t inside = s->block[b].inside;
+        int64_t number = s->o.block[b].number;
+        for (a = 0; a < 3; a++)
+            if (i >> a & 1) {
+                inside &= first[a];
+                number -= s->o.stride[a];
+            }
+        if (inside) GS4I_TRY(gs4i_net_block(s, number));
+    }
+    return GS4_OK;
+}
+
 /* Of every 8 nodes, bit x + 2 y + 4 z each, those of which one has to be inside, too. */
 static void gs4i_net_rules(gs4i_net *s)
 {
     static const uint8_t face[6][2] = { { 0x09, 0x06 }, { 0x90, 0x60 }, { 0x21, 0x12 },
                                         { 0x84, 0x48 }, { 0x41, 0x14 }, { 0x82, 0x28 } };
     int c, i;
-    for (c = 0; c < 256; c++) {
-        s->fill[c] = 0;
+    for (c = 0; c < 256; c++)
         for (i = 0; i < 12; i++) {
-            const int pair = face[i / 2][i & 1], both = face[i / 2][0] | face[i / 2][1];
-            if ((c & both) == pair) s->fill[c] |= (uint8_t)(both & ~pair);
-        }
-        for (i = 0; i < 4; i++) {
-            const int pair = 1 << i | 0x80 >> i;
+            const int both = face[i / 2][0] | face[i / 2][1], pair = 1 << (i & 3) | 0x80 >> (i & 3);
+            if ((c & both) == face[i / 2][i & 1]) s->fill[c] |= (uint8_t)(both & ~c);
             if (c == pair || c == (pair ^ 255)) s->fill[c] |= (uint8_t)(c ^ 255);
         }
-    }
 }
 
-/* Which nodes are inside, around the cubes of a block: bit x of row[z][y], each from 0 to 4. 0:
- * all or none is, so the surface crosses none of its cubes. */
-static int gs4i_net_rows(const gs4i_net *s, size_t b, uint8_t row[5][5])
+/* Which nodes are inside, in the cubes that begin at the nodes of a block: bit x of row[z][y], each
+ * from 0 to 4. 0: all or none is, so the surface crosses none of its cubes. */
+static int gs4i_net_rows(const gs4i_net *s, const int32_t place[27], uint8_t row[5][5])
 {
-    const gs4i_occupied *o = &s->o;
     uint64_t inside[8], any = 0, all = ~(uint64_t)0;
-    int i, a, y, z;
+    int i, y, z;
     for (i = 0; i < 8; i++) {
-        int64_t number = (int64_t)b;
-        for (a = 0; a < 3 && number >= 0; a++) {
-            if (!(i >> a & 1)) continue;
-            number = (int)(b / (size_t)o->stride[a] % (size_t)o->blocks[a]) + 1 < o->blocks[a]
-                         ? number + o->stride[a]
-                         : -1;
-        }
-        inside[i] = number >= 0 && o->place[number] ? s->block[o->place[number] - 1].inside : 0;
+        const int32_t b = place[13 + (i & 1) + 3 * (i >> 1 & 1) + 9 * (i >> 2)];
+        inside[i] = b < 0 ? 0 : s->block[b].inside;
         any |= inside[i];
         all &= inside[i];
     }
-    if (!any || !~all) return 0;
     for (z = 0; z < 5; z++)
         for (y = 0; y < 5; y++) {
             const int beyond = 2 * (y >> 2) + 4 * (z >> 2), first = 4 * (y & 3) + 16 * (z & 3);
             row[z][y] =
                 (uint8_t)((inside[beyond] >> first & 15) | (inside[beyond + 1] >> first & 1) << 4);
         }
-    return 1;
+    return any && ~all;
 }
 
-/* The 8 nodes of cube n of a block, as in gs4i_net_rules. */
+/* The 8 nodes of cube n of a block, bit x + 2 y + 4 z each. */
 GS4I_INLINE int gs4i_net_cube(uint8_t row[5][5], int n)
 {
     const int x = n & 3, y = n >> 2 & 3, z = n >> 4;
@@ -25474,34 +25495,22 @@ GS4I_INLINE int gs4i_net_cube(uint8_t row[5][5], int n)
            | (row[z + 1][y + 1] >> x & 3) << 6;
 }
 
-/* Cube n of block b, in nodes of the box. */
-GS4I_INLINE void gs4i_net_place(const gs4i_net *s, size_t b, int n, int x[3])
+/* The fullest of those nodes of cube n of block b that would do is inside from now on. */
+static int gs4i_net_fill(gs4i_net *s, int b, int n, int nodes)
 {
-    int a;
-    for (a = 0; a < 3; a++)
-        x[a] = gs4i_occupied_first(&s->o, b, a) - s->o.low[a] + (n >> 2 * a & 3);
-}
-
-/* The fullest of the nodes that would do is inside from now on. */
-static int gs4i_net_fill(gs4i_net *s, const int x[3], int nodes)
-{
-    float most = -1;
-    int64_t best = 0;
-    int c, node = 0;
+    int32_t place[27], best = -1;
+    int c;
     for (c = 0; c < 8; c++) {
-        const int at[3] = { x[0] + (c & 1), x[1] + (c >> 1 & 1), x[2] + (c >> 2) };
-        const int64_t number = gs4i_net_block_of(s, at);
-        const int n = gs4i_place_of(at[0], at[1], at[2]);
-        const gs4i_net_block *block;
-        if (!(nodes >> c & 1) || number < 0) continue;
-        block = gs4i_net_block_for(s, number);
-        if (!block) return GS4_ERROR_MEMORY;
-        if (!(block->level[n] > most)) continue;
-        most = block->level[n];
-        best = number;
-        node = n;
+        const int x = (n & 3) + (c & 1), y = (n >> 2 & 3) + (c >> 1 & 1), z = (n >> 4) + (c >> 2);
+        int32_t node;
+        if (!(nodes >> c & 1)) continue;
+        GS4I_TRY(gs4i_net_block(s, s->o.block[b].number + (x >> 2) + (y >> 2) * s->o.stride[1]
+                                       + (z >> 2) * s->o.stride[2]));
+        gs4i_net_around(s, b, place);
+        node = gs4i_net_node(place, x, y, z);
+        if (best < 0 || GS4I_NET_OF(level, node) > GS4I_NET_OF(level, best)) best = node;
     }
-    s->block[s->o.place[best] - 1].inside |= (uint64_t)1 << node;
+    s->block[best / GS4I_BLOCK_NODES].inside |= (uint64_t)1 << best % GS4I_BLOCK_NODES;
     return GS4_OK;
 }
 
@@ -25509,30 +25518,29 @@ static int gs4i_net_fill(gs4i_net *s, const int x[3], int nodes)
 static int gs4i_net_number(gs4i_net *s)
 {
     uint8_t row[5][5];
-    int x[3], n, a, again = 1;
-    size_t b;
+    int32_t place[27];
+    int b, n, a, again = 1;
     while (again) {
         again = s->vertices = s->quads = 0;
-        for (b = 0; b < s->o.table; b++) {
-            gs4i_net_block *block = gs4i_net_block_at(s, (int64_t)b);
-            if (!gs4i_net_rows(s, b, row)) continue;
-            if (!block) block = gs4i_net_block_for(s, (int64_t)b);
-            if (!block) return GS4_ERROR_MEMORY;
-            for (n = 0; n < GS4I_BLOCK_NODES && !again; n++) {
-                const int cube = gs4i_net_cube(row, n);
-                block->vertex[n] = cube == 0 || cube == 255 ? 0 : ++s->vertices;
-                for (a = 0; a < 3; a++) s->quads += (cube & 1) != (cube >> (1 << a) & 1);
-            }
+        for (b = 0; b < s->o.count; b++)
+            if (s->block[b].inside) GS4I_TRY(gs4i_net_margin(s, b));
+        for (b = 0; b < s->o.count; b++) {
+            gs4i_net_around(s, b, place);
+            memset(s->block[b].vertex, 0, sizeof s->block[b].vertex);
+            if (!gs4i_net_rows(s, place, row)) continue;
             for (n = 0; n < GS4I_BLOCK_NODES; n++) {
                 const int cube = gs4i_net_cube(row, n);
+                if (cube == 0 || cube == 255) continue;
+                s->block[b].vertex[n] = ++s->vertices;
+                for (a = 0; a < 3; a++) s->quads += (cube & 1) != (cube >> (1 << a) & 1);
                 if (!s->fill[cube]) continue;
-                gs4i_net_place(s, b, n, x);
-                if (gs4i_net_fill(s, x, s->fill[cube]) != GS4_OK) return GS4_ERROR_MEMORY;
+                GS4I_TRY(gs4i_net_fill(s, b, n, s->fill[cube]));
+                gs4i_net_around(s, b, place);
+                gs4i_net_rows(s, place, row);
                 again = 1;
-                gs4i_net_rows(s, b, row);
             }
+            if (s->vertices > INT32_MAX / 16) return GS4_ERROR_MEMORY;
         }
-        if (s->vertices > INT32_MAX / 8) return GS4_ERROR_MEMORY;
     }
     s->quad_capacity = s->quads;
     s->vertex =
@@ -25555,26 +25563,19 @@ GS4I_INLINE int gs4i_net_beyond(const gs4i_net *s, int axis, int x)
     return (at < 0 || at >= n) && s->sim->desc.walls[2 * axis + (at >= n)] != GS4_WALL_OPEN;
 }
 
-/* The vertex of a cube: where and on which walls it is. */
-static void gs4i_net_place_vertex(const gs4i_net *s, const int x[3], int cube, gs4i_net_vertex *v)
+/* The vertex of cube n of a block, by the depths of its nodes: where and on which walls it is. */
+static void gs4i_net_place_vertex(const gs4i_net *s, const int first[3], int n, int cube,
+                                  const float depth[8], gs4i_net_vertex *v)
 {
-    float depth[8], sum[3] = { 0, 0, 0 };
-    int a, c, crossings = 0;
-    for (c = 0; c < 8; c++) {
-        const int at[3] = { x[0] + (c & 1), x[1] + (c >> 1 & 1), x[2] + (c >> 2) };
-        const gs4i_net_block *block = gs4i_net_block_at(s, gs4i_net_block_of(s, at));
-        const float d =
-            gs4i_net_depth(block ? block->level[gs4i_place_of(at[0], at[1], at[2])] : 0);
-        /* one that was filled is hardly inside */
-        depth[c] = cube >> c & 1 ? (d > 0.05f ? d : 0.05f) : (d < 0 ? d : 0);
-    }
+    const int x[3] = { first[0] + (n & 3), first[1] + (n >> 2 & 3), first[2] + (n >> 4) };
+    float sum[3] = { 0, 0, 0 };
+    int a, c, k, crossings = 0;
     for (a = 0; a < 3; a++)
         if (gs4i_net_beyond(s, a, x[a]) || gs4i_net_beyond(s, a, x[a] + 1))
             v->walls |= (uint8_t)(1 << a);
     for (a = 0; a < 3; a++)
         for (c = 0; c < 8 && !(v->walls >> a & 1); c++) {
             const int other = c | 1 << a;
-            int k;
             if (other == c || (cube >> c & 1) == (cube >> other & 1)) continue;
             for (k = 0; k < 3; k++)
                 sum[k] += k == a ? depth[c] / (depth[c] - depth[other]) : (float)(c >> k & 1);
@@ -25585,17 +25586,33 @@ static void gs4i_net_place_vertex(const gs4i_net *s, const int x[3], int cube, g
             (float)x[a] + (v->walls >> a & 1 || !crossings ? 0.5f : sum[a] / (float)crossings);
 }
 
-/* Vertex of the cube at node x. */
-GS4I_INLINE int32_t gs4i_net_vertex_at(const gs4i_net *s, int x, int y, int z)
+/* The vertices of a block. */
+static void gs4i_net_place_vertices(gs4i_net *s, int b, const int32_t place[27], uint8_t row[5][5])
 {
-    const int at[3] = { x, y, z };
-    const int64_t number = gs4i_net_block_of(s, at);
-    return gs4i_net_block_at(s, number)->vertex[gs4i_place_of(x, y, z)] - 1;
+    float depth[5 * 5 * 5], of[8];
+    int n, c, first[3];
+    for (n = 0; n < 125; n++) {
+        const int x = n % 5, y = n / 5 % 5, z = n / 25;
+        const int32_t node = gs4i_net_node(place, x, y, z);
+        const float d = node < 0 ? -1 : gs4i_net_depth(GS4I_NET_OF(level, node));
+        /* one that was filled is hardly inside */
+        depth[n] = row[z][y] >> x & 1 ? (d > 0.05f ? d : 0.05f) : d < 0 ? d : 0;
+    }
+    for (c = 0; c < 3; c++)
+        first[c] = gs4i_occupied_first(&s->o, (size_t)s->o.block[b].number, c) - s->o.low[c];
+    for (n = 0; n < GS4I_BLOCK_NODES; n++) {
+        if (!s->block[b].vertex[n]) continue;
+        for (c = 0; c < 8; c++)
+            of[c] = depth[(n & 3) + (c & 1) + 5 * ((n >> 2 & 3) + (c >> 1 & 1))
+                          + 25 * ((n >> 4) + (c >> 2))];
+        gs4i_net_place_vertex(s, first, n, gs4i_net_cube(row, n), of,
+                              &s->vertex[s->block[b].vertex[n] - 1]);
+    }
 }
 
-/* The quads around those edges of cube x that begin at its first node; counter-clockwise from
- * outside. */
-static void gs4i_net_add_quads(gs4i_net *s, const int x[3], int cube)
+/* The quads around those edges of cube n of a block that begin at its first node; counter-clockwise
+ * from outside. */
+static void gs4i_net_add_quads(gs4i_net *s, const int32_t place[27], int n, int cube)
 {
     int a, k;
     for (a = 0; a < 3; a++) {
@@ -25604,11 +25621,11 @@ static void gs4i_net_add_quads(gs4i_net *s, const int x[3], int cube)
         int walls = 7;
         if (is_inside == (cube >> (1 << a) & 1)) continue;
         for (k = 0; k < 4; k++) {
-            int at[3];
-            memcpy(at, x, sizeof at);
+            int at[3] = { n & 3, n >> 2 & 3, n >> 4 };
             at[u] -= k == 1 || k == 2;
             at[v] -= k >= 2;
-            quad[is_inside ? k : 3 - k] = gs4i_net_vertex_at(s, at[0], at[1], at[2]);
+            quad[is_inside ? k : 3 - k] =
+                GS4I_NET_OF(vertex, gs4i_net_node(place, at[0], at[1], at[2])) - 1;
         }
         for (k = 0; k < 4; k++) walls &= s->vertex[quad[k]].walls;
         memcpy(s->quad[walls ? --s->quads : s->free_quads++], quad, sizeof quad);
@@ -25619,21 +25636,15 @@ static void gs4i_net_add_quads(gs4i_net *s, const int x[3], int cube)
 static void gs4i_net_build(gs4i_net *s)
 {
     uint8_t row[5][5];
-    int pass, n, k, x[3];
-    size_t b;
+    int32_t place[27];
+    int pass, b, n, k;
     for (pass = 0; pass < 2; pass++)
-        for (b = 0; b < s->o.table; b++) {
-            const gs4i_net_block *block = gs4i_net_block_at(s, (int64_t)b);
-            if (!block || !gs4i_net_rows(s, b, row)) continue;
-            for (n = 0; n < GS4I_BLOCK_NODES; n++) {
-                if (!block->vertex[n]) continue;
-                gs4i_net_place(s, b, n, x);
-                if (pass)
-                    gs4i_net_add_quads(s, x, gs4i_net_cube(row, n));
-                else
-                    gs4i_net_place_vertex(s, x, gs4i_net_cube(row, n),
-                                          &s->vertex[block->vertex[n] - 1]);
-            }
+        for (b = 0; b < s->o.count; b++) {
+            gs4i_net_around(s, b, place);
+            if (!gs4i_net_rows(s, place, row)) continue;
+            if (!pass) gs4i_net_place_vertices(s, b, place, row);
+            for (n = 0; n < GS4I_BLOCK_NODES && pass; n++)
+                if (s->block[b].vertex[n]) gs4i_net_add_quads(s, place, n, gs4i_net_cube(row, n));
         }
     s->quads = s->quad_capacity;
     for (n = 0; n < s->free_quads; n++)
@@ -25667,108 +25678,111 @@ static void gs4i_net_smooth(gs4i_net *s, float share)
 static int32_t gs4i_net_root(gs4i_net *s, int32_t node)
 {
     for (;;) {
-        int32_t *next = &s->block[node / GS4I_BLOCK_NODES].piece[node % GS4I_BLOCK_NODES], *after;
-        if (*next < 0) return node;
-        after = &s->block[*next / GS4I_BLOCK_NODES].piece[*next % GS4I_BLOCK_NODES];
-        if (*after < 0) return *next;
-        node = *next = *after;
+        const int32_t next = GS4I_NET_OF(piece, node);
+        if (next < 0) return node;
+        if (GS4I_NET_OF(piece, next) < 0) return next;
+        node = GS4I_NET_OF(piece, node) = GS4I_NET_OF(piece, next);
     }
-}
-
-static int32_t *gs4i_net_piece_of(gs4i_net *s, int32_t node)
-{
-    const int32_t root = gs4i_net_root(s, node);
-    return &s->block[root / GS4I_BLOCK_NODES].piece[root % GS4I_BLOCK_NODES];
 }
 
 static void gs4i_net_join(gs4i_net *s, int32_t a, int32_t b)
 {
     a = gs4i_net_root(s, a);
     b = gs4i_net_root(s, b);
-    if (a != b) s->block[b / GS4I_BLOCK_NODES].piece[b % GS4I_BLOCK_NODES] = a;
+    if (a != b) GS4I_NET_OF(piece, b) = a;
 }
 
-/* Number of a node of the box among those of all blocks, -1: it is in none. */
-static int32_t gs4i_net_node(const gs4i_net *s, int x, int y, int z)
+/* Joins the nodes of block b that are inside to those after them along each axis. */
+static void gs4i_net_join_inside(gs4i_net *s, int b)
 {
-    const int at[3] = { x, y, z };
-    const int64_t number = gs4i_net_block_of(s, at);
-    return number < 0 || !s->o.place[number]
-               ? -1
-               : (int32_t)(s->o.place[number] - 1) * GS4I_BLOCK_NODES + gs4i_place_of(x, y, z);
-}
-
-/* Joins the nodes of block b that are inside to those after them along each axis, and others to the
- * fullest around them: so all that is around a piece counts to it. */
-static void gs4i_net_join_block(gs4i_net *s, size_t b)
-{
-    const gs4i_net_block *block = gs4i_net_block_at(s, (int64_t)b);
-    const int32_t first = (int32_t)(s->o.place[b] - 1) * GS4I_BLOCK_NODES;
-    int n, a, i, x[3];
-    for (n = 0; n < GS4I_BLOCK_NODES; n++) {
-        const float f = s->o.block[s->o.place[b] - 1].f[gs4i_occupied_node(n)];
-        float most = f;
-        int32_t fullest = -1;
-        if (!(block->inside >> n & 1) && !(f > 0)) continue;
-        gs4i_net_place(s, b, n, x);
-        for (a = 0; a < 3 && block->inside >> n & 1; a++) {
-            const int32_t next =
-                gs4i_net_node(s, x[0] + (a == 0), x[1] + (a == 1), x[2] + (a == 2));
-            if (next >= 0
-                && s->block[next / GS4I_BLOCK_NODES].inside >> next % GS4I_BLOCK_NODES & 1)
-                gs4i_net_join(s, first + n, next);
+    int32_t place[27];
+    int n, a;
+    gs4i_net_around(s, b, place);
+    for (n = 0; n < GS4I_BLOCK_NODES; n++)
+        for (a = 0; a < 3; a++) {
+            const int is_last = (n >> 2 * a & 3) == 3;
+            const int32_t here = b * GS4I_BLOCK_NODES + n,
+                          block = place[a == 0   ? 14
+                                        : a == 1 ? 16
+                                                 : 22],
+                          next = is_last ? block * GS4I_BLOCK_NODES + n - (3 << 2 * a)
+                                         : here + (1 << 2 * a);
+            if (!(s->block[b].inside >> n & 1) || (is_last && block < 0)
+                || (!is_last && !~s->block[b].inside) || !gs4i_net_is_inside(s, next))
+                continue;
+            gs4i_net_join(s, here, next);
+            /* of blocks that are full one node is enough */
+            if (is_last && !~s->block[b].inside && !~s->block[block].inside) break;
         }
-        for (i = 0; i < 27 && !(block->inside >> n & 1); i++) {
-            const int32_t near =
-                gs4i_net_node(s, x[0] + i % 3 - 1, x[1] + i / 3 % 3 - 1, x[2] + i / 9 - 1);
-            const float g = near < 0 ? 0
-                                     : s->o.block[near / GS4I_BLOCK_NODES]
-                                           .f[gs4i_occupied_node(near % GS4I_BLOCK_NODES)];
-            if (!(g > most)) continue;
-            most = g;
+}
+
+/* Joins nodes that are not inside to the fullest around them: so all that is around a piece counts
+ * to it. */
+static void gs4i_net_join_outside(gs4i_net *s, int b)
+{
+    int32_t place[27];
+    int n, i;
+    gs4i_net_around(s, b, place);
+    for (n = 0; n < GS4I_BLOCK_NODES; n++) {
+        int32_t fullest = b * GS4I_BLOCK_NODES + n;
+        float most = gs4i_net_f(s, fullest);
+        if (s->block[b].inside >> n & 1 || !(most > 0)) continue;
+        for (i = 0; i < 27; i++) {
+            const int32_t near = gs4i_net_node(place, (n & 3) + i % 3 - 1,
+                                               (n >> 2 & 3) + i / 3 % 3 - 1, (n >> 4) + i / 9 - 1);
+            if (!(gs4i_net_f(s, near) > most)) continue;
+            most = gs4i_net_f(s, near);
             fullest = near;
         }
-        if (fullest >= 0) gs4i_net_join(s, fullest, first + n);
+        gs4i_net_join(s, fullest, b * GS4I_BLOCK_NODES + n);
     }
 }
 
-/* Finds the pieces: how much is in each, and which a vertex is of. */
+/* Numbers the pieces. */
+static int gs4i_net_number_pieces(gs4i_net *s)
+{
+    int b, n;
+    for (b = 0; b < s->o.count; b++)
+        for (n = 0; n < GS4I_BLOCK_NODES; n++)
+            s->block[b].piece[n] = !~s->block[b].inside && n ? b * GS4I_BLOCK_NODES : -1;
+    for (b = 0; b < s->o.count; b++)
+        if (s->block[b].inside) gs4i_net_join_inside(s, b);
+    for (b = 0; b < s->o.count; b++)
+        for (n = 0; n < GS4I_BLOCK_NODES; n++)
+            if (s->block[b].inside >> n & 1 && s->block[b].piece[n] == -1)
+                s->block[b].piece[n] = -2 - s->pieces++;
+    s->piece = (gs4i_net_piece *)gs4i_alloc(&s->sim->memory, (size_t)s->pieces, sizeof *s->piece);
+    return s->piece ? GS4_OK : GS4_ERROR_MEMORY;
+}
+
+/* Finds the pieces: how much is in each, and which a vertex is of. Where there is one, it is all.
+ */
 static int gs4i_net_find_pieces(gs4i_net *s)
 {
-    int32_t i, n;
-    size_t b;
-    if (s->o.count > INT32_MAX / GS4I_BLOCK_NODES) return GS4_ERROR_MEMORY;
-    for (i = 0; i < s->o.count; i++)
-        for (n = 0; n < GS4I_BLOCK_NODES; n++) s->block[i].piece[n] = -1;
-    for (b = 0; b < s->o.table; b++)
-        if (s->o.place[b]) gs4i_net_join_block(s, b);
-    for (i = 0; i < s->o.count; i++)
-        for (n = 0; n < GS4I_BLOCK_NODES; n++)
-            if (s->block[i].inside >> n & 1 && s->block[i].piece[n] == -1)
-                s->block[i].piece[n] = -2 - s->pieces++;
-    s->piece = (gs4i_net_piece *)gs4i_alloc(&s->sim->memory, (size_t)s->pieces, sizeof *s->piece);
-    if (!s->piece) return GS4_ERROR_MEMORY;
-    for (b = 0; b < s->o.table; b++) {
-        uint8_t row[5][5];
-        int x[3], c;
-        if (!s->o.place[b]) continue;
-        i = (int32_t)s->o.place[b] - 1;
+    uint8_t row[5][5];
+    int32_t place[27], piece = 0;
+    int b, n, c;
+    GS4I_TRY(gs4i_net_number_pieces(s));
+    for (b = 0; b < s->o.count && s->pieces > 1; b++) gs4i_net_join_outside(s, b);
+    for (b = 0; b < s->o.count; b++) {
         for (n = 0; n < GS4I_BLOCK_NODES; n++) {
-            const float f = s->o.block[i].f[gs4i_occupied_node(n)];
-            const int32_t piece = f > 0 ? -2 - *gs4i_net_piece_of(s, i * GS4I_BLOCK_NODES + n) : -1;
-            if (piece >= 0) s->piece[piece].volume += (double)f;
+            const int32_t node = b * GS4I_BLOCK_NODES + n;
+            const float f = gs4i_net_f(s, node);
+            if (s->pieces > 1) piece = -2 - GS4I_NET_OF(piece, gs4i_net_root(s, node));
+            if (f > 0 && piece >= 0) s->piece[piece].volume += (double)f;
         }
-        if (!gs4i_net_rows(s, b, row)) continue;
+        if (s->pieces == 1) continue;
+        gs4i_net_around(s, b, place);
+        if (!gs4i_net_rows(s, place, row)) continue;
         for (n = 0; n < GS4I_BLOCK_NODES; n++) {
             const int cube = gs4i_net_cube(row, n);
-            if (!s->block[i].vertex[n]) continue;
+            if (!s->block[b].vertex[n]) continue;
             for (c = 0; !(cube >> c & 1); c++) {
             }
-            gs4i_net_place(s, b, n, x);
-            s->vertex[s->block[i].vertex[n] - 1].piece =
-                -2
-                - *gs4i_net_piece_of(
-                    s, gs4i_net_node(s, x[0] + (c & 1), x[1] + (c >> 1 & 1), x[2] + (c >> 2)));
+            c = gs4i_net_node(place, (n & 3) + (c & 1), (n >> 2 & 3) + (c >> 1 & 1),
+                              (n >> 4) + (c >> 2));
+            s->vertex[s->block[b].vertex[n] - 1].piece =
+                -2 - GS4I_NET_OF(piece, gs4i_net_root(s, c));
         }
     }
     return GS4_OK;
@@ -26074,15 +26088,15 @@ static int gs4i_net_fill_blocks(gs4i_net *s)
 {
     gs4i_occupied *o = &s->o;
     int result = gs4i_occupied_box(&s->sim->memory, o), i;
-    size_t b;
     if (result != GS4_OK) return result;
     GS4I_TRY(gs4i_occupied_add(&s->sim->memory, o));
-    for (b = 0; b < o->table; b++) GS4I_TRY(gs4i_occupied_share(&s->sim->memory, o, b));
-    s->block = (gs4i_net_block *)gs4i_alloc(&s->sim->memory, (size_t)o->capacity, sizeof *s->block);
+    for (i = 0; i < o->count; i++)
+        GS4I_TRY(gs4i_occupied_share(&s->sim->memory, o, (size_t)o->block[i].number));
+    s->block =
+        (gs4i_net_block_data *)gs4i_alloc(&s->sim->memory, (size_t)o->capacity, sizeof *s->block);
     if (!s->block) return GS4_ERROR_MEMORY;
     s->capacity = o->capacity;
-    for (b = 0; b < o->table; b++)
-        if (o->place[b]) gs4i_net_levels(s, b);
+    for (i = 0; i < o->count; i++) gs4i_net_levels(s, i);
     gs4i_net_rules(s);
     GS4I_TRY(gs4i_net_number(s));
     gs4i_net_build(s);
@@ -28500,6 +28514,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_MOST_UNPACKED
 #undef GS4I_MUL
 #undef GS4I_NEGLIGIBLE_FACE
+#undef GS4I_NET_OF
 #undef GS4I_NEVER_MELTS
 #undef GS4I_NODES_REACH
 #undef GS4I_NODE_REALS

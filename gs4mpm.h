@@ -25312,7 +25312,8 @@ GS4I_INLINE int gs4i_occupied_node(int n)
 
 /* Passes and weights of Taubin's smoothing: it keeps what is longer than some 8 cells. Chosen so
  * that the normals of a stirred pool are within 2 degrees. */
-#define GS4I_SMOOTHINGS 12
+#define GS4I_SMOOTHINGS 6
+#define GS4I_NORMAL_SMOOTHINGS 2
 #define GS4I_SMOOTHING_LAMBDA 0.6f
 #define GS4I_SMOOTHING_MU -0.63f
 
@@ -25824,6 +25825,28 @@ static void gs4i_net_normals(gs4i_net *s)
     }
 }
 
+/* Each normal becomes the mean of those at the corners of its free quads: what is left of the grain
+ * of particles shows in them most. */
+static void gs4i_net_smooth_normals(gs4i_net *s)
+{
+    int i, k, a;
+    for (i = 0; i < s->vertices; i++) memset(s->vertex[i].sum, 0, sizeof s->vertex[i].sum);
+    for (i = 0; i < s->free_quads; i++)
+        for (a = 0; a < 3; a++) {
+            float sum = 0;
+            for (k = 0; k < 4; k++) sum += s->vertex[s->quad[i][k]].normal[a];
+            for (k = 0; k < 4; k++)
+                if (!(s->vertex[s->quad[i][k]].walls >> a & 1))
+                    s->vertex[s->quad[i][k]].sum[a] += sum;
+        }
+    for (i = 0; i < s->vertices; i++) {
+        gs4i_net_vertex *v = &s->vertex[i];
+        const float size =
+            sqrtf(v->sum[0] * v->sum[0] + v->sum[1] * v->sum[1] + v->sum[2] * v->sum[2]);
+        for (a = 0; a < 3 && size > 0; a++) v->normal[a] = v->sum[a] / size;
+    }
+}
+
 /* `enclosed` of all pieces by (1/6) p . (q x r) over triangles: of a quad (1/12) the sum over both
  * ways to cut it, so that no diagonal matters. */
 static void gs4i_net_enclosed(gs4i_net *s)
@@ -25905,6 +25928,7 @@ static void gs4i_net_set_volume(gs4i_net *s)
         }
     }
     gs4i_net_normals(s);
+    for (i = 0; i < GS4I_NORMAL_SMOOTHINGS; i++) gs4i_net_smooth_normals(s);
 }
 
 /* --- materials and values --------------------------------------------------------------------- */
@@ -28518,6 +28542,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_NEVER_MELTS
 #undef GS4I_NODES_REACH
 #undef GS4I_NODE_REALS
+#undef GS4I_NORMAL_SMOOTHINGS
 #undef GS4I_NO_HEAT
 #undef GS4I_NO_POM_POM
 #undef GS4I_NO_SOLID_PHASE

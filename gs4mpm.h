@@ -25338,10 +25338,11 @@ typedef struct gs4i_net_vertex {
 
 /* How much of the material is in a piece, and what encloses it. */
 typedef struct gs4i_net_piece {
-    double volume, enclosed, slope; /* cells^3; of `enclosed` as vertices move along normals */
-    float low[3], high[3];          /* its box */
-    float wall[3][2];               /* the least and the greatest place where walls hold it */
-    float centre[3], scale[3], offset;
+    double volume, moment[3];          /* cells^3; of it, cells^4 */
+    double enclosed, centre[3], slope; /* of `enclosed` as vertices move along normals */
+    float low[3], high[3];             /* its box */
+    float wall[3][2];                  /* the least and the greatest place of walls that hold */
+    float scale[3], shift[3], offset;
 } gs4i_net_piece;
 
 typedef struct gs4i_net {
@@ -25390,6 +25391,14 @@ static void gs4i_net_around(const gs4i_net *s, int b, int32_t place[27])
                 ? -1
                 : (int32_t)o->place[x + y * o->stride[1] + z * o->stride[2]] - 1;
     }
+}
+
+/* The first node of block b in the box. */
+static void gs4i_net_first(const gs4i_net *s, int b, int first[3])
+{
+    int a;
+    for (a = 0; a < 3; a++)
+        first[a] = gs4i_occupied_first(&s->o, (size_t)s->o.block[b].number, a) - s->o.low[a];
 }
 
 /* Number of node (x, y, z) of a block, from -4 to 7, among those of all blocks; -1: it is in none.
@@ -25599,8 +25608,7 @@ static void gs4i_net_place_vertices(gs4i_net *s, int b, const int32_t place[27],
         /* one that was filled is hardly inside */
         depth[n] = row[z][y] >> x & 1 ? (d > 0.05f ? d : 0.05f) : d < 0 ? d : 0;
     }
-    for (c = 0; c < 3; c++)
-        first[c] = gs4i_occupied_first(&s->o, (size_t)s->o.block[b].number, c) - s->o.low[c];
+    gs4i_net_first(s, b, first);
     for (n = 0; n < GS4I_BLOCK_NODES; n++) {
         if (!s->block[b].vertex[n]) continue;
         for (c = 0; c < 8; c++)
@@ -25762,15 +25770,19 @@ static int gs4i_net_find_pieces(gs4i_net *s)
 {
     uint8_t row[5][5];
     int32_t place[27], piece = 0;
-    int b, n, c;
+    int b, n, c, first[3];
     GS4I_TRY(gs4i_net_number_pieces(s));
     for (b = 0; b < s->o.count && s->pieces > 1; b++) gs4i_net_join_outside(s, b);
     for (b = 0; b < s->o.count; b++) {
+        gs4i_net_first(s, b, first);
         for (n = 0; n < GS4I_BLOCK_NODES; n++) {
             const int32_t node = b * GS4I_BLOCK_NODES + n;
             const float f = gs4i_net_f(s, node);
             if (s->pieces > 1) piece = -2 - GS4I_NET_OF(piece, gs4i_net_root(s, node));
-            if (f > 0 && piece >= 0) s->piece[piece].volume += (double)f;
+            if (!(f > 0) || piece < 0) continue;
+            s->piece[piece].volume += (double)f;
+            for (c = 0; c < 3; c++)
+                s->piece[piece].moment[c] += (double)f * (double)(first[c] + (n >> 2 * c & 3));
         }
         if (s->pieces == 1) continue;
         gs4i_net_around(s, b, place);
@@ -25847,19 +25859,46 @@ static void gs4i_net_smooth_normals(gs4i_net *s)
     }
 }
 
-/* `enclosed` of all pieces by (1/6) p . (q x r) over triangles: of a quad (1/12) the sum over both
- * ways to cut it, so that no diagonal matters. */
+/* Quads are turned so that the shorter diagonal, along which they are cut, is from 0 to 2. */
+static void gs4i_net_cut(gs4i_net *s)
+{
+    int i, k, a;
+    for (i = 0; i < s->quads; i++) {
+        int32_t *q = s->quad[i], first = q[0];
+        float longer = 0;
+        for (k = 0; k < 2; k++)
+            for (a = 0; a < 3; a++) {
+                const float d = s->vertex[q[k + 2]].at[a] - s->vertex[q[k]].at[a];
+                longer += k ? -d * d : d * d;
+            }
+        if (!(longer > 0)) continue;
+        memmove(q, q + 1, 3 * sizeof *q);
+        q[3] = first;
+    }
+}
+
+/* `enclosed` of all pieces, and their centres: sums of p . (q x r)/6 and of that times
+ * (p + q + r)/4, over triangles. */
 static void gs4i_net_enclosed(gs4i_net *s)
 {
     int i, k, a;
-    for (i = 0; i < s->pieces; i++) s->piece[i].enclosed = 0;
-    for (i = 0; i < s->quads; i++) {
-        double sum = 0;
-        float area[3];
-        gs4i_net_area(s, s->quad[i], area);
-        for (a = 0; a < 3; a++)
-            for (k = 0; k < 4; k++) sum += (double)s->vertex[s->quad[i][k]].at[a] * (double)area[a];
-        s->piece[s->vertex[s->quad[i][0]].piece].enclosed += sum / 24;
+    for (i = 0; i < s->pieces; i++) {
+        s->piece[i].enclosed = 0;
+        memset(s->piece[i].centre, 0, sizeof s->piece[i].centre);
+    }
+    for (i = 0; i < 2 * s->quads; i++) {
+        const int32_t *of = s->quad[i / 2];
+        const float *x[3] = { s->vertex[of[0]].at, s->vertex[of[1 + (i & 1)]].at,
+                              s->vertex[of[2 + (i & 1)]].at };
+        gs4i_net_piece *piece = &s->piece[s->vertex[of[0]].piece];
+        double p[3][3], volume = 0;
+        for (k = 0; k < 9; k++) p[k / 3][k % 3] = (double)x[k / 3][k % 3];
+        for (a = 0; a < 3; a++) {
+            const int u = a == 2 ? 0 : a + 1, v = 3 - a - u;
+            volume += p[0][a] * (p[1][u] * p[2][v] - p[1][v] * p[2][u]) / 6;
+        }
+        piece->enclosed += volume;
+        for (a = 0; a < 3; a++) piece->centre[a] += volume * (p[0][a] + p[1][a] + p[2][a]) / 4;
     }
 }
 
@@ -25889,32 +25928,39 @@ static void gs4i_net_measure(gs4i_net *s)
     }
 }
 
-/* What vertices of a piece do: small ones are scaled, about the walls that hold them; others move
- * along their normals, by half a cell at most. */
+/* How a piece gets its volume: x goes to from x scale + shift. Small ones are scaled, about walls
+ * that hold them or else about their centre, which goes to that of their particles: so drops fly
+ * as these do. Others move along their normals, by half a cell at most. */
 static void gs4i_net_plan(gs4i_net_piece *p, int first)
 {
     const double ratio = p->enclosed > 0 ? p->volume / p->enclosed : 1;
     int a, is_small = 1, free_axes = 0;
-    p->offset = p->slope > 0 ? (float)((p->volume - p->enclosed) / p->slope) : 0;
-    p->offset = p->offset < -0.5f ? -0.5f : p->offset > 0.5f ? 0.5f : p->offset;
     for (a = 0; a < 3; a++) {
         is_small &= p->high[a] - p->low[a] < GS4I_SMALL_PIECE;
         free_axes += !(p->wall[a][1] > p->wall[a][0]);
         p->scale[a] = 1;
-        p->centre[a] = p->wall[a][1] < p->wall[a][0] ? (p->low[a] + p->high[a]) / 2 : p->wall[a][0];
+        p->shift[a] = 0;
     }
-    if (!is_small || !free_axes) return;
-    p->offset = 0;
-    for (a = 0; a < 3 && first; a++)
-        if (!(p->wall[a][1] > p->wall[a][0])) p->scale[a] = (float)pow(ratio, 1.0 / free_axes);
+    is_small &= free_axes > 0;
+    p->offset = p->slope > 0 && !is_small ? (float)((p->volume - p->enclosed) / p->slope) : 0;
+    p->offset = p->offset < -0.5f ? -0.5f : p->offset > 0.5f ? 0.5f : p->offset;
+    for (a = 0; a < 3 && is_small && first; a++) {
+        const int is_held = p->wall[a][1] >= p->wall[a][0];
+        const double about = is_held ? (double)p->wall[a][0] : p->centre[a] / p->enclosed,
+                     to = is_held ? about : p->moment[a] / p->volume;
+        if (p->wall[a][1] > p->wall[a][0]) continue;
+        p->scale[a] = (float)pow(ratio, 1.0 / free_axes);
+        p->shift[a] = (float)(to - about * (double)p->scale[a]);
+    }
 }
 
-/* Gives each piece the volume of its particles. */
+/* Gives each piece the volume of its particles; three passes leave 1e-3 of what was missing. */
 static void gs4i_net_set_volume(gs4i_net *s)
 {
     int pass, i, a;
     gs4i_net_normals(s);
     gs4i_net_measure(s);
+    gs4i_net_cut(s);
     for (pass = 0; pass < 3; pass++) {
         gs4i_net_enclosed(s);
         for (i = 0; i < s->pieces; i++) gs4i_net_plan(&s->piece[i], pass == 0);
@@ -25923,7 +25969,7 @@ static void gs4i_net_set_volume(gs4i_net *s)
             const gs4i_net_piece *p = &s->piece[v->piece];
             for (a = 0; a < 3; a++) {
                 if (v->neighbours) v->at[a] += p->offset * v->normal[a];
-                v->at[a] = p->centre[a] + p->scale[a] * (v->at[a] - p->centre[a]);
+                v->at[a] = p->scale[a] * v->at[a] + p->shift[a];
             }
         }
     }
@@ -26054,25 +26100,9 @@ static void gs4i_triangles_free(gs4i_memory *m, gs4_triangles *t)
     memset(t, 0, sizeof *t);
 }
 
-/* Quads are cut along the shorter diagonal. */
-static void gs4i_net_cut(const gs4i_net *s, int *triangles)
-{
-    int i, k, a;
-    for (i = 0; i < s->quads; i++) {
-        static const int corner[2][6] = { { 0, 1, 2, 0, 2, 3 }, { 1, 2, 3, 1, 3, 0 } };
-        const int32_t *q = s->quad[i];
-        float length[2] = { 0, 0 };
-        for (k = 0; k < 2; k++)
-            for (a = 0; a < 3; a++) {
-                const float d = s->vertex[q[k + 2]].at[a] - s->vertex[q[k]].at[a];
-                length[k] += d * d;
-            }
-        for (k = 0; k < 6; k++) triangles[6 * i + k] = (int)q[corner[length[1] < length[0]][k]];
-    }
-}
-
 static int gs4i_net_give(const gs4i_net *s, int with_values, gs4_triangles *t)
 {
+    static const int corner[6] = { 0, 1, 2, 0, 2, 3 };
     gs4i_memory *m = &s->sim->memory;
     const gs4i_grid *g = &s->sim->grid;
     const gs4_real origin[3] = { g->origin.x, g->origin.y, g->origin.z };
@@ -26093,18 +26123,13 @@ static int gs4i_net_give(const gs4i_net *s, int with_values, gs4_triangles *t)
         for (a = 0; a < 3; a++) {
             const gs4_real end = GS4I_C(g->cells[a]),
                            x = GS4I_C(s->o.low[a]) + GS4I_C(v->at[a]) + GS4I_C(0.5);
-            t->positions[3 * i + a] =
-                origin[a]
-                + g->h
-                      * (x < 0 && s->sim->desc.walls[2 * a] != GS4_WALL_OPEN         ? 0
-                         : x > end && s->sim->desc.walls[2 * a + 1] != GS4_WALL_OPEN ? end
-                                                                                     : x);
+            t->positions[3 * i + a] = origin[a] + g->h * (x < 0 ? 0 : x > end ? end : x);
             t->normals[3 * i + a] = GS4I_C(v->normal[a]);
         }
         if (with_values) t->values[i] = GS4I_C(v->value);
         t->materials[i] = v->material;
     }
-    gs4i_net_cut(s, t->triangles);
+    for (i = 0; i < 6 * s->quads; i++) t->triangles[i] = (int)s->quad[i / 6][corner[i % 6]];
     return GS4_OK;
 }
 

@@ -13,6 +13,7 @@
 #include "test_heat.c"
 #include "test_errors.c"
 #include "test_files.c"
+#include "test_surface.c"
 #include "test_stability.c"
 #include "test_density.c"
 #include "test_volume.c"
@@ -113,6 +114,7 @@ int main(int count, char **values)
     run_solid();
     run_errors();
     run_files();
+    run_surface();
     run_stress();
     run_yield();
     run_poisson();

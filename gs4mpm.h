@@ -25121,18 +25121,20 @@ typedef struct gs4i_occupied_cell {
     int node;
 } gs4i_occupied_cell;
 
-/* Cell x of an axis, or that inside the domain whose image it is. Open walls have none. */
-GS4I_INLINE int gs4i_inside_walls(const gs4_sim *sim, int axis, int x)
+/* Cell x of an axis, or that inside the domain whose image it is. Open walls have none, but for
+ * the surface, which ends at all walls alike. */
+GS4I_INLINE int gs4i_inside_walls(const gs4i_occupied *o, int axis, int x)
 {
-    const int n = sim->grid.cells[axis];
-    const gs4_wall wall = sim->desc.walls[2 * axis + (x >= n)];
-    return (x >= 0 && x < n) || wall == GS4_WALL_OPEN ? x : gs4i_mirrored(wall, x, n);
+    const int n = o->sim->grid.cells[axis];
+    const gs4_wall wall = o->sim->desc.walls[2 * axis + (x >= n)];
+    if ((x >= 0 && x < n) || (wall == GS4_WALL_OPEN && !o->with_cubes)) return x;
+    return gs4i_mirrored(wall, x, n);
 }
 
 GS4I_INLINE gs4i_occupied_cell gs4i_occupied_cell_of(const gs4i_occupied *o, int axis, int x)
 {
     static const int stride[3] = { 1, GS4I_OCCUPIED_SIDE, GS4I_OCCUPIED_SIDE * GS4I_OCCUPIED_SIDE };
-    const int at = gs4i_inside_walls(o->sim, axis, x) - o->low[axis];
+    const int at = gs4i_inside_walls(o, axis, x) - o->low[axis];
     gs4i_occupied_cell c;
     c.block =
         at < 0 || at >> 2 >= o->blocks[axis] ? -(int64_t)o->table : (at >> 2) * o->stride[axis];
@@ -25317,8 +25319,12 @@ GS4I_INLINE int gs4i_occupied_node(int n)
 #define GS4I_SMOOTHING_LAMBDA 0.6f
 #define GS4I_SMOOTHING_MU -0.63f
 
-/* Pieces with less than so many cells along each axis are scaled. */
-#define GS4I_SMALL_PIECE 4.0f
+#ifndef GS4I_MOST_SMOOTHED
+#define GS4I_MOST_SMOOTHED 0.25f
+#endif
+
+/* Pieces with less than so many cells along each axis are made round. */
+#define GS4I_SMALL_PIECE 2.6f
 
 typedef struct gs4i_net_block_data {
     float level[GS4I_BLOCK_NODES];
@@ -25329,8 +25335,9 @@ typedef struct gs4i_net_block_data {
 
 /* A vertex, in cells from the first node of the box on. */
 typedef struct gs4i_net_vertex {
-    float at[3], normal[3], sum[3]; /* sum: of neighbours, or of areas */
-    float value, weight;            /* of particles in its cube */
+    float at[3], net[3];     /* where it is; where it was before it was smoothed */
+    float normal[3], sum[3]; /* sum: of neighbours, or of areas */
+    float value, weight;     /* of particles in its cube */
     int32_t piece;
     uint16_t neighbours;
     uint8_t walls, material; /* a bit for each axis along which it is held */
@@ -25338,11 +25345,14 @@ typedef struct gs4i_net_vertex {
 
 /* How much of the material is in a piece, and what encloses it. */
 typedef struct gs4i_net_piece {
-    double volume, moment[3];          /* cells^3; of it, cells^4 */
-    double enclosed, centre[3], slope; /* of `enclosed` as vertices move along normals */
-    float low[3], high[3];             /* its box */
-    float wall[3][2];                  /* the least and the greatest place of walls that hold */
-    float scale[3], shift[3], offset;
+    double volume, moment[3]; /* cells^3; of it, cells^4 */
+    double enclosed, before;  /* now; before the last pass */
+    double slope;             /* of `enclosed` as vertices move along normals */
+    double mean[3];           /* the sum of places before they were smoothed */
+    float low[3], high[3];    /* their box */
+    float wall[3][2];         /* the least and the greatest place of walls that hold it */
+    int vertices, is_small;
+    float offset, radius, centre[3], scale[3]; /* see gs4i_net_plan */
 } gs4i_net_piece;
 
 typedef struct gs4i_net {
@@ -25569,8 +25579,33 @@ GS4I_INLINE float gs4i_net_depth(float level)
 /* Is node x of the box beyond a wall along an axis? */
 GS4I_INLINE int gs4i_net_beyond(const gs4i_net *s, int axis, int x)
 {
-    const int at = s->o.low[axis] + x, n = s->sim->grid.cells[axis];
-    return (at < 0 || at >= n) && s->sim->desc.walls[2 * axis + (at >= n)] != GS4_WALL_OPEN;
+    const int at = s->o.low[axis] + x;
+    return at < 0 || at >= s->sim->grid.cells[axis];
+}
+
+/* A step by Newton's rule from place x in a cube to where the depth is 0, along axes that are not
+ * held: the mean of crossings alone cuts corners. */
+static void gs4i_net_to_surface(const float depth[8], int walls, float x[3])
+{
+    float d = 0, slope[3] = { 0, 0, 0 }, size = 0;
+    int a, c;
+    for (c = 0; c < 8; c++) {
+        float w[3];
+        const float of = depth[c];
+        for (a = 0; a < 3; a++) w[a] = c >> a & 1 ? x[a] : 1 - x[a];
+        d += w[0] * w[1] * w[2] * of;
+        slope[0] += (c & 1 ? of : -of) * w[1] * w[2];
+        slope[1] += (c & 2 ? of : -of) * w[0] * w[2];
+        slope[2] += (c & 4 ? of : -of) * w[0] * w[1];
+    }
+    for (a = 0; a < 3; a++) {
+        if (walls >> a & 1) slope[a] = 0;
+        size += slope[a] * slope[a];
+    }
+    for (a = 0; a < 3 && size > 0.01f; a++) {
+        x[a] -= d * slope[a] / size;
+        x[a] = x[a] < 0 ? 0 : x[a] > 1 ? 1 : x[a];
+    }
 }
 
 /* The vertex of cube n of a block, by the depths of its nodes: where and on which walls it is. */
@@ -25578,11 +25613,14 @@ static void gs4i_net_place_vertex(const gs4i_net *s, const int first[3], int n, 
                                   const float depth[8], gs4i_net_vertex *v)
 {
     const int x[3] = { first[0] + (n & 3), first[1] + (n >> 2 & 3), first[2] + (n >> 4) };
-    float sum[3] = { 0, 0, 0 };
-    int a, c, k, crossings = 0;
-    for (a = 0; a < 3; a++)
-        if (gs4i_net_beyond(s, a, x[a]) || gs4i_net_beyond(s, a, x[a] + 1))
-            v->walls |= (uint8_t)(1 << a);
+    float sum[3] = { 0, 0, 0 }, of[8], at[3];
+    int a, c, k, crossings = 0, low = 0;
+    for (a = 0; a < 3; a++) {
+        const int below = gs4i_net_beyond(s, a, x[a]);
+        if (below || gs4i_net_beyond(s, a, x[a] + 1)) v->walls |= (uint8_t)(1 << a);
+        low |= below << a;
+    }
+    for (c = 0; c < 8; c++) of[c] = depth[(c & ~v->walls) | low]; /* mirrored */
     for (a = 0; a < 3; a++)
         for (c = 0; c < 8 && !(v->walls >> a & 1); c++) {
             const int other = c | 1 << a;
@@ -25592,8 +25630,9 @@ static void gs4i_net_place_vertex(const gs4i_net *s, const int first[3], int n, 
             crossings++;
         }
     for (a = 0; a < 3; a++)
-        v->at[a] =
-            (float)x[a] + (v->walls >> a & 1 || !crossings ? 0.5f : sum[a] / (float)crossings);
+        at[a] = v->walls >> a & 1 || !crossings ? 0.5f : sum[a] / (float)crossings;
+    if (crossings) gs4i_net_to_surface(of, v->walls, at);
+    for (a = 0; a < 3; a++) v->net[a] = v->at[a] = (float)x[a] + at[a];
 }
 
 /* The vertices of a block. */
@@ -25674,8 +25713,11 @@ static void gs4i_net_smooth(gs4i_net *s, float share)
     for (i = 0; i < s->vertices; i++) {
         gs4i_net_vertex *v = &s->vertex[i];
         for (a = 0; a < 3; a++) {
+            float x = v->at[a];
             if (v->neighbours && !(v->walls >> a & 1))
-                v->at[a] += share * (v->sum[a] / (float)v->neighbours - v->at[a]);
+                x += share * (v->sum[a] / (float)v->neighbours - x);
+            x = x < v->net[a] + GS4I_MOST_SMOOTHED ? x : v->net[a] + GS4I_MOST_SMOOTHED;
+            v->at[a] = x > v->net[a] - GS4I_MOST_SMOOTHED ? x : v->net[a] - GS4I_MOST_SMOOTHED;
             v->sum[a] = 0;
         }
     }
@@ -25725,6 +25767,27 @@ static void gs4i_net_join_inside(gs4i_net *s, int b)
         }
 }
 
+/* The node on the other side of a periodic wall that node n of block b is at, -1: none. */
+static int32_t gs4i_net_across(const gs4i_net *s, int b, int n, int axis)
+{
+    const gs4i_occupied *o = &s->o;
+    const int cells = s->sim->grid.cells[axis];
+    int first[3], x[3], a;
+    int64_t number = 0;
+    gs4i_net_first(s, b, first);
+    for (a = 0; a < 3; a++) x[a] = first[a] + (n >> 2 * a & 3);
+    if (!s->sim->grid.periodic[axis]) return -1;
+    if (x[axis] + o->low[axis] != 0 && x[axis] + o->low[axis] != cells - 1) return -1;
+    x[axis] = x[axis] + o->low[axis] == 0 ? x[axis] + cells - 1 : x[axis] - (cells - 1);
+    for (a = 0; a < 3; a++) {
+        if (x[a] < 0 || x[a] >> 2 >= o->blocks[a]) return -1;
+        number += (x[a] >> 2) * o->stride[a];
+    }
+    return o->place[number] ? (int32_t)(o->place[number] - 1) * GS4I_BLOCK_NODES
+                                  + gs4i_place_of(x[0], x[1], x[2])
+                            : -1;
+}
+
 /* Joins nodes that are not inside to the fullest around them: so all that is around a piece counts
  * to it. */
 static void gs4i_net_join_outside(gs4i_net *s, int b)
@@ -25736,9 +25799,11 @@ static void gs4i_net_join_outside(gs4i_net *s, int b)
         int32_t fullest = b * GS4I_BLOCK_NODES + n;
         float most = gs4i_net_f(s, fullest);
         if (s->block[b].inside >> n & 1 || !(most > 0)) continue;
-        for (i = 0; i < 27; i++) {
-            const int32_t near = gs4i_net_node(place, (n & 3) + i % 3 - 1,
-                                               (n >> 2 & 3) + i / 3 % 3 - 1, (n >> 4) + i / 9 - 1);
+        for (i = 0; i < 30; i++) {
+            const int32_t near =
+                i > 26 ? gs4i_net_across(s, b, n, i - 27)
+                       : gs4i_net_node(place, (n & 3) + i % 3 - 1, (n >> 2 & 3) + i / 3 % 3 - 1,
+                                       (n >> 4) + i / 9 - 1);
             if (!(gs4i_net_f(s, near) > most)) continue;
             most = gs4i_net_f(s, near);
             fullest = near;
@@ -25877,28 +25942,22 @@ static void gs4i_net_cut(gs4i_net *s)
     }
 }
 
-/* `enclosed` of all pieces, and their centres: sums of p . (q x r)/6 and of that times
- * (p + q + r)/4, over triangles. */
+/* `enclosed` of all pieces: the sum of p . (q x r)/6 over triangles. */
 static void gs4i_net_enclosed(gs4i_net *s)
 {
     int i, k, a;
-    for (i = 0; i < s->pieces; i++) {
-        s->piece[i].enclosed = 0;
-        memset(s->piece[i].centre, 0, sizeof s->piece[i].centre);
-    }
+    for (i = 0; i < s->pieces; i++) s->piece[i].enclosed = 0;
     for (i = 0; i < 2 * s->quads; i++) {
         const int32_t *of = s->quad[i / 2];
         const float *x[3] = { s->vertex[of[0]].at, s->vertex[of[1 + (i & 1)]].at,
                               s->vertex[of[2 + (i & 1)]].at };
-        gs4i_net_piece *piece = &s->piece[s->vertex[of[0]].piece];
         double p[3][3], volume = 0;
         for (k = 0; k < 9; k++) p[k / 3][k % 3] = (double)x[k / 3][k % 3];
         for (a = 0; a < 3; a++) {
             const int u = a == 2 ? 0 : a + 1, v = 3 - a - u;
             volume += p[0][a] * (p[1][u] * p[2][v] - p[1][v] * p[2][u]) / 6;
         }
-        piece->enclosed += volume;
-        for (a = 0; a < 3; a++) piece->centre[a] += volume * (p[0][a] + p[1][a] + p[2][a]) / 4;
+        s->piece[s->vertex[of[0]].piece].enclosed += volume;
     }
 }
 
@@ -25914,8 +25973,10 @@ static void gs4i_net_measure(gs4i_net *s)
     for (i = 0; i < s->vertices; i++) {
         const gs4i_net_vertex *v = &s->vertex[i];
         gs4i_net_piece *p = &s->piece[v->piece];
+        p->vertices++;
         for (a = 0; a < 3; a++) {
-            const float x = v->at[a];
+            const float x = v->net[a];
+            p->mean[a] += (double)x;
             p->low[a] = x < p->low[a] ? x : p->low[a];
             p->high[a] = x > p->high[a] ? x : p->high[a];
             if (v->walls >> a & 1) {
@@ -25928,48 +25989,66 @@ static void gs4i_net_measure(gs4i_net *s)
     }
 }
 
-/* How a piece gets its volume: x goes to from x scale + shift. Small ones are scaled, about walls
- * that hold them or else about their centre, which goes to that of their particles: so drops fly
- * as these do. Others move along their normals, by half a cell at most. */
-static void gs4i_net_plan(gs4i_net_piece *p, int first)
+/* How a piece gets its volume. Small ones are not smoothed: they are made round about the centre
+ * of their particles, so that drops fly as these do, or where walls hold them they are scaled about
+ * these. Others move along their normals, by half a cell at most in a pass; their slope is what the
+ * last pass has found. */
+static void gs4i_net_plan(gs4i_net_piece *p, int pass)
 {
-    const double ratio = p->enclosed > 0 ? p->volume / p->enclosed : 1;
-    int a, is_small = 1, free_axes = 0;
+    const double found = p->enclosed - p->before;
+    int a, held = 0, free_axes = 0;
+    p->is_small = 1;
     for (a = 0; a < 3; a++) {
-        is_small &= p->high[a] - p->low[a] < GS4I_SMALL_PIECE;
+        const int is_held = p->wall[a][1] >= p->wall[a][0];
+        p->is_small &= p->high[a] - p->low[a] < GS4I_SMALL_PIECE;
+        held += is_held;
         free_axes += !(p->wall[a][1] > p->wall[a][0]);
         p->scale[a] = 1;
-        p->shift[a] = 0;
+        p->centre[a] = is_held ? p->wall[a][0] : (float)(p->moment[a] / p->volume);
     }
-    is_small &= free_axes > 0;
-    p->offset = p->slope > 0 && !is_small ? (float)((p->volume - p->enclosed) / p->slope) : 0;
+    p->is_small &= free_axes > 0;
+    p->radius = p->is_small && !held ? (float)cbrt(p->volume * 0.238732) : 0;
+    if (pass && found * (double)p->offset > 0) p->slope = found / (double)p->offset;
+    p->before = p->enclosed;
+    p->offset = p->slope > 0 && !p->is_small ? (float)((p->volume - p->enclosed) / p->slope) : 0;
     p->offset = p->offset < -0.5f ? -0.5f : p->offset > 0.5f ? 0.5f : p->offset;
-    for (a = 0; a < 3 && is_small && first; a++) {
-        const int is_held = p->wall[a][1] >= p->wall[a][0];
-        const double about = is_held ? (double)p->wall[a][0] : p->centre[a] / p->enclosed,
-                     to = is_held ? about : p->moment[a] / p->volume;
-        if (p->wall[a][1] > p->wall[a][0]) continue;
-        p->scale[a] = (float)pow(ratio, 1.0 / free_axes);
-        p->shift[a] = (float)(to - about * (double)p->scale[a]);
-    }
+    for (a = 0; a < 3 && p->is_small && pass; a++)
+        if (!(p->wall[a][1] > p->wall[a][0]) && p->enclosed > 0)
+            p->scale[a] = (float)pow(p->volume / p->enclosed, 1.0 / free_axes);
 }
 
-/* Gives each piece the volume of its particles; three passes leave 1e-3 of what was missing. */
+/* Vertex v of a small piece as it was before it was smoothed, on a ball where nothing holds the
+ * piece. */
+static void gs4i_net_round(const gs4i_net_piece *p, gs4i_net_vertex *v)
+{
+    float d[3], size = 0;
+    int a;
+    for (a = 0; a < 3; a++) {
+        v->at[a] = v->net[a];
+        d[a] = v->net[a] - (float)(p->mean[a] / p->vertices);
+        size += d[a] * d[a];
+    }
+    for (a = 0; a < 3 && size > 0 && p->radius > 0; a++)
+        v->at[a] = p->centre[a] + d[a] * p->radius / sqrtf(size);
+}
+
+/* Gives each piece the volume of its particles; four passes leave 1e-3 of what was missing. */
 static void gs4i_net_set_volume(gs4i_net *s)
 {
     int pass, i, a;
     gs4i_net_normals(s);
     gs4i_net_measure(s);
     gs4i_net_cut(s);
-    for (pass = 0; pass < 3; pass++) {
+    for (pass = 0; pass < 4; pass++) {
         gs4i_net_enclosed(s);
-        for (i = 0; i < s->pieces; i++) gs4i_net_plan(&s->piece[i], pass == 0);
+        for (i = 0; i < s->pieces; i++) gs4i_net_plan(&s->piece[i], pass);
         for (i = 0; i < s->vertices; i++) {
             gs4i_net_vertex *v = &s->vertex[i];
             const gs4i_net_piece *p = &s->piece[v->piece];
+            if (p->is_small && !pass) gs4i_net_round(p, v);
             for (a = 0; a < 3; a++) {
                 if (v->neighbours) v->at[a] += p->offset * v->normal[a];
-                v->at[a] = p->scale[a] * v->at[a] + p->shift[a];
+                v->at[a] = p->centre[a] + p->scale[a] * (v->at[a] - p->centre[a]);
             }
         }
     }

@@ -148,7 +148,7 @@ static void test_surface_sphere(void)
         }
         CHECK_BETWEEN(off, 0, 0.2);
         CHECK_BETWEEN(mean, -0.02, R > 2 ? 0.05 : 0.1);
-        CHECK_BETWEEN(angle, 0, 4);
+        CHECK_BETWEEN(angle, 0, 5);
         CHECK_CLOSE(surface_counted(sim, &t).volume / (4 * acos(-1.0) / 3 * R * R * R), 1,
                     R > 2 ? 0.01 : 0.03);
         CHECK(!t.materials[0] && t.values[0] == 0);
@@ -209,30 +209,33 @@ static void test_surface_thin(void)
     gs4_fill f = scene_fill(at(0, 0, 0));
     gs4_triangles t;
     int i, k;
-    for (k = 0; k < 24; k++) {
-        const int axis = k / 8, layers = k & 1 ? 2 : 4, n = 24; /* of particles */
-        const double step = (k & 1 ? 0.75 / 2 : 1.5 / 4) * h, z = (16 + k % 8 / 2 * 0.25) * h,
-                     half = layers * step / 2;
+    for (k = 0; k < 48; k++) { /* from wall to wall, and not; 1.5 and 0.75 cells thick */
+        const int axis = k / 8 % 3, is_wide = k < 24, layers = k & 1 ? 2 : 3, n = is_wide ? 64 : 30;
+        const double up = (k & 1 ? 0.375 : 0.5) * h, z = (16 + k % 8 / 2 * 0.25) * h,
+                     from = is_wide ? 0 : 8.1 * h, half = layers * up / 2,
+                     tolerance = !is_wide ? 0.3
+                                 : k & 1  ? 0.1
+                                          : 0.05;
         gs4_real *x = (gs4_real *)malloc((size_t)(n * n * layers) * 3 * sizeof *x);
-        double inner = 1, outer = 0;
+        double inner = 9, outer = 0;
         for (i = 0; i < n * n * layers; i++) {
-            x[3 * i + axis] = (gs4_real)(z + (i % layers + 0.5) * step);
-            x[3 * i + (axis + 1) % 3] = (gs4_real)(0.35 + i / layers % n * step);
-            x[3 * i + (axis + 2) % 3] = (gs4_real)(0.35 + i / layers / n * step);
+            x[3 * i + axis] = (gs4_real)(z + (i % layers + 0.5) * up);
+            x[3 * i + (axis + 1) % 3] = (gs4_real)(from + (i / layers % n + 0.5) * h / 2);
+            x[3 * i + (axis + 2) % 3] = (gs4_real)(from + (i / layers / n + 0.5) * h / 2);
         }
-        CHECK(gs4_add_points(sim, x, n * n * layers, (gs4_real)(step * step * step), &f) > 0);
+        CHECK(gs4_add_points(sim, x, n * n * layers, (gs4_real)(h * h * up / 4), &f) > 0);
         t = surface_of(sim, 1, 2);
         for (i = 0; i < t.vertex_count; i++) {
             const gs4_real *p = t.positions + 3 * i;
             const double y = ((double)p[axis] - z - half) / h;
-            if (fabs((double)p[(axis + 1) % 3] - 0.48) > 2 * h
-                || fabs((double)p[(axis + 2) % 3] - 0.48) > 2 * h)
+            if (fabs((double)p[(axis + 1) % 3] - 0.48) > 4 * h
+                || fabs((double)p[(axis + 2) % 3] - 0.48) > 4 * h)
                 continue;
             inner = fmin(inner, fabs(y));
             outer = fmax(outer, fabs(y));
         }
-        CHECK_BETWEEN(inner, half / h - 0.12, half / h + 0.12);
-        CHECK_BETWEEN(outer, half / h - 0.12, half / h + 0.12);
+        CHECK_BETWEEN(inner, half / h - tolerance, half / h + tolerance);
+        CHECK_BETWEEN(outer, half / h - tolerance, half / h + tolerance);
         gs4_surface_free(sim, &t);
         surface_clear(sim);
         free(x);
@@ -290,7 +293,7 @@ static void test_surface_walls(void)
                 if (low[a] == 0) off = fmax(off, fabs(least));
                 if (high[a] == 1) off = fmax(off, fabs(most - 1));
             }
-            CHECK_BETWEEN(off / h, 0, walls[w] == GS4_WALL_OPEN ? 0.3 : 1e-4);
+            CHECK_BETWEEN(off / h, 0, 1e-4);
             gs4_surface_free(sim, &t);
             gs4_destroy(sim);
         }
@@ -301,8 +304,8 @@ static void test_surface_walls(void)
 static void test_surface_pool(void)
 {
     int way, i, k;
-    for (way = 0; way < (test_full ? 6 : 2); way++) {
-        const int n = 24, axis = (way / 2 + 1) % 3, up = !(way & 1);
+    for (way = 0; way < (test_full ? 6 : 1); way++) {
+        const int n = 20, axis = (way / 2 + 1) % 3, up = !(way & 1);
         const double h = 1.0 / n;
         gs4_sim *sim = surface_scene(n);
         gs4_fill f = scene_fill(at(0, 0, 0));
@@ -312,8 +315,8 @@ static void test_surface_pool(void)
         gs4_triangles t;
         f.jitter = (gs4_real)0.4;
         along[axis] = up ? 1 : -1;
-        high[axis] = up ? 9.3 * h : 1;
-        low[axis] = up ? 0 : 1 - 9.3 * h;
+        high[axis] = up ? 7.3 * h : 1;
+        low[axis] = up ? 0 : 1 - 7.3 * h;
         CHECK_RESULT(
             sim, gs4_set_gravity(sim, at(-9.81 * along[0], -9.81 * along[1], -9.81 * along[2])), 0);
         CHECK(gs4_add_particles(
@@ -329,8 +332,8 @@ static void test_surface_pool(void)
             v.data[i * v.stride + (axis + 2) % 3] = (gs4_real)(a * speed);
         }
         for (k = 0; k < 5; k++) {
-            for (i = 0; i < 30; i++)
-                CHECK_RESULT(sim, gs4_step(sim, (gs4_real)(0.6 * (double)gs4_stable_dt(sim))), 0);
+            for (i = 0; i < 24; i++)
+                CHECK_RESULT(sim, gs4_step(sim, (gs4_real)(0.8 * (double)gs4_stable_dt(sim))), 0);
             t = surface_of(sim, 1, 2);
             for (i = 0; i < t.vertex_count; i++) {
                 const double a = (double)t.positions[3 * i + (axis + 1) % 3],
@@ -388,7 +391,7 @@ static void test_surface_materials(void)
 /* A scene with a body, an emitter, a drop and a column, by any scheme. */
 static gs4_sim *surface_mixed(int kind, int threads, files_memory *m)
 {
-    gs4_sim_desc d = scene_cube(20);
+    gs4_sim_desc d = scene_cube(14);
     gs4_material a = scene_liquid(1000, 2, 20), b = scene_liquid(900, 1, 20);
     gs4_collider c;
     gs4_emitter e;
@@ -428,8 +431,11 @@ static void test_surface_schemes(void)
 {
     int kind, k, i;
     for (kind = 0; kind < 5; kind++) {
-        gs4_sim *one = surface_mixed(kind, 1, NULL), *three = surface_mixed(kind, 3, NULL);
-        for (k = 0; k < (kind > 1 ? 3 : 6); k++) {
+        gs4_sim *one, *three;
+        if (kind > 0 && kind < 4 && !test_full) continue;
+        one = surface_mixed(kind, 1, NULL);
+        three = surface_mixed(kind, 3, NULL);
+        for (k = 0; k < 3; k++) {
             gs4_triangles t, u;
             const uint64_t hash = gs4_state_hash(one), memory = gs4_get_stats(one).memory_bytes;
             t = surface_of(one, -1, 0);

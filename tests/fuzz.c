@@ -1089,11 +1089,30 @@ static int load_damaged(void)
     return end(i, -1);
 }
 
+/* A field that may not be there, memory that may be refused; what is given is whole. */
+static int get_surface(void)
+{
+    gs4_triangles t;
+    int result, i, bad = 0;
+    begin("gs4_surface");
+    result = gs4_surface(r.s.sim, (gs4_field)pick(-1, 11), &t);
+    for (i = 0; result >= 0 && i < 3 * t.triangle_count; i++)
+        bad += t.triangles[i] < 0 || t.triangles[i] >= t.vertex_count;
+    for (i = 0; result >= 0 && i < 3 * t.vertex_count; i++)
+        bad += !(fabs((double)t.positions[i]) < 1e30) || !(fabs((double)t.normals[i]) <= 1.001);
+    check(bad == 0 && (result >= 0 || !t.vertex_count), "the triangles", bad);
+    gs4_surface_free(r.s.sim, &t);
+    if (end(result, -1) < 0) return -1;
+    begin("gs4_write_surface");
+    return end(gs4_write_surface(r.s.sim, one_in(10) ? NULL : r.path), -1);
+}
+
 static int write_frames(void)
 {
     const int bad = one_in(10);
     begin("gs4_write_ply");
     if (end(gs4_write_ply(r.s.sim, bad ? NULL : r.path), -1) < 0) return -1;
+    if (get_surface() < 0) return -1;
     begin("gs4_write_raw");
     r.saved_version = -1;
     return end(gs4_write_raw(r.s.sim, bad ? "/nowhere/at/all" : r.path), -1);
@@ -1231,6 +1250,9 @@ static int use_nothing(void)
     bad += gs4_put_collider(NULL, 0, &pose) != GS4_ERROR_ARGUMENT;
     bad += gs4_step(NULL, 1) != GS4_ERROR_ARGUMENT;
     bad += gs4_advance(NULL, 1) != GS4_ERROR_ARGUMENT;
+    gs4_surface_free(NULL, NULL);
+    bad += gs4_surface(NULL, GS4_FIELD_MASS, NULL) != GS4_ERROR_ARGUMENT
+           || gs4_write_surface(NULL, r.path) != GS4_ERROR_ARGUMENT;
     bad += gs4_save(NULL, r.path) != GS4_ERROR_ARGUMENT
            || gs4_load(NULL, r.path) != GS4_ERROR_ARGUMENT;
     bad +=

@@ -168,34 +168,33 @@ static double example_share(double x, double low, double high)
     return fmax(0, fmin(1, (x - low) / (high - low)));
 }
 
-/* What the colour stands for, a number a particle; NULL: out of memory. */
-static gs4_real *example_numbers(const example *e, gs4_sim *sim)
+/* The surface with what the colour stands for. */
+static gs4_triangles example_surface(const example *e, gs4_sim *sim)
 {
-    const gs4_view T = gs4_particles(sim, GS4_FIELD_TEMPERATURE),
-                   liquid = gs4_particles(sim, GS4_FIELD_LIQUID_FRACTION);
-    const uint8_t *material = gs4_particle_materials(sim);
-    const int count = gs4_get_stats(sim).particles;
-    gs4_real *number = (gs4_real *)malloc((size_t)count * sizeof *number);
-    for (int i = 0; number && i < count; ++i) {
-        if (e->colour == EXAMPLE_MATERIAL) {
-            number[i] = (gs4_real)material[i];
-            continue;
-        }
-        number[i] = real(
-            0.4 * example_share((double)T.data[i * T.stride], (double)e->look.low, e->melting)
-            + 0.2 * (double)liquid.data[i * liquid.stride]
-            + 0.4 * example_share((double)T.data[i * T.stride], e->melting, (double)e->look.high));
-    }
-    return number;
+    const gs4_field fields[] = { GS4_FIELD_POSITION, GS4_FIELD_MASS, GS4_FIELD_VELOCITY,
+                                 GS4_FIELD_TEMPERATURE };
+    gs4_triangles t, liquid;
+    example_need(sim, gs4_surface(sim, fields[e->colour], &t));
+    if (e->colour == EXAMPLE_MATERIAL)
+        for (int i = 0; i < t.vertex_count; ++i) t.values[i] = (gs4_real)t.materials[i];
+    if (e->colour != EXAMPLE_TEMPERATURE) return t;
+    example_need(sim, gs4_surface(sim, GS4_FIELD_LIQUID_FRACTION, &liquid)); /* the same vertices */
+    for (int i = 0; i < t.vertex_count; ++i)
+        t.values[i] =
+            real(0.4 * example_share((double)t.values[i], (double)e->look.low, e->melting)
+                 + 0.2 * (double)liquid.values[i]
+                 + 0.4 * example_share((double)t.values[i], e->melting, (double)e->look.high));
+    gs4_surface_free(sim, &liquid);
+    return t;
 }
 
 static void example_write(const example *e, gs4_sim *sim)
 {
-    gs4_view x = gs4_particles(sim, GS4_FIELD_POSITION), v = gs4_particles(sim, GS4_FIELD_VELOCITY);
     preview_settings look = e->look;
+    gs4_triangles t;
     char path[1024], row[16] = "";
     int failed = 0;
-    if (!x.count) return;
+    if (!gs4_particles(sim, GS4_FIELD_POSITION).count) return;
     if (e->rows) sprintf(row, "_%d", e->row);
     sprintf(path, "%.900s/%.64s%s_%04d.ply", e->out, e->name, row, e->frame);
     example_need(sim, gs4_write_ply(sim, path));
@@ -208,16 +207,9 @@ static void example_write(const example *e, gs4_sim *sim)
             look.palette_count = 6;
         }
     }
-    if (e->colour == EXAMPLE_MATERIAL || e->colour == EXAMPLE_TEMPERATURE) {
-        gs4_real *number = example_numbers(e, sim);
-        failed =
-            !number ? 2 : preview_write_png(path, &look, x.count, x.data, x.stride, number, 1, 1);
-        free(number);
-    } else if (e->colour == EXAMPLE_SPEED)
-        failed = preview_write_png(path, &look, x.count, x.data, x.stride, v.data, v.components,
-                                   v.stride);
-    else
-        failed = preview_write_png(path, &look, x.count, x.data, x.stride, NULL, 0, 0);
+    t = example_surface(e, sim);
+    failed = preview_write_png(path, &look, &t);
+    gs4_surface_free(sim, &t);
     if (failed) {
         fprintf(stderr, "\n%s: %s\n", path, failed == 1 ? "cannot be written" : "out of memory");
         exit(1);

@@ -1,26 +1,26 @@
-/* preview.h - pictures of particle clouds for the examples: PNG files, libc and libm only. MIT
- * licence, as gs4mpm.h.
+/* preview.h - pictures of the surface of materials for the examples: PNG files, libc and libm only.
+ * MIT licence, as gs4mpm.h.
  *
  *     #include "gs4mpm.h"
  *     #include "preview.h"
  *     ...
  *     preview_settings look = {0};     // zero: honey before white, framed by itself
- *     gs4_view x = gs4_particles(sim, GS4_FIELD_POSITION);
- *     preview_write_png("honey.png", &look, x.count, x.data, x.stride, NULL, 0, 0);
+ *     gs4_triangles t;
+ *     if (gs4_surface(sim, GS4_FIELD_POSITION, &t) == GS4_OK)
+ *         preview_write_png("honey.png", &look, &t);
+ *     gs4_surface_free(sim, &t);
  *
  * How a picture is made, with four samples to a pixel:
- *   1. Solids are ray cast. Particles are spread over a grid, and the liquid's surface is where
- *   that smooth volume
- *      fraction passes PREVIEW_LEVEL; a coarse map of depths tells each ray where to look for it.
- *   2. The length of the view ray inside the liquid and the field at its surface are read from the
- *   same grid.
+ *   1. Solids and triangles are ray cast. Colour is by the values of the triangles, if they have
+ *      any.
+ *   2. The length of the view ray inside the liquid is what lies between triangles that face the
+ *      eye and those that do not.
  *   3. Light comes from some 40 directions, a bundle of them close together: the key lamp, the
- *   others the sky. Each
- *      has a shadow map, so that soft shadows, contact shadows and dark corners are all one thing.
+ *      others the sky. Each has a shadow map, so that soft shadows, contact shadows and dark
+ *      corners are all one thing.
  *   4. Clear liquids absorb (Beer, Lambert) the light that falls in and what is seen through them.
- *   Liquids mirror a
- *      studio with two tall lamps by Schlick's approximation of Fresnel's factor.
- * 200 000 particles at 960 x 720 take one to two seconds on one core and about 150 MB. */
+ *      Liquids mirror a studio with two tall lamps by Schlick's approximation of Fresnel's factor.
+ * 50 000 triangles at 960 x 720 take one to two seconds on one core and about 200 MB. */
 #ifndef PREVIEW_H
 #define PREVIEW_H
 #include <math.h>
@@ -60,7 +60,7 @@ static const float preview_speed[PREVIEW_COLOURS][3] = { { 0.05f, 0.25f, 0.55f }
                                                          { 0.62f, 0.86f, 0.95f },
                                                          { 0.97f, 0.99f, 1.00f } };
 
-/* ---- what to draw beside the particles ------------------------------------------------------- */
+/* ---- what to draw beside the liquid ---------------------------------------------------------- */
 typedef enum preview_kind {
     /* endless plane through a, normal b or up; radius: side of its squares, 0: plain */
     PREVIEW_FLOOR = 0,
@@ -87,7 +87,7 @@ typedef struct preview_settings {
     /* eye = target: chosen so that the cloud fills the picture; up zero: (0, 1, 0) */
     float eye[3], target[3], up[3];
     float field_of_view; /* degrees from bottom to top; 0: 35 */
-    /* of a particle, m: half the distance of neighbours; 0: measured */
+    /* m, a quarter of a cell: how near shadows and clear liquids are told apart; 0: measured */
     float radius;
     float low, high; /* of the field; equal: from its least to its greatest value */
     /* NULL: preview_honey; count 0: PREVIEW_COLOURS */
@@ -660,226 +660,64 @@ static void preview_draw_solids(const preview_camera *c, const preview_settings 
     }
 }
 
-/* ---- particles ------------------------------------------------------------------------------- */
-typedef struct preview_cloud {
-    const gs4_real *xyz, *field;
-    int count, stride, components, field_stride;
-    float spacing; /* m between neighbours */
-} preview_cloud;
-
-static preview_vec preview_position(const preview_cloud *cloud, int i)
-{
-    return preview_read(cloud->xyz + (size_t)i * (size_t)cloud->stride);
-}
-
-static float preview_field(const preview_cloud *cloud, int i)
-{
-    const gs4_real *f = cloud->field + (size_t)i * (size_t)cloud->field_stride;
-    return cloud->components < 3 ? (float)f[0] : preview_size(preview_read(f));
-}
-
-/* Distance of neighbours: from the seventh nearest of some particles, which lattice and gas
- * agree on within 10 %. */
-static float preview_spacing(const preview_cloud *cloud)
-{
-    float found[41];
-    int n = 0, step = cloud->count / 41 + 1, k;
-    for (int i = step / 2; i < cloud->count && n < 41; i += step, ++n) {
-        preview_vec p = preview_position(cloud, i);
-        /* squared, rising; the first is itself */
-        float nearest[8];
-        for (k = 0; k < 8; ++k) nearest[k] = 1e30f;
-        for (int j = 0; j < cloud->count; ++j) {
-            preview_vec q = preview_add(preview_position(cloud, j), p, -1);
-            float d = preview_dot(q, q);
-            for (k = 7; k > 0 && d < nearest[k - 1]; --k) nearest[k] = nearest[k - 1];
-            if (d < nearest[k]) nearest[k] = d;
-        }
-        for (k = n; k > 0 && nearest[7] < found[k - 1]; --k) found[k] = found[k - 1];
-        found[k] = nearest[7];
-    }
-    return n && found[n / 2] < 1e29f ? sqrtf(found[n / 2]) / 1.3f : 0;
-}
-
-/* Draws spheres, for a light: nearest depth, length of the ray inside. For a map of what a ray
- * may meet, `back` is given: nearest and farthest depth of blocks as deep as they are wide, and
- * one pixel wider. */
-static void preview_splat(const preview_camera *c, const preview_cloud *cloud, float radius,
-                          float *front, float *back, float *length)
-{
-    /* spheres overlap: chords count for less */
-    float fill = cloud->spacing / radius;
-    fill *= fill * fill / 4.19f;
-    for (int i = 0; i < cloud->count; ++i) {
-        float x, y, z, scale = preview_project(c, preview_position(cloud, i), &x, &y, &z);
-        float r = fmaxf(scale * radius, 0.75f) + (back ? 1.0f : 0), w = (float)c->width,
-              h = (float)c->height;
-        int x0, x1, y0, y1;
-        if (!(scale > 0 && x > -r && y > -r && x < w + r && y < h + r)) continue;
-        x0 = (int)preview_clamp(x - r + 0.5f, 0, w);
-        x1 = (int)preview_clamp(x + r + 0.5f, 0, w);
-        y0 = (int)preview_clamp(y - r + 0.5f, 0, h);
-        y1 = (int)preview_clamp(y + r + 0.5f, 0, h);
-        for (int py = y0; py < y1; ++py)
-            for (int px = x0; px < x1; ++px) {
-                float dx = ((float)px + 0.5f - x) / r, dy = ((float)py + 0.5f - y) / r,
-                      rest = 1 - dx * dx - dy * dy, half;
-                int at = py * c->width + px;
-                if (rest < 0) continue;
-                half = back ? radius : radius * sqrtf(rest);
-                if (z - half < front[at]) front[at] = z - half;
-                if (back && z + half > back[at]) back[at] = z + half;
-                if (length) length[at] += 2 * half * fill;
-            }
-    }
-}
-
 /* ---- the liquid's surface -------------------------------------------------------------------- */
-#define PREVIEW_LEVEL 0.35f
-typedef struct preview_grid {
-    preview_vec origin;
-    float cell;
-    int nx, ny, nz;
-    /* volume fraction of liquid, and the same times the field or NULL; x fastest */
-    float *fraction, *value;
-} preview_grid;
 
-/* Quadratic B-spline around a point: weights and slopes of three nodes along each axis. Returns
- * the first node's index, -1 outside. */
-static long preview_spline(const preview_grid *g, preview_vec p, float w[3][3], float slope[3][3])
+/* What a ray meets of it: place, normal and value of the first, and how much of it is inside. */
+typedef struct preview_skin {
+    float *front, *length, *value;
+    preview_vec *normal;
+} preview_skin;
+
+static preview_vec preview_vertex(const gs4_triangles *t, int i)
 {
-    float x[3];
-    int i[3];
-    x[0] = (p.x - g->origin.x) / g->cell;
-    x[1] = (p.y - g->origin.y) / g->cell;
-    x[2] = (p.z - g->origin.z) / g->cell;
-    if (!(x[0] > 1 && x[1] > 1 && x[2] > 1)) return -1;
-    if (!(x[0] < (float)(g->nx - 2) && x[1] < (float)(g->ny - 2) && x[2] < (float)(g->nz - 2)))
-        return -1;
-    for (int k = 0; k < 3; ++k) {
-        float f = x[k] - (float)(i[k] = (int)(x[k] - 0.5f));
-        w[k][0] = 0.5f * (1.5f - f) * (1.5f - f);
-        w[k][1] = 0.75f - (f - 1) * (f - 1);
-        w[k][2] = 0.5f * (f - 0.5f) * (f - 0.5f);
-        slope[k][0] = f - 1.5f;
-        slope[k][1] = 2 - 2 * f;
-        slope[k][2] = f - 0.5f;
-    }
-    return ((long)i[2] * g->ny + i[1]) * g->nx + i[0];
+    return preview_read(t->positions + 3 * (size_t)i);
 }
 
-/* Value at a point, zero outside; its gradient too unless NULL. */
-static float preview_sample(const preview_grid *g, const float *data, preview_vec p,
-                            preview_vec *gradient)
+/* Mean length of the first sides of triangles: about a cell. */
+static float preview_side(const gs4_triangles *t)
 {
-    float w[3][3], s[3][3], sum = 0;
-    preview_vec slope = preview_make(0, 0, 0);
-    long first = preview_spline(g, p, w, s);
-    for (int k = 0; k < 3 && first >= 0; ++k)
-        for (int j = 0; j < 3; ++j) {
-            const float *d = data + first + ((long)k * g->ny + j) * g->nx;
-            float row = w[0][0] * d[0] + w[0][1] * d[1] + w[0][2] * d[2], both = w[2][k] * w[1][j];
-            sum += both * row;
-            if (!gradient) continue;
-            slope =
-                preview_add(slope,
-                            preview_make(both * (s[0][0] * d[0] + s[0][1] * d[1] + s[0][2] * d[2]),
-                                         w[2][k] * s[1][j] * row, s[2][k] * w[1][j] * row),
-                            1 / g->cell);
-        }
-    if (gradient) *gradient = slope;
-    return sum;
+    float sum = 0;
+    for (int i = 0; i < t->triangle_count; ++i)
+        sum += preview_size(preview_add(preview_vertex(t, t->triangles[3 * i]),
+                                        preview_vertex(t, t->triangles[3 * i + 1]), -1));
+    return t->triangle_count ? sum / (float)t->triangle_count : 0;
 }
 
-static void preview_deposit(const preview_grid *g, float *data, preview_vec p, float amount)
+/* Draws all triangles. Lights ask for front and length alone; what `wall` hides counts for
+ * neither. */
+static void preview_draw_skin(const preview_camera *c, const gs4_triangles *t, const float *wall,
+                              preview_skin *skin)
 {
-    float w[3][3], s[3][3];
-    long first = preview_spline(g, p, w, s);
-    for (int k = 0; k < 3 && first >= 0; ++k)
+    for (int i = 0; i < t->triangle_count; ++i) {
+        const int *k = t->triangles + 3 * (size_t)i;
+        preview_vec v[3], face, middle, from;
+        float reach = 0, w[3];
+        int r[4];
+        for (int j = 0; j < 3; ++j) v[j] = preview_vertex(t, k[j]);
+        face = preview_cross(preview_add(v[1], v[0], -1), preview_add(v[2], v[0], -1));
+        middle = preview_scale(preview_add(preview_add(v[0], v[1], 1), v[2], 1), 1.0f / 3);
         for (int j = 0; j < 3; ++j)
-            for (int i = 0; i < 3; ++i)
-                data[first + ((long)k * g->ny + j) * g->nx + i] +=
-                    amount * w[0][i] * w[1][j] * w[2][k];
-}
-
-/* Weights 1 2 1 along each axis, in place: forth with 1 1, back with 1 1. The grid's rim is
- * empty. */
-static void preview_blur(const preview_grid *g, float *data)
-{
-    long n = (long)g->nx * g->ny * g->nz;
-    for (long axis = 0, step = 1; axis < 3;
-         ++axis, step = axis == 1 ? g->nx : (long)g->nx * g->ny) {
-        for (long i = 0; i < n - step; ++i) data[i] = 0.5f * (data[i] + data[i + step]);
-        for (long i = n - 1; i >= step; --i) data[i] = 0.5f * (data[i] + data[i - step]);
-    }
-}
-
-/* Fills the grid. Particles with few neighbours weigh more, so that threads and drops are not
- * smoothed away. */
-static int preview_fill(preview_grid *g, const preview_cloud *cloud, preview_vec low,
-                        preview_vec high)
-{
-    float cell = 1.2f * cloud->spacing, share, *plain;
-    preview_vec size = preview_add(high, low, -1);
-    size_t n;
-    /* 32 MB a grid */
-    while ((size.x / cell + 10) * (size.y / cell + 10) * (size.z / cell + 10) > 8e6f) cell *= 1.1f;
-    g->cell = cell;
-    g->origin = preview_add(low, preview_make(1, 1, 1), -4 * cell);
-    g->nx = (int)(size.x / cell) + 10;
-    g->ny = (int)(size.y / cell) + 10;
-    g->nz = (int)(size.z / cell) + 10;
-    n = (size_t)g->nx * (size_t)g->ny * (size_t)g->nz;
-    plain = (float *)calloc(n, sizeof *plain);
-    g->fraction = (float *)calloc(n, sizeof *g->fraction);
-    g->value = cloud->field ? (float *)calloc(n, sizeof *g->value) : NULL;
-    if (!plain || !g->fraction || (cloud->field && !g->value)) {
-        free(plain);
-        return 2;
-    }
-    share = cloud->spacing / cell;
-    share *= share * share;
-    for (int i = 0; i < cloud->count; ++i)
-        preview_deposit(g, plain, preview_position(cloud, i), share);
-    preview_blur(g, plain);
-    for (int i = 0; i < cloud->count; ++i) {
-        preview_vec p = preview_position(cloud, i);
-        float there = preview_sample(g, plain, p, NULL),
-              weight = there < 0.65f ? share * 0.65f / there : share;
-        preview_deposit(g, g->fraction, p, weight);
-        if (g->value) preview_deposit(g, g->value, p, weight * preview_field(cloud, i));
-    }
-    preview_blur(g, g->fraction);
-    if (g->value) preview_blur(g, g->value);
-    free(plain);
-    return 0;
-}
-
-/* First depth between t and `end` at which the ray enters the liquid, 1e30 if it does not. */
-static float preview_enter(const preview_grid *g, preview_vec from, preview_vec dir, float t,
-                           float end)
-{
-    float step = 0.8f * g->cell, before = 0, now;
-    for (; t < end; t += step, before = now) {
-        now = preview_sample(g, g->fraction, preview_add(from, dir, t), NULL) - PREVIEW_LEVEL;
-        if (now < 0) continue;
-        /* regula falsi in the last step */
-        for (int i = 0; i < 2 && before < 0; ++i) {
-            float back = step * now / (now - before);
-            float middle = preview_sample(g, g->fraction, preview_add(from, dir, t - back), NULL)
-                           - PREVIEW_LEVEL;
-            if (middle < 0) {
-                before = middle;
-                step = back;
-            } else {
-                now = middle;
-                t -= back;
-                step -= back;
+            reach = fmaxf(reach, preview_size(preview_add(v[j], middle, -1)));
+        preview_cover(c, middle, reach, r);
+        for (int y = r[1]; y < r[3]; ++y)
+            for (int x = r[0]; x < r[2]; ++x) {
+                int at = y * c->width + x;
+                preview_vec dir = preview_ray(c, x, y, &from), n = preview_make(0, 0, 0);
+                float depth = 1e30f;
+                if (!preview_cast_triangle(v, from, dir, &depth, w)) continue;
+                skin->length[at] +=
+                    (preview_dot(face, dir) > 0 ? 1.0f : -1.0f) * fminf(depth, wall[at]);
+                if (!(depth < skin->front[at])) continue;
+                skin->front[at] = depth;
+                if (!skin->normal) continue;
+                for (int j = 0; j < 3; ++j)
+                    n = preview_add(n, preview_read(t->normals + 3 * (size_t)k[j]), w[j]);
+                skin->normal[at] = preview_unit(n);
+                skin->value[at] = 0;
+                for (int j = 0; j < 3 && t->values; ++j)
+                    skin->value[at] += w[j] * (float)t->values[k[j]];
             }
-        }
-        return before < 0 ? t - step * now / (now - before) : t;
     }
-    return 1e30f;
 }
 
 /* ---- the scene ------------------------------------------------------------------------------- */
@@ -892,12 +730,13 @@ typedef struct preview_entry {
 
 typedef struct preview_scene {
     preview_settings set;
-    preview_cloud cloud;
-    preview_grid grid;
+    const gs4_triangles *skin;
+    float spacing;      /* m, half a cell */
     preview_camera eye; /* twice the picture's width and height */
     preview_vec up, key, centre, backdrop;
-    float bound;         /* radius of particles and solids about `centre` */
+    float bound;         /* radius of liquid and solids about `centre` */
     float *wall, *front; /* depth of solids and liquid, for every sample */
+    preview_skin seen;   /* the same front */
     /* of the solids: index from 1, plus 128 on a dark square */
     preview_vec *normal;
     unsigned char *ids;
@@ -907,19 +746,17 @@ typedef struct preview_scene {
     int entry_count;
 } preview_scene;
 
-/* Defaults, camera, bounds, grid. */
-static int preview_prepare(preview_scene *s)
+/* Defaults, camera, bounds. */
+static void preview_prepare(preview_scene *s)
 {
     preview_settings *set = &s->set;
     preview_vec low = preview_make(1e30f, 1e30f, 1e30f), high = preview_scale(low, -1),
                 eye = preview_load(set->eye);
     preview_vec target = preview_load(set->target), none = preview_make(0, 0, 0);
     float least = 1e30f, most = -1e30f, size, angle;
-    for (int i = 0; i < s->cloud.count; ++i) {
-        preview_vec p = preview_position(&s->cloud, i);
-        float f = s->cloud.field ? preview_field(&s->cloud, i) : 0;
-        /* a particle that is nowhere */
-        if (!(preview_dot(p, p) < 1e30f)) continue;
+    for (int i = 0; i < s->skin->vertex_count; ++i) {
+        preview_vec p = preview_vertex(s->skin, i);
+        float f = s->skin->values ? (float)s->skin->values[i] : 0;
         low = preview_low(low, p);
         high = preview_high(high, p);
         least = fminf(least, f);
@@ -938,10 +775,9 @@ static int preview_prepare(preview_scene *s)
         set->palette_count = 0;
     }
     if (set->palette_count <= 0) set->palette_count = PREVIEW_COLOURS;
-    s->cloud.spacing = set->radius > 0 ? 2 * set->radius : preview_spacing(&s->cloud);
-    if (!(s->cloud.spacing > 0)) s->cloud.spacing = 0.1f * size;
-    if (!(set->clarity > 0))
-        set->clarity = set->palette == preview_honey ? 6 * s->cloud.spacing : 0;
+    s->spacing = set->radius > 0 ? 2 * set->radius : 0.5f * preview_side(s->skin);
+    if (!(s->spacing > 0)) s->spacing = 0.1f * size;
+    if (!(set->clarity > 0)) set->clarity = set->palette == preview_honey ? 6 * s->spacing : 0;
     set->shine = set->shine < 0 ? 0 : set->shine > 0 ? set->shine : 1;
     if (!(set->high > set->low)) {
         set->low = least;
@@ -964,78 +800,36 @@ static int preview_prepare(preview_scene *s)
     s->key = preview_add(preview_add(s->up, s->eye.right, -0.7f),
                          preview_cross(s->up, s->eye.right), -0.35f);
     s->key = preview_unit(s->key);
-    s->bound = size + s->cloud.spacing;
+    s->bound = size + s->spacing;
     for (int i = 0; i < set->solid_count; ++i) {
         preview_vec centre;
         float r = preview_bound(set->solids + i, &centre);
         if (r > 0 && set->solids[i].kind != PREVIEW_ROOM)
             s->bound = fmaxf(s->bound, preview_size(preview_add(centre, s->centre, -1)) + r);
     }
-    return preview_fill(&s->grid, &s->cloud, low, high);
-}
-
-/* The liquid's depth at each sample. Particles drawn in a map of 4 x 4 blocks tell where a ray
- * may meet any. */
-static int preview_trace(preview_scene *s)
-{
-    const preview_camera *c = &s->eye;
-    preview_camera coarse = *c;
-    float *nearest, *farthest;
-    int n;
-    coarse.width = (c->width + 3) / 4;
-    coarse.height = (c->height + 3) / 4;
-    coarse.focal = c->focal / 4;
-    n = coarse.width * coarse.height;
-    nearest = (float *)malloc(2 * (size_t)n * sizeof *nearest);
-    if (!nearest) return 2;
-    farthest = nearest + n;
-    for (int i = 0; i < n; ++i) {
-        nearest[i] = 1e30f;
-        farthest[i] = 0;
-    }
-    preview_splat(&coarse, &s->cloud, 2.2f * s->cloud.spacing, nearest, farthest, NULL);
-    for (int y = 0; y < c->height; ++y)
-        for (int x = 0; x < c->width; ++x) {
-            int at = y * c->width + x, block = (y / 4) * coarse.width + x / 4;
-            preview_vec from, dir;
-            s->front[at] = 1e30f;
-            if (nearest[block] > s->wall[at] || farthest[block] <= 0) continue;
-            dir = preview_ray(c, x, y, &from);
-            s->front[at] = preview_enter(&s->grid, from, dir, fmaxf(nearest[block], 0),
-                                         fminf(farthest[block], s->wall[at]));
-        }
-    free(nearest);
-    return 0;
 }
 
 /* Whether samples a and b lie on one surface, so that b can take a's light. */
 static int preview_same(const preview_scene *s, int liquid, int a, int b)
 {
     const float *depth = liquid ? s->front : s->wall;
-    if (fabsf(depth[a] - depth[b]) > s->cloud.spacing + 0.004f * depth[a]) return 0;
+    if (fabsf(depth[a] - depth[b]) > s->spacing + 0.004f * depth[a]) return 0;
     return liquid || (s->ids[a] == s->ids[b] && preview_dot(s->normal[a], s->normal[b]) > 0.95f);
 }
 
 static preview_entry preview_new_entry(const preview_scene *s, int at, int liquid)
 {
-    const preview_grid *g = &s->grid;
     preview_vec from, dir = preview_ray(&s->eye, at % s->eye.width, at / s->eye.width, &from);
     preview_entry e;
-    float depth = (liquid ? s->front : s->wall)[at], end = fminf(s->wall[at], depth + 2 * s->bound),
-          here;
+    float depth = (liquid ? s->front : s->wall)[at];
     memset(&e, 0, sizeof e);
     e.at = at;
     e.liquid = liquid;
     e.p = preview_add(from, dir, depth);
     if (liquid) {
-        here = preview_sample(g, g->fraction, e.p, &e.n);
-        e.n = preview_scale(preview_unit(e.n), -1);
-        e.value = g->value && here > 0 ? preview_sample(g, g->value, e.p, NULL) / here
-                                       : 0.5f * (s->set.low + s->set.high);
-        for (float step = 1.5f * g->cell, t = depth + 0.5f * step; s->set.clarity > 0 && t < end;
-             t += step)
-            e.length +=
-                step * fminf(preview_sample(g, g->fraction, preview_add(from, dir, t), NULL), 1);
+        e.n = s->seen.normal[at];
+        e.value = s->skin->values ? s->seen.value[at] : 0.5f * (s->set.low + s->set.high);
+        e.length = preview_clamp(s->seen.length[at], 0, 2 * s->bound);
     } else
         e.n = preview_scale(s->normal[at], preview_dot(s->normal[at], dir) > 0 ? -1.0f : 1.0f);
     /* light that comes back from below */
@@ -1111,13 +905,14 @@ static float preview_reach(float wall, float front, float length, float z, float
  * liquid, one after another. */
 static void preview_add_light(preview_scene *s, float *map, int i)
 {
-    float strength, bound = s->bound, h = s->cloud.spacing, fine = i < PREVIEW_KEYS ? 1.0f : 0.5f;
+    float strength, bound = s->bound, h = s->spacing, fine = i < PREVIEW_KEYS ? 1.0f : 0.5f;
     preview_vec light = preview_light(s, i, &strength);
     int size = (int)preview_clamp(3.3f * fine * bound / h, 64, fine * (float)PREVIEW_MAP),
         n = size * size;
     int clear = s->set.clarity > 0;
     float *wall = map, *front = map + n, *length = map + 2 * n, texel = 2 * bound / (float)size,
           edge = (float)(size - 1);
+    preview_skin shadow = { NULL, NULL, NULL, NULL };
     preview_vec source = preview_add(s->centre, light, 2 * bound);
     preview_camera c = preview_aim(source, preview_scale(light, -1), s->eye.right, size, size);
     c.parallel = 1;
@@ -1126,8 +921,10 @@ static void preview_add_light(preview_scene *s, float *map, int i)
         wall[k] = front[k] = 1e30f;
         length[k] = 0;
     }
+    shadow.front = front;
+    shadow.length = length;
     preview_draw_solids(&c, &s->set, s->up, wall, NULL, NULL);
-    preview_splat(&c, &s->cloud, 0.9f * h, front, NULL, length);
+    preview_draw_skin(&c, s->skin, wall, &shadow);
     for (int k = 0; k < s->entry_count; ++k) {
         preview_entry *e = s->entries + k;
         float lambert = preview_dot(e->n, light),
@@ -1259,11 +1056,13 @@ static int preview_render(preview_scene *s, unsigned char *rgb, float *map)
     const preview_camera *c = &s->eye;
     int n = c->width * c->height;
     for (int i = 0; i < n; ++i) {
-        s->wall[i] = 1e30f;
+        s->wall[i] = s->front[i] = 1e30f;
+        s->seen.length[i] = 0;
         s->ids[i] = 0;
     }
     preview_draw_solids(c, &s->set, s->up, s->wall, s->normal, s->ids);
-    if (preview_trace(s) || preview_list(s)) return 2;
+    preview_draw_skin(c, s->skin, s->wall, &s->seen);
+    if (preview_list(s)) return 2;
     for (int i = 0; i < PREVIEW_LIGHTS; ++i) preview_add_light(s, map, i);
     /* liquids show solids */
     for (int liquid = 0; liquid < 2; ++liquid)
@@ -1289,51 +1088,48 @@ static int preview_render(preview_scene *s, unsigned char *rgb, float *map)
     return 0;
 }
 
-/* Draws particles into a PNG file. Strides are in reals, 0: tight. Field NULL: one colour; 3
- * components: magnitude. 0: done, 1: the file could not be written, 2: out of memory. */
-static int preview_write_png(const char *path, const preview_settings *set, int count,
-                             const gs4_real *xyz, int xyz_stride, const gs4_real *field,
-                             int field_components, int field_stride)
+/* Draws triangles into a PNG file. 0: done, 1: the file could not be written, 2: out of memory. */
+static int preview_write_png(const char *path, const preview_settings *set, const gs4_triangles *t)
 {
     preview_scene s;
     unsigned char *rgb;
     float *map;
     size_t n;
-    int failed;
+    int failed = 0;
     memset(&s, 0, sizeof s);
     if (set) s.set = *set;
-    s.cloud.xyz = xyz;
-    s.cloud.count = count;
-    s.cloud.stride = xyz_stride > 0 ? xyz_stride : 3;
-    s.cloud.field = field;
-    s.cloud.components = field_components;
-    s.cloud.field_stride = field_stride > 0 ? field_stride : field_components;
-    failed = preview_prepare(&s);
+    s.skin = t;
+    preview_prepare(&s);
     n = (size_t)s.eye.width * (size_t)s.eye.height;
     map = (float *)malloc((size_t)3 * PREVIEW_MAP * PREVIEW_MAP * sizeof *map);
     s.wall = (float *)malloc(n * sizeof *s.wall);
-    s.front = (float *)malloc(n * sizeof *s.front);
+    s.front = s.seen.front = (float *)malloc(n * sizeof *s.front);
+    s.seen.length = (float *)malloc(n * sizeof *s.seen.length);
+    s.seen.value = (float *)malloc(n * sizeof *s.seen.value);
+    s.seen.normal = (preview_vec *)malloc(n * sizeof *s.seen.normal);
     s.normal = (preview_vec *)malloc(n * sizeof *s.normal);
     s.ids = (unsigned char *)malloc(n);
     s.lit[0] = (int *)malloc(n * sizeof *s.lit[0]);
     s.lit[1] = (int *)malloc(n * sizeof *s.lit[1]);
     /* 3 bytes for every 4 samples */
     rgb = (unsigned char *)malloc(n);
-    if (!map || !s.wall || !s.front || !s.normal || !s.ids || !s.lit[0] || !s.lit[1] || !rgb)
+    if (!map || !s.wall || !s.front || !s.seen.length || !s.seen.value || !s.seen.normal
+        || !s.normal || !s.ids || !s.lit[0] || !s.lit[1] || !rgb)
         failed = 2;
     if (!failed) failed = preview_render(&s, rgb, map);
     if (!failed) failed = preview_write_rgb(path, s.set.width, s.set.height, rgb);
     free(map);
     free(s.wall);
     free(s.front);
+    free(s.seen.length);
+    free(s.seen.value);
+    free(s.seen.normal);
     free(s.normal);
     free(s.ids);
     free(s.lit[0]);
     free(s.lit[1]);
     free(rgb);
     free(s.entries);
-    free(s.grid.fraction);
-    free(s.grid.value);
     return failed;
 }
 

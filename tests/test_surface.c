@@ -200,8 +200,8 @@ static void test_surface_shapes(void)
     gs4_destroy(sim);
 }
 
-/* Sheets of 1.5 cells anywhere in a cell have no hole and their thickness; what is half as thick has
- * no hole either. Drops of 1.5 cells, and single particles, are there. */
+/* Sheets of 1.5 cells anywhere in a cell have no hole and their thickness; what is half as thick
+ * has no hole either. Drops of 1.5 cells, and single particles, are there. */
 static void test_surface_thin(void)
 {
     const double h = 1.0 / 32;

@@ -1,24 +1,24 @@
 /* The surface as triangles: closed, of the right volume, place and normals, whatever the scene. */
 
 /* What is counted of triangles. */
-typedef struct surface_count {
+typedef struct triangles_count {
     int pieces, euler, open; /* open: sides that do not meet exactly one other, turned round */
     double volume, length, outside; /* cells^3; of normals, farthest from 1; out of the domain */
-} surface_count;
+} triangles_count;
 
-static int surface_order(const void *a, const void *b)
+static int triangles_order(const void *a, const void *b)
 {
     const uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
     return x < y ? -1 : x > y;
 }
 
-static int surface_root(int *parent, int i)
+static int triangles_root(int *parent, int i)
 {
     while (parent[i] != i) i = parent[i] = parent[parent[i]];
     return i;
 }
 
-static surface_count surface_counted(gs4_sim *sim, const gs4_triangles *t)
+static triangles_count triangles_counted(gs4_sim *sim, const gs4_triangles *t)
 {
     const gs4_sim_desc d = gs4_get_desc(sim);
     const double h = (double)d.cell_size,
@@ -26,7 +26,7 @@ static surface_count surface_counted(gs4_sim *sim, const gs4_triangles *t)
     const int n = 3 * t->triangle_count;
     uint64_t *side = (uint64_t *)malloc((size_t)n * sizeof *side + 8);
     int *parent = (int *)malloc((size_t)t->vertex_count * sizeof *parent + 8), i, k;
-    surface_count c = { 0, 0, 0, 0, 0, 0 };
+    triangles_count c = { 0, 0, 0, 0, 0, 0 };
     for (i = 0; i < t->vertex_count; i++) {
         double size = 0;
         parent[i] = i;
@@ -42,13 +42,13 @@ static surface_count surface_counted(gs4_sim *sim, const gs4_triangles *t)
         const int a = t->triangles[i], b = t->triangles[i % 3 == 2 ? i - 2 : i + 1];
         if (a < 0 || a >= t->vertex_count || a == b) c.open++;
         side[i] = (uint64_t)a << 32 | (uint64_t)b;
-        parent[surface_root(parent, a)] = surface_root(parent, b);
+        parent[triangles_root(parent, a)] = triangles_root(parent, b);
     }
-    qsort(side, (size_t)n, sizeof *side, surface_order);
+    qsort(side, (size_t)n, sizeof *side, triangles_order);
     for (i = 0; i < n; i++) {
         const uint64_t back = side[i] << 32 | side[i] >> 32;
         c.open += (i > 0 && side[i] == side[i - 1])
-                  || !bsearch(&back, side, (size_t)n, sizeof *side, surface_order);
+                  || !bsearch(&back, side, (size_t)n, sizeof *side, triangles_order);
     }
     for (i = 0; i < t->triangle_count; i++) {
         double p[3][3];
@@ -69,7 +69,7 @@ static surface_count surface_counted(gs4_sim *sim, const gs4_triangles *t)
 }
 
 /* Volume of the particles in cells. */
-static double surface_volume(gs4_sim *sim)
+static double triangles_volume(gs4_sim *sim)
 {
     const double h = (double)gs4_get_desc(sim).cell_size;
     return gs4_get_stats(sim).volume / (h * h * h);
@@ -77,22 +77,22 @@ static double surface_volume(gs4_sim *sim)
 
 /* The surface, which has so many pieces and that Euler characteristic, and encloses the volume of
  * the particles within 2 %. */
-static gs4_triangles surface_of(gs4_sim *sim, int pieces, int euler)
+static gs4_triangles triangles_of(gs4_sim *sim, int pieces, int euler)
 {
     gs4_triangles t;
-    surface_count c;
+    triangles_count c;
     CHECK_RESULT(sim, gs4_surface(sim, GS4_FIELD_VELOCITY, &t), 0);
-    c = surface_counted(sim, &t);
+    c = triangles_counted(sim, &t);
     CHECK(c.open == 0);
     if (pieces >= 0) CHECK_CLOSE(c.pieces, pieces, 0);
     if (pieces >= 0) CHECK_CLOSE(c.euler, euler, 0);
-    CHECK_CLOSE(c.volume / surface_volume(sim), 1, 0.02);
+    CHECK_CLOSE(c.volume / triangles_volume(sim), 1, 0.02);
     CHECK(c.length < 1e-4 && c.outside < 1e-4);
     return t;
 }
 
 /* A cube of n^3 cells of side 1/n, one liquid of 1 Pa s. */
-static gs4_sim *surface_scene(int n)
+static gs4_sim *triangles_scene(int n)
 {
     const gs4_sim_desc d = scene_cube(n);
     const gs4_material m = scene_liquid(1000, 1, 30);
@@ -102,20 +102,20 @@ static gs4_sim *surface_scene(int n)
     return sim;
 }
 
-static void surface_add(gs4_sim *sim, gs4_shape shape, double spacing)
+static void triangles_add(gs4_sim *sim, gs4_shape shape, double spacing)
 {
     gs4_fill f = scene_fill(at(0, 0, 0));
     f.spacing = (gs4_real)spacing;
     CHECK(gs4_add_particles(sim, shape, &f) > 0);
 }
 
-static void surface_clear(gs4_sim *sim)
+static void triangles_clear(gs4_sim *sim)
 {
     CHECK(gs4_remove_particles(sim, gs4_box(at(-9, -9, -9), at(9, 9, 9))) > 0);
 }
 
 /* Angle in degrees between the normal of vertex i and a direction. */
-static double surface_angle(const gs4_triangles *t, int i, const double along[3])
+static double triangles_angle(const gs4_triangles *t, int i, const double along[3])
 {
     double dot = 0, size = 0;
     int k;
@@ -132,24 +132,24 @@ static void test_surface_sphere(void)
     int R;
     for (R = 2; R <= 16; R *= 2) {
         const double h = 1.0 / 40, centre[3] = { 0.501, 0.503, 0.4983 };
-        gs4_sim *sim = surface_scene(40);
+        gs4_sim *sim = triangles_scene(40);
         gs4_triangles t;
         double off = 0, angle = 0, mean = 0;
         int i, k;
-        surface_add(sim, gs4_sphere(at(centre[0], centre[1], centre[2]), (gs4_real)(R * h)), 0);
-        t = surface_of(sim, 1, 2);
+        triangles_add(sim, gs4_sphere(at(centre[0], centre[1], centre[2]), (gs4_real)(R * h)), 0);
+        t = triangles_of(sim, 1, 2);
         for (i = 0; i < t.vertex_count; i++) {
             double d[3], r;
             for (k = 0; k < 3; k++) d[k] = ((double)t.positions[3 * i + k] - centre[k]) / h;
             r = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
             off = fmax(off, fabs(r - R));
             mean += (r - R) / t.vertex_count;
-            angle = fmax(angle, surface_angle(&t, i, d));
+            angle = fmax(angle, triangles_angle(&t, i, d));
         }
         CHECK_BETWEEN(off, 0, 0.2);
         CHECK_BETWEEN(mean, -0.02, R > 2 ? 0.05 : 0.1);
         CHECK_BETWEEN(angle, 0, 5);
-        CHECK_CLOSE(surface_counted(sim, &t).volume / (4 * acos(-1.0) / 3 * R * R * R), 1,
+        CHECK_CLOSE(triangles_counted(sim, &t).volume / (4 * acos(-1.0) / 3 * R * R * R), 1,
                     R > 2 ? 0.01 : 0.03);
         CHECK(!t.materials[0] && t.values[0] == 0);
         gs4_surface_free(sim, &t);
@@ -159,7 +159,7 @@ static void test_surface_sphere(void)
     }
 }
 
-static gs4_real surface_ring(gs4_vec3 p, void *user)
+static gs4_real triangles_ring(gs4_vec3 p, void *user)
 {
     const double x = (double)p.x - 0.5, y = (double)p.y - 0.5, z = (double)p.z - 0.5,
                  r = sqrt(x * x + y * y) - 0.3;
@@ -170,30 +170,30 @@ static gs4_real surface_ring(gs4_vec3 p, void *user)
 static void test_surface_shapes(void)
 {
     const double h = 1.0 / 32;
-    gs4_sim *sim = surface_scene(32);
+    gs4_sim *sim = triangles_scene(32);
     gs4_triangles t;
-    surface_count c;
+    triangles_count c;
     int i;
-    surface_add(sim, gs4_sdf(surface_ring, NULL, at(0, 0, 0), at(1, 1, 1)), 0);
-    t = surface_of(sim, 1, 0);
+    triangles_add(sim, gs4_sdf(triangles_ring, NULL, at(0, 0, 0), at(1, 1, 1)), 0);
+    t = triangles_of(sim, 1, 0);
     gs4_surface_free(sim, &t);
-    surface_clear(sim);
+    triangles_clear(sim);
     /* two drops, each with its own volume */
-    surface_add(sim, gs4_sphere(at(0.3, 0.3, 0.3), (gs4_real)(6 * h)), 0);
-    surface_add(sim, gs4_sphere(at(0.7, 0.6, 0.7), (gs4_real)(3 * h)), 0);
-    t = surface_of(sim, 2, 4);
+    triangles_add(sim, gs4_sphere(at(0.3, 0.3, 0.3), (gs4_real)(6 * h)), 0);
+    triangles_add(sim, gs4_sphere(at(0.7, 0.6, 0.7), (gs4_real)(3 * h)), 0);
+    t = triangles_of(sim, 2, 4);
     for (i = 0; i < 3 * t.triangle_count; i += 3) /* what is left is the first */
         if (t.positions[3 * t.triangles[i]] > (gs4_real)0.55) t.triangles[i + 1] = t.triangles[i];
-    c = surface_counted(sim, &t);
+    c = triangles_counted(sim, &t);
     CHECK_CLOSE(c.volume / (4 * acos(-1.0) / 3 * 216), 1, 0.02);
     gs4_surface_free(sim, &t);
-    surface_clear(sim);
+    triangles_clear(sim);
     /* a ball with a hollow */
-    surface_add(sim, gs4_sphere(at(0.5, 0.5, 0.5), (gs4_real)(10 * h)), 0);
+    triangles_add(sim, gs4_sphere(at(0.5, 0.5, 0.5), (gs4_real)(10 * h)), 0);
     CHECK(gs4_remove_particles(sim, gs4_sphere(at(0.5, 0.5, 0.5), (gs4_real)(4 * h))) > 0);
-    t = surface_of(sim, 2, 4);
+    t = triangles_of(sim, 2, 4);
     gs4_surface_free(sim, &t);
-    surface_clear(sim);
+    triangles_clear(sim);
     CHECK_RESULT(sim, gs4_surface(sim, GS4_FIELD_VELOCITY, &t), 0);
     CHECK(t.vertex_count == 0 && t.triangle_count == 0);
     gs4_surface_free(sim, &t);
@@ -205,7 +205,7 @@ static void test_surface_shapes(void)
 static void test_surface_thin(void)
 {
     const double h = 1.0 / 32;
-    gs4_sim *sim = surface_scene(32);
+    gs4_sim *sim = triangles_scene(32);
     gs4_fill f = scene_fill(at(0, 0, 0));
     gs4_triangles t;
     int i, k;
@@ -224,7 +224,7 @@ static void test_surface_thin(void)
             x[3 * i + (axis + 2) % 3] = (gs4_real)(from + (i / layers / n + 0.5) * h / 2);
         }
         CHECK(gs4_add_points(sim, x, n * n * layers, (gs4_real)(h * h * up / 4), &f) > 0);
-        t = surface_of(sim, 1, 2);
+        t = triangles_of(sim, 1, 2);
         for (i = 0; i < t.vertex_count; i++) {
             const gs4_real *p = t.positions + 3 * i;
             const double y = ((double)p[axis] - z - half) / h;
@@ -237,25 +237,25 @@ static void test_surface_thin(void)
         CHECK_BETWEEN(inner, half / h - tolerance, half / h + tolerance);
         CHECK_BETWEEN(outer, half / h - tolerance, half / h + tolerance);
         gs4_surface_free(sim, &t);
-        surface_clear(sim);
+        triangles_clear(sim);
         free(x);
     }
     for (k = 0; k < 8; k++) {
         const double c = (16 + k * 0.125) * h;
-        surface_add(sim, gs4_sphere(at(c, c, c), (gs4_real)(0.75 * h)), h / 4);
-        t = surface_of(sim, 1, 2);
+        triangles_add(sim, gs4_sphere(at(c, c, c), (gs4_real)(0.75 * h)), h / 4);
+        t = triangles_of(sim, 1, 2);
         for (i = 0; i < 3 * t.vertex_count; i++) CHECK(fabs((double)t.positions[i] - c) < 1.3 * h);
         gs4_surface_free(sim, &t);
-        surface_clear(sim);
+        triangles_clear(sim);
     }
     for (k = 0; k < 8; k++) {
         const gs4_real p[3] = { (gs4_real)(0.5 + 0.13 * k * h), (gs4_real)0.4, (gs4_real)0.3 };
         CHECK(gs4_add_points(sim, p, 1, (gs4_real)(h * h * h / 8), &f) == 1);
-        t = surface_of(sim, 1, 2);
+        t = triangles_of(sim, 1, 2);
         for (i = 0; i < 3 * t.vertex_count; i++)
             CHECK(fabs((double)t.positions[i] - (double)p[i % 3]) < 0.5 * h);
         gs4_surface_free(sim, &t);
-        surface_clear(sim);
+        triangles_clear(sim);
     }
     gs4_destroy(sim);
 }
@@ -282,8 +282,9 @@ static void test_surface_walls(void)
                 low[a] = k == 8 || !(k >> a & 1) ? 0 : 6 * h;
                 high[a] = k == 8 || k >> a & 1 ? 1 : 7.3 * h;
             }
-            surface_add(sim, gs4_box(at(low[0], low[1], low[2]), at(high[0], high[1], high[2])), 0);
-            t = surface_of(sim, w == 3 && k < 8 ? -1 : 1, 2);
+            triangles_add(sim, gs4_box(at(low[0], low[1], low[2]), at(high[0], high[1], high[2])),
+                          0);
+            t = triangles_of(sim, w == 3 && k < 8 ? -1 : 1, 2);
             for (a = 0; a < 3; a++) {
                 double least = 9, most = -9;
                 for (i = 0; i < t.vertex_count; i++) {
@@ -307,7 +308,7 @@ static void test_surface_pool(void)
     for (way = 0; way < (test_full ? 6 : 1); way++) {
         const int n = 20, axis = (way / 2 + 1) % 3, up = !(way & 1);
         const double h = 1.0 / n;
-        gs4_sim *sim = surface_scene(n);
+        gs4_sim *sim = triangles_scene(n);
         gs4_fill f = scene_fill(at(0, 0, 0));
         double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 }, along[3] = { 0, 0, 0 }, worst = 0;
         gs4_view x;
@@ -334,14 +335,14 @@ static void test_surface_pool(void)
         for (k = 0; k < 5; k++) {
             for (i = 0; i < 24; i++)
                 CHECK_RESULT(sim, gs4_step(sim, (gs4_real)(0.8 * (double)gs4_stable_dt(sim))), 0);
-            t = surface_of(sim, 1, 2);
+            t = triangles_of(sim, 1, 2);
             for (i = 0; i < t.vertex_count; i++) {
                 const double a = (double)t.positions[3 * i + (axis + 1) % 3],
                              b = (double)t.positions[3 * i + (axis + 2) % 3];
                 if (fmin(fmin(a, 1 - a), fmin(b, 1 - b)) < 3 * h
                     || fabs((double)t.positions[3 * i + axis] - (up ? 0 : 1)) < 4 * h)
                     continue;
-                worst = fmax(worst, surface_angle(&t, i, along));
+                worst = fmax(worst, triangles_angle(&t, i, along));
             }
             gs4_surface_free(sim, &t);
         }
@@ -354,7 +355,7 @@ static void test_surface_pool(void)
 static void test_surface_materials(void)
 {
     const double h = 1.0 / 24;
-    gs4_sim *sim = surface_scene(24);
+    gs4_sim *sim = triangles_scene(24);
     const gs4_material m = scene_liquid(500, 1, 30);
     gs4_fill f = scene_fill(at(1, 0, 0));
     gs4_triangles t;
@@ -364,7 +365,7 @@ static void test_surface_materials(void)
     f.material = 1;
     f.velocity = at(0, 0, 3);
     CHECK(gs4_add_particles(sim, gs4_box(at(0.5, 0.2, 0.2), at(0.8, 0.8, 0.8)), &f) > 0);
-    t = surface_of(sim, 1, 2);
+    t = triangles_of(sim, 1, 2);
     for (i = 0; i < t.vertex_count; i++) {
         const double x = (double)t.positions[3 * i];
         const int material = t.materials[i];
@@ -389,7 +390,7 @@ static void test_surface_materials(void)
 }
 
 /* A scene with a body, an emitter, a drop and a column, by any scheme. */
-static gs4_sim *surface_mixed(int kind, int threads, files_memory *m)
+static gs4_sim *triangles_mixed(int kind, int threads, files_memory *m)
 {
     gs4_sim_desc d = scene_cube(14);
     gs4_material a = scene_liquid(1000, 2, 20), b = scene_liquid(900, 1, 20);
@@ -433,14 +434,14 @@ static void test_surface_schemes(void)
     for (kind = 0; kind < 5; kind++) {
         gs4_sim *one, *three;
         if (kind > 0 && kind < 4 && !test_full) continue;
-        one = surface_mixed(kind, 1, NULL);
-        three = surface_mixed(kind, 3, NULL);
+        one = triangles_mixed(kind, 1, NULL);
+        three = triangles_mixed(kind, 3, NULL);
         for (k = 0; k < 3; k++) {
             gs4_triangles t, u;
             const uint64_t hash = gs4_state_hash(one), memory = gs4_get_stats(one).memory_bytes;
-            t = surface_of(one, -1, 0);
+            t = triangles_of(one, -1, 0);
             CHECK(gs4_state_hash(one) == hash);
-            u = surface_of(three, -1, 0);
+            u = triangles_of(three, -1, 0);
             CHECK(t.vertex_count == u.vertex_count && t.triangle_count == u.triangle_count);
             if (t.vertex_count == u.vertex_count && t.triangle_count == u.triangle_count) {
                 const size_t bytes = (size_t)t.vertex_count * 3 * sizeof(gs4_real);
@@ -477,7 +478,7 @@ static void test_surface_memory(void)
     int r = -1, write;
     memset(&m, 0, sizeof m);
     m.fail_at = -1;
-    sim = surface_mixed(0, 1, &m);
+    sim = triangles_mixed(0, 1, &m);
     CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)0.01), 0);
     hash = gs4_state_hash(sim);
     live = m.live;
@@ -505,13 +506,13 @@ static void test_surface_memory(void)
 static void test_surface_file(void)
 {
     const char *head_end = "end_header\n", *type = sizeof(gs4_real) == 4 ? "float" : "double";
-    gs4_sim *sim = surface_mixed(0, 1, NULL);
+    gs4_sim *sim = triangles_mixed(0, 1, NULL);
     gs4_triangles t;
     char line[200], *data, *at_end;
     size_t bytes = 0, row = 7 * sizeof(gs4_real) + 1;
     int i, k, bad = 0;
     CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)0.02), 0);
-    t = surface_of(sim, -1, 0);
+    t = triangles_of(sim, -1, 0);
     CHECK_RESULT(sim, gs4_write_surface(sim, files_path("surface.ply")), 0);
     data = (char *)files_read(files_path("surface.ply"), &bytes);
     at_end = data ? strstr(data, head_end) : NULL;
@@ -551,7 +552,7 @@ static void test_surface_file(void)
         CHECK_RESULT(sim, gs4_write_surface(sim, "/dev/full"), GS4_ERROR_IO);
     CHECK(gs4_write_surface(NULL, "x") == GS4_ERROR_ARGUMENT && !files_leftover());
     gs4_destroy(sim);
-    sim = surface_scene(8); /* no particles: a file without vertices */
+    sim = triangles_scene(8); /* no particles: a file without vertices */
     CHECK_RESULT(sim, gs4_write_surface(sim, files_path("surface.ply")), 0);
     remove(files_path("surface.ply"));
     gs4_destroy(sim);
@@ -564,21 +565,21 @@ static void test_surface_random(void)
     int k, i;
     for (k = 0; k < (test_full ? 60 : 12); k++) {
         const double h = 1.0 / 12;
-        gs4_sim *sim = surface_scene(12);
+        gs4_sim *sim = triangles_scene(12);
         const int count = 20 << k % 8;
         gs4_real *x = (gs4_real *)malloc((size_t)count * 3 * sizeof *x);
         gs4_fill f = scene_fill(at(0, 0, 0));
         gs4_triangles t;
-        surface_count c;
+        triangles_count c;
         for (i = 0; i < 3 * count; i++) {
             state = state * 6364136223846793005u + 1442695040888963407u;
             x[i] = (gs4_real)(0.999 * (double)(state >> 40) / 16777216.0);
         }
         CHECK(gs4_add_points(sim, x, count, (gs4_real)(h * h * h / 8), &f) == count);
         CHECK_RESULT(sim, gs4_surface(sim, GS4_FIELD_VELOCITY, &t), 0);
-        c = surface_counted(sim, &t);
+        c = triangles_counted(sim, &t);
         CHECK(c.open == 0 && c.outside < 1e-4 && c.length < 1e-4);
-        CHECK_CLOSE(c.volume / surface_volume(sim), 1, 0.1);
+        CHECK_CLOSE(c.volume / triangles_volume(sim), 1, 0.1);
         gs4_surface_free(sim, &t);
         gs4_destroy(sim);
         free(x);

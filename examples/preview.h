@@ -468,6 +468,14 @@ static void preview_cover(const preview_camera *c, preview_vec p, float radius, 
     r[3] = (int)preview_clamp(y + reach + 1, 0, h);
 }
 
+static void preview_cover_triangle(const preview_camera *c, const preview_vec v[3], int range[4])
+{
+    preview_vec middle = preview_scale(preview_add(preview_add(v[0], v[1], 1), v[2], 1), 1.0f / 3);
+    float reach = 0;
+    for (int j = 0; j < 3; ++j) reach = fmaxf(reach, preview_size(preview_add(v[j], middle, -1)));
+    preview_cover(c, middle, reach, range);
+}
+
 /* ---- solids ---------------------------------------------------------------------------------- */
 static preview_vec preview_corner(const preview_solid *s, int i)
 {
@@ -596,18 +604,15 @@ static void preview_draw_mesh(const preview_camera *c, const preview_solid *s, i
     for (int pass = smooth ? 0 : 1; pass < 2; ++pass)
         for (int i = 0; i < s->triangle_count; ++i) {
             const int *k = s->triangles + 3 * (size_t)i;
-            preview_vec v[3], face, middle, from;
-            float reach = 0, w[3];
+            preview_vec v[3], face, from;
+            float w[3];
             int r[4];
             for (int j = 0; j < 3; ++j) v[j] = preview_corner(s, k[j]);
             face = preview_cross(preview_add(v[1], v[0], -1), preview_add(v[2], v[0], -1));
             for (int j = 0; j < 3 && !pass; ++j) smooth[k[j]] = preview_add(smooth[k[j]], face, 1);
             if (!pass) continue;
             face = preview_unit(face);
-            middle = preview_scale(preview_add(preview_add(v[0], v[1], 1), v[2], 1), 1.0f / 3);
-            for (int j = 0; j < 3; ++j)
-                reach = fmaxf(reach, preview_size(preview_add(v[j], middle, -1)));
-            preview_cover(c, middle, reach, r);
+            preview_cover_triangle(c, v, r);
             for (int y = r[1]; y < r[3]; ++y)
                 for (int x = r[0]; x < r[2]; ++x) {
                     int at = y * c->width + x;
@@ -690,15 +695,12 @@ static void preview_draw_skin(const preview_camera *c, const gs4_triangles *t, c
 {
     for (int i = 0; i < t->triangle_count; ++i) {
         const int *k = t->triangles + 3 * (size_t)i;
-        preview_vec v[3], face, middle, from;
-        float reach = 0, w[3];
+        preview_vec v[3], face, from;
+        float w[3];
         int r[4];
         for (int j = 0; j < 3; ++j) v[j] = preview_vertex(t, k[j]);
         face = preview_cross(preview_add(v[1], v[0], -1), preview_add(v[2], v[0], -1));
-        middle = preview_scale(preview_add(preview_add(v[0], v[1], 1), v[2], 1), 1.0f / 3);
-        for (int j = 0; j < 3; ++j)
-            reach = fmaxf(reach, preview_size(preview_add(v[j], middle, -1)));
-        preview_cover(c, middle, reach, r);
+        preview_cover_triangle(c, v, r);
         for (int y = r[1]; y < r[3]; ++y)
             for (int x = r[0]; x < r[2]; ++x) {
                 int at = y * c->width + x;

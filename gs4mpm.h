@@ -17203,14 +17203,19 @@ GS4I_INLINE void gs4i_affine_momentum(gs4i_response *r, const gs4i_batch *q, con
     gs4i_from_lanes(Q[0][2], Q[1][2], Q[2][2], none, f->z);
 }
 
-/* J of what nodes do not see decays before sticky bodies that move as it does with GS4, at the rate
- * of gs4i_near_decay. Nodes held by a body are a rough surface, what is beside it goes with it, and
- * errors of div v in particles add up: beside a plate that slides J went to .952 and 1.050, with
- * shorter steps further, .935 and 1.083; now .993 and 1.009. Nodes have in place of forces the sum
- * of m p/rho over the particles nearest to them, and of m: smoothed by that and by the weights of
- * one that takes it, a wave of 4 cells is seen to .66, of 2 cells to .16. */
+/* J of what nodes do not see decays, as it does with GS4, in two places.
+ *     Before sticky bodies that move, at the rate of gs4i_near_decay. Nodes held by a body are a
+ * rough surface, what is beside it goes with it, and errors of div v in particles add up: beside a
+ * plate that slides J went to .952 and 1.050, with shorter steps further, .935 and 1.083; now .993
+ * and 1.009.
+ *     Where liquid is packed: a particle sees a node with J f > 1.08, see gs4i_unpack. That lowers
+ * J of some particles and pressure raises J of all, so what they differ by, elastic energy, grew.
+ * Everywhere it would smooth fresh fillings, whose tanks sink by 2 %.
+ * Nodes have in place of forces the sum of m p/rho over the particles nearest to them, and of m:
+ * smoothed by that and by the weights of one that takes it, a wave of 4 cells is seen to .66, of 2
+ * cells to .16. */
 typedef struct gs4i_pressure_tile {
-    int settles; /* is there such a body near the block? else the tile is not in use */
+    int settles; /* bit 0: is there such a body near the block? bit 1: is it packed? */
     gs4_real nodes[GS4I_TILE_REALS];
 } gs4i_pressure_tile;
 
@@ -17236,33 +17241,79 @@ static void gs4i_sum_pressure(const gs4i_response *r, const gs4i_batch *q, const
     }
 }
 
-/* And back, beside the rates. */
-static void gs4i_load_pressure(const gs4_sim *sim, int o, gs4i_pressure_tile *t)
+/* Is J f > 1.08 somewhere among `count` nodes, whose fourth numbers are masses? */
+static int gs4i_is_packed(const gs4i_integrator *k, const gs4_real *nodes, size_t count, gs4_real J)
 {
-    const uint64_t rows = sim->reports[o].rows;
+    gs4_real most = 0;
+    size_t i;
+    for (i = 0; i < count; i++) most = gs4i_max(most, nodes[4 * i + 3]);
+    return most * k->inv_node_mass * J > GS4I_C(GS4I_PACKED);
+}
+
+/* Pressures where gs4i_scatter_affinely leaves them out, in a scene that is packed somewhere. */
+static void gs4i_scatter_pressure(int index, void *context)
+{
+    const gs4i_prediction now = { 0, 0, 0 };
+    const gs4i_pass *pass = (const gs4i_pass *)context;
+    const gs4_sim *sim = pass->sim;
+    const gs4i_grid *g = &sim->grid;
+    const int o = pass->blocks[index];
+    const gs4i_frame frame = gs4i_tile_frame(g, g->occupied_block[o]);
+    gs4i_response r;
+    gs4_real tile[GS4I_TILE_REALS];
+    size_t i = (size_t)g->first[o], end = (size_t)g->first[o + 1];
+    if (gs4i_volume_settles(sim, o)) return;
+    memset(tile, 0, sizeof tile);
+    gs4i_begin_response(&r, sim, &sim->particles, &sim->integrator, &sim->reports[o], NULL);
+    for (; i < end; i += GS4I_BATCH) {
+        const int n = gs4i_batch_size(i, end);
+        gs4i_batch q;
+        gs4i_stencils s;
+        gs4i_stage_batch(r.p, i, n, now, &frame, &q, &s);
+        gs4i_turn_to_batch(&r, i, n);
+        gs4i_sum_pressure(&r, &q, &s, tile);
+    }
+    gs4i_tile_add(g, o, r.report->rows, tile, g->force);
+}
+
+/* And back, beside the rates. `nodes`: velocities and masses there. */
+static void gs4i_load_pressure(const gs4_sim *sim, int o, const gs4i_integrator *k,
+                               const gs4_real *nodes, gs4i_pressure_tile *t)
+{
+    const gs4i_report *report = &sim->reports[o];
     t->settles = gs4i_volume_settles(sim, o);
+    if (k->volume_crossing > 0 && k->unpacking > 0
+        && gs4i_is_packed(k, nodes, GS4I_TILE * GS4I_TILE * GS4I_TILE, report->max_J))
+        t->settles |= 2;
     if (!t->settles) return;
-    gs4i_tile_load(&sim->grid, o, rows, sim->grid.force, t->nodes);
-    gs4i_load_near_decay(sim, o, rows, t->nodes);
+    gs4i_tile_load(&sim->grid, o, report->rows, sim->grid.force, t->nodes);
+    if (t->settles & 1) gs4i_load_near_decay(sim, o, report->rows, t->nodes);
 }
 
 /* dJ/dt has k (Jbar - J) more, implicit in J, for particles i to i + n. */
-static void gs4i_settle_volume(const gs4i_response *r, const gs4_real *tile, const gs4i_stencils *s,
-                               size_t i, int n, gs4i_batch *q)
+static void gs4i_settle_volume(const gs4i_response *r, const gs4i_pressure_tile *t,
+                               const gs4_real *nodes, const gs4i_stencils *s, size_t i, int n,
+                               gs4i_batch *q)
 {
+    const gs4i_integrator *k = r->integrator;
     gs4_real seen[4 * GS4I_BATCH];
-    int b;
+    int b, row;
     for (b = 0; b < n; b++) {
-        const gs4_real *at = tile + 4 * s->base[b];
-        gs4_real *J = &GS4I_NTH(q->v[3], b), decay;
+        const gs4_real *at = t->nodes + 4 * s->base[b], *masses = nodes + 4 * s->base[b];
+        gs4_real *J = &GS4I_NTH(q->v[3], b), mean /* of J - 1 */, excess, decay = 0;
+        int packed = 0;
         gs4i_row w, d;
-        if (!(at[4 * GS4I_MIDDLE_NODE + 3] > 0)) continue;
         gs4i_x_weights(s, b, &w, &d);
         gs4i_gather_value(at, s, b, &w, seen);
-        decay = seen[4 * b + 3] * r->integrator->dt;
-        *J += decay / (1 + decay)
-              * (seen[4 * b] / (seen[4 * b + 1] * r->materials[r->p->material[i + (size_t)b]].tait)
-                 - (*J - 1));
+        mean = seen[4 * b] / (seen[4 * b + 1] * r->materials[r->p->material[i + (size_t)b]].tait);
+        excess = mean - (*J - 1);
+        for (row = 0; row < 9 && t->settles & 2; row++)
+            packed |= gs4i_is_packed(k, masses + 4 * GS4I_TILE * (row % 3 + GS4I_TILE * (row / 3)),
+                                     3, 1 + mean);
+        if (packed) decay = gs4i_max(0, k->volume_crossing * gs4i_abs(excess) - k->weight_crossing);
+        if (t->settles & 1 && at[4 * GS4I_MIDDLE_NODE + 3] > 0) decay += seen[4 * b + 3];
+        decay *= k->dt;
+        *J += decay / (1 + decay) * excess;
     }
 }
 
@@ -17381,8 +17432,8 @@ static void gs4i_gather_euler(int index, void *context)
     if (!pass->commit && gs4i_is_safe(pass, index)) return;
     clear = edge && pass->commit ? gs4i_find_clear_nodes(sim, o, clear_nodes) : NULL;
     gs4i_tile_load(g, o, report->rows, gs4i_velocity(g), nodes);
-    gs4i_load_pressure(sim, o, &pressure);
-    gs4i_begin_response(&r, sim, &p, &sim->integrator, report, heat);
+    gs4i_load_pressure(sim, o, &integrator, nodes, &pressure);
+    gs4i_begin_response(&r, sim, &p, &integrator, report, heat);
     if (heat) gs4i_load_heat_tiles(sim, o, heat);
     for (; i < end; i += GS4I_BATCH, row += 2) {
         const int n = gs4i_batch_size(i, end);
@@ -17401,7 +17452,7 @@ static void gs4i_gather_euler(int index, void *context)
         }
         if (near.particle) gs4i_make_odd(&near, n, 0, &u, NULL);
         if (near.particle) near.particle += n;
-        if (pressure.settles) gs4i_settle_volume(&r, pressure.nodes, &s, i, n, &q);
+        if (pressure.settles) gs4i_settle_volume(&r, &pressure, nodes, &s, i, n, &q);
         gs4i_advect_batch(&integrator, &u, n, &q, C);
         gs4i_advance_response(&r, i, n, C, NULL, q.v[3], pass->commit);
         if (!pass->commit) {
@@ -17418,11 +17469,19 @@ static void gs4i_gather_euler(int index, void *context)
     if (pass->commit) gs4i_report_motion(report, &r.seen);
 }
 
-/* Stress and weight are in the momentum already. */
+/* Stress and weight are in the momentum already. What is packed nowhere pays for no decay of J. */
 static int gs4i_accelerate_euler(gs4_sim *sim, gs4i_node_pass *nodes)
 {
-    if (sim->integrator.unpacking > 0) gs4i_fill_mirror_masses(&sim->boundary, &sim->grid);
-    if (sim->integrator.volume_settles) gs4i_fill_mirror_pressures(&sim->boundary, &sim->grid);
+    const gs4i_grid *g = &sim->grid;
+    gs4i_integrator *k = &sim->integrator;
+    gs4_real J = 0;
+    int o;
+    for (o = 0; o < g->occupied; o++) J = gs4i_max(J, sim->reports[o].max_J);
+    if (!gs4i_is_packed(k, gs4i_velocity(g), GS4I_BLOCK_NODES * (size_t)g->active, J))
+        k->volume_crossing = 0;
+    if (k->volume_crossing > 0) gs4i_scatter(sim, gs4i_scatter_pressure);
+    if (k->unpacking > 0) gs4i_fill_mirror_masses(&sim->boundary, g);
+    if (k->volume_settles || k->volume_crossing > 0) gs4i_fill_mirror_pressures(&sim->boundary, g);
     (void)nodes;
     return GS4_OK;
 }
@@ -23699,7 +23758,8 @@ static void gs4i_set_decay(gs4i_integrator *k, const gs4_sim *sim)
 {
     const gs4_real r = sim->desc.rho_inf, s = sim->desc.rho_inf_spurious,
                    most = GS4I_C(3.2) * (1 - r * s) / ((3 + r + s - r * s) * k->dt);
-    const int by_noise = sim->desc.flip_decay_time == 0 && sim->particles.with_rates;
+    const int by_noise = sim->desc.flip_decay_time == 0 && sim->particles.with_rates,
+              is_euler = sim->desc.integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER;
     const gs4_real time = by_noise ? GS4I_SLOW_DECAY : sim->desc.flip_decay_time;
     gs4_real y;
     /* in less than 1e-6 dt makes no difference */
@@ -23715,10 +23775,10 @@ static void gs4i_set_decay(gs4i_integrator *k, const gs4_sim *sim)
     /* beside what goes at once (4) is stable up to so much less: single particles swung for ever */
     k->inv_stable = 1 / (most * (1 - GS4I_C(0.5) * k->decayed_at_once));
     k->crossing = by_noise && !sim->particles.deformation_reals ? sim->grid.inv_h : GS4I_C(0);
-    k->volume_crossing =
-        k->crossing > 0 && !sim->grid.with_deconvolution && gs4i_materials_are_alike(sim)
-            ? k->fast_decay
-            : GS4I_C(0);
+    k->volume_crossing = (k->crossing > 0 || (is_euler && k->unpacking > 0))
+                                 && !sim->grid.with_deconvolution && gs4i_materials_are_alike(sim)
+                             ? k->fast_decay
+                             : GS4I_C(0);
     k->weight_crossing = k->volume_crossing > 0
                              ? gs4i_length(sim->desc.gravity) / (k->volume_crossing * sim->grid.h)
                              : GS4I_C(0);

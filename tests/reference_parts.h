@@ -19,6 +19,7 @@ typedef struct ref_node {
     double m, v[3], f[3];   /* mass; momentum, then velocity; force, then acceleration */
     double ag[3];           /* the acceleration that it remembers */
     double b;               /* sum w m (rho0 c0^2 / 7) (J~ - 1), then over m */
+    double near;            /* symplectic Euler: mass nearest to it; b is of that alone */
     int remembers, pressed; /* has an ag; material pressed on the separating wall here */
     int folds, mirrors;     /* bit a: folds along axis a; it does so at a wall, not a period */
 } ref_node;
@@ -298,14 +299,18 @@ static void ref_fill(ref_sim *s)
         }
 }
 
-/* At last mirrors are as full as their originals, as J asks how densely particles lie. */
+/* At last mirrors are as full as their originals, as J asks how densely particles lie, and with
+ * symplectic Euler have what lies nearest to those. */
 static void ref_fill_masses(ref_sim *s)
 {
     int wall, i;
     for (wall = 5; wall >= 0 && s->unpacking > 0; wall--)
         for (i = 0; i < ref_nodes(s); i++) {
             ref_node *mirror = &s->node[i], *from = ref_original(s, wall, i);
-            if (from && mirror->folds >> wall / 2 & 1) mirror->m = from->m;
+            if (!from || !(mirror->folds >> wall / 2 & 1)) continue;
+            mirror->m = from->m;
+            mirror->near = from->near;
+            if (s->d.integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER) mirror->b = from->b;
         }
 }
 
@@ -346,7 +351,7 @@ static void ref_clear(ref_sim *s)
     int i, c;
     for (i = 0; i < ref_nodes(s); i++) {
         ref_node *n = &s->node[i];
-        n->m = n->b = 0;
+        n->m = n->b = n->near = 0;
         for (c = 0; c < 3; c++) n->v[c] = n->f[c] = 0;
         n->folds = n->mirrors = 0;
     }
@@ -496,8 +501,27 @@ static void ref_restart(ref_sim *s)
 
 /* --- symplectic Euler: MLS-MPM with APIC ------------------------------------------------------ */
 
+/* J goes to B = 1 + sum w b_i / (rho0 c0^2/7 sum w near_i) at the rate c0 |B - J| / h - g / c0,
+ * implicit in J, where one of the nodes is packed, m_i B > 1.08 rho0 h^3. */
+static void ref_settle(const ref_sim *s, ref_particle *p, const ref_stencil *t)
+{
+    const double g = sqrt(s->g[0] * s->g[0] + s->g[1] * s->g[1] + s->g[2] * s->g[2]);
+    double b = 0, near = 0, most = 0, decay;
+    int i;
+    for (i = 0; i < 27; i++) {
+        b += t->w[i] * t->node[i]->b;
+        near += t->w[i] * t->node[i]->near;
+        most = fmax(most, t->node[i]->m);
+    }
+    b = 1 + b / (ref_tait(p->is) * near);
+    if (!(s->unpacking > 0 && most * b > 1.08 * s->least_rho * s->h * s->h * s->h)) return;
+    decay = s->dt * fmax(0, s->most_c0 * fabs(b - p->J) / s->h - g / s->most_c0);
+    p->J += decay / (1 + decay) * (b - p->J);
+}
+
 /* (m v)_i = sum w [m (v + dt g) + (m C - dt J m/rho0 sigma 4/h^2) (x_i - x)], |C| dt at most 1/4;
- * v = sum w v_i,  C = sum v_i (x) grad w,  x += dt v,  J += dt J tr C, then dt ref_unpack;
+ * v = sum w v_i,  C = sum v_i (x) grad w,  x += dt v,  J by ref_settle, then J += dt J tr C, then
+ * dt ref_unpack;
  * F and s by (4) with alpha_m = alpha_f = gamma = 1 and no rates. */
 static void ref_euler_step(ref_sim *s, double dt)
 {
@@ -514,6 +538,8 @@ static void ref_euler_step(ref_sim *s, double dt)
         ref_stress(s, p, p->C, p->J, sigma);
         for (i = 0; i < 9; i++) squared += p->C[i / 3][i % 3] * p->C[i / 3][i % 3];
         bound = ref_bound(squared, dt);
+        t.node[13]->b += p->m * ref_tait(p->is) * (p->J - 1);
+        t.node[13]->near += p->m;
         for (i = 0; i < 27; i++) {
             t.node[i]->m += t.w[i] * p->m;
             for (c = 0; c < 3; c++) {
@@ -533,6 +559,7 @@ static void ref_euler_step(ref_sim *s, double dt)
         ref_weights(s, p->x, &t);
         ref_gather(&t, REF_VELOCITY, p->v, p->C);
         for (c = 0; c < 3; c++) p->x[c] += dt * p->v[c];
+        ref_settle(s, p, &t);
         p->J += dt * p->J * ref_trace(p->C);
         p->J += dt * ref_unpack(s, ref_filled(s, &t), p->J);
         memset(p->M, 0, sizeof p->M);

@@ -17208,14 +17208,15 @@ GS4I_INLINE void gs4i_affine_momentum(gs4i_response *r, const gs4i_batch *q, con
  * rough surface, what is beside it goes with it, and errors of div v in particles add up: beside a
  * plate that slides J went to .952 and 1.050, with shorter steps further, .935 and 1.083; now .993
  * and 1.009.
- *     Where liquid is packed: a particle sees a node with J f > 1.08, see gs4i_unpack. That lowers
- * J of some particles and pressure raises J of all, so what they differ by, elastic energy, grew.
- * Everywhere it would smooth fresh fillings, whose tanks sink by 2 %.
+ *     Where liquid is packed: a particle sees a node of f > 1.08, see gs4i_unpack. That lowers J of
+ * some particles and pressure raises J of all, so what they differ by, elastic energy, grew.
+ * Everywhere it would let tanks sink by 2 %.
  * Nodes have in place of forces the sum of m p/rho over the particles nearest to them, and of m:
  * smoothed by that and by the weights of one that takes it, a wave of 4 cells is seen to .66, of 2
  * cells to .16. */
 typedef struct gs4i_pressure_tile {
     int settles; /* bit 0: is there such a body near the block? bit 1: is it packed? */
+    uint64_t packed[GS4I_TILE];
     gs4_real nodes[GS4I_TILE_REALS];
 } gs4i_pressure_tile;
 
@@ -17241,16 +17242,35 @@ static void gs4i_sum_pressure(const gs4i_response *r, const gs4i_batch *q, const
     }
 }
 
-/* Is J f > 1.08 somewhere among `count` nodes, whose fourth numbers are masses? */
-static int gs4i_is_packed(const gs4i_integrator *k, const gs4_real *nodes, size_t count, gs4_real J)
+/* Is one of the nodes packed? Fourth numbers are masses. */
+static int gs4i_is_packed(const gs4i_integrator *k, const gs4_real *nodes, size_t count)
 {
     gs4_real most = 0;
     size_t i;
     for (i = 0; i < count; i++) most = gs4i_max(most, nodes[4 * i + 3]);
-    return most * k->inv_node_mass * J > GS4I_C(GS4I_PACKED);
+    return most * k->inv_node_mass > GS4I_C(GS4I_PACKED);
 }
 
-/* Pressures where gs4i_scatter_affinely leaves them out, in a scene that is packed somewhere. */
+/* Bits of a tile's places: is one of the 27 nodes from there on packed? Returns whether any is. */
+static int gs4i_find_packed(const gs4i_integrator *k, const gs4_real *nodes,
+                            uint64_t bits[GS4I_TILE])
+{
+    uint64_t any = 0;
+    int z, i;
+    for (z = 0; z < GS4I_TILE; z++) {
+        uint64_t own = 0;
+        for (i = 0; i < 64; i++)
+            own |= (uint64_t)gs4i_is_packed(k, nodes + 4 * (64 * z + i), 1) << i;
+        own |= own >> 1 | own >> 2;
+        bits[z] = own | own >> 8 | own >> 16;
+        any |= bits[z];
+    }
+    for (z = 0; z + 2 < GS4I_TILE; z++) bits[z] |= bits[z + 1] | bits[z + 2];
+    return any != 0;
+}
+
+/* Pressures that gs4i_scatter_affinely leaves out, of all that reach a particle which sees a packed
+ * node: that is 3 nodes from its block at most, in one of the 27 around it. */
 static void gs4i_scatter_pressure(int index, void *context)
 {
     const gs4i_prediction now = { 0, 0, 0 };
@@ -17262,7 +17282,14 @@ static void gs4i_scatter_pressure(int index, void *context)
     gs4i_response r;
     gs4_real tile[GS4I_TILE_REALS];
     size_t i = (size_t)g->first[o], end = (size_t)g->first[o + 1];
-    if (gs4i_volume_settles(sim, o)) return;
+    int packed = 0, b;
+    for (b = 0; b < 27 && !packed; b++) {
+        const int slot = g->neighbour[27 * o + b];
+        packed = slot >= 0
+                 && gs4i_is_packed(&sim->integrator, gs4i_of_slot(gs4i_velocity(g), slot),
+                                   GS4I_BLOCK_NODES);
+    }
+    if (!packed || gs4i_volume_settles(sim, o)) return;
     memset(tile, 0, sizeof tile);
     gs4i_begin_response(&r, sim, &sim->particles, &sim->integrator, &sim->reports[o], NULL);
     for (; i < end; i += GS4I_BATCH) {
@@ -17282,8 +17309,7 @@ static void gs4i_load_pressure(const gs4_sim *sim, int o, const gs4i_integrator 
 {
     const gs4i_report *report = &sim->reports[o];
     t->settles = gs4i_volume_settles(sim, o);
-    if (k->volume_crossing > 0 && k->unpacking > 0
-        && gs4i_is_packed(k, nodes, GS4I_TILE * GS4I_TILE * GS4I_TILE, report->max_J))
+    if (k->volume_crossing > 0 && k->unpacking > 0 && gs4i_find_packed(k, nodes, t->packed))
         t->settles |= 2;
     if (!t->settles) return;
     gs4i_tile_load(&sim->grid, o, report->rows, sim->grid.force, t->nodes);
@@ -17292,26 +17318,24 @@ static void gs4i_load_pressure(const gs4_sim *sim, int o, const gs4i_integrator 
 
 /* dJ/dt has k (Jbar - J) more, implicit in J, for particles i to i + n. */
 static void gs4i_settle_volume(const gs4i_response *r, const gs4i_pressure_tile *t,
-                               const gs4_real *nodes, const gs4i_stencils *s, size_t i, int n,
-                               gs4i_batch *q)
+                               const gs4i_stencils *s, size_t i, int n, gs4i_batch *q)
 {
     const gs4i_integrator *k = r->integrator;
     gs4_real seen[4 * GS4I_BATCH];
-    int b, row;
+    int b;
     for (b = 0; b < n; b++) {
-        const gs4_real *at = t->nodes + 4 * s->base[b], *masses = nodes + 4 * s->base[b];
-        gs4_real *J = &GS4I_NTH(q->v[3], b), mean /* of J - 1 */, excess, decay = 0;
-        int packed = 0;
+        const int base = s->base[b],
+                  near = t->settles & 1 && t->nodes[4 * (base + GS4I_MIDDLE_NODE) + 3] > 0,
+                  packed = t->settles & 2 && t->packed[base >> 6] >> (base & 63) & 1;
+        gs4_real *J = &GS4I_NTH(q->v[3], b), excess, decay = 0;
         gs4i_row w, d;
+        if (!near && !packed) continue;
         gs4i_x_weights(s, b, &w, &d);
-        gs4i_gather_value(at, s, b, &w, seen);
-        mean = seen[4 * b] / (seen[4 * b + 1] * r->materials[r->p->material[i + (size_t)b]].tait);
-        excess = mean - (*J - 1);
-        for (row = 0; row < 9 && t->settles & 2; row++)
-            packed |= gs4i_is_packed(k, masses + 4 * GS4I_TILE * (row % 3 + GS4I_TILE * (row / 3)),
-                                     3, 1 + mean);
+        gs4i_gather_value(t->nodes + 4 * base, s, b, &w, seen);
+        excess = seen[4 * b] / (seen[4 * b + 1] * r->materials[r->p->material[i + (size_t)b]].tait)
+                 - (*J - 1);
         if (packed) decay = gs4i_max(0, k->volume_crossing * gs4i_abs(excess) - k->weight_crossing);
-        if (t->settles & 1 && at[4 * GS4I_MIDDLE_NODE + 3] > 0) decay += seen[4 * b + 3];
+        if (near) decay += seen[4 * b + 3];
         decay *= k->dt;
         *J += decay / (1 + decay) * excess;
     }
@@ -17452,7 +17476,7 @@ static void gs4i_gather_euler(int index, void *context)
         }
         if (near.particle) gs4i_make_odd(&near, n, 0, &u, NULL);
         if (near.particle) near.particle += n;
-        if (pressure.settles) gs4i_settle_volume(&r, &pressure, nodes, &s, i, n, &q);
+        if (pressure.settles) gs4i_settle_volume(&r, &pressure, &s, i, n, &q);
         gs4i_advect_batch(&integrator, &u, n, &q, C);
         gs4i_advance_response(&r, i, n, C, NULL, q.v[3], pass->commit);
         if (!pass->commit) {
@@ -17474,10 +17498,7 @@ static int gs4i_accelerate_euler(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     const gs4i_grid *g = &sim->grid;
     gs4i_integrator *k = &sim->integrator;
-    gs4_real J = 0;
-    int o;
-    for (o = 0; o < g->occupied; o++) J = gs4i_max(J, sim->reports[o].max_J);
-    if (!gs4i_is_packed(k, gs4i_velocity(g), GS4I_BLOCK_NODES * (size_t)g->active, J))
+    if (!gs4i_is_packed(k, gs4i_velocity(g), GS4I_BLOCK_NODES * (size_t)g->active))
         k->volume_crossing = 0;
     if (k->volume_crossing > 0) gs4i_scatter(sim, gs4i_scatter_pressure);
     if (k->unpacking > 0) gs4i_fill_mirror_masses(&sim->boundary, g);

@@ -74,7 +74,9 @@ static const reference_scene reference_scenes[] = {
     { "packed around a period", { 6, 5, 4 }, { ROUND, ROUND, SLIP, SLIP, ROUND, ROUND }, 0, 0, 0.05,
       { 0, 0, 0 }, { 6, 5, 4 }, 0, 0, 0, { 3, 0, -3 }, 5, 0, 12, 0, 1.3 },
     { "packed, Euler", { 6, 5, 4 }, { SLIP, APART, STICK, SLIP, APART, STICK }, 0, 0, 0,
-      { 0, 0, 0 }, { 6, 5, 4 }, 0, 0, 1, { 1, -2, 1 }, 5, 0, 12, 0, 1.1 }
+      { 0, 0, 0 }, { 6, 5, 4 }, 0, 0, 1, { 1, -2, 1 }, 5, 0, 12, 0, 1.1 },
+    { "packed in the midst, Euler", { 12, 9, 9 }, ALL(SLIP), 0, 0, 0,
+      { 3, 2, 2 }, { 9, 7, 7 }, 0, 0, 1, { 1, -2, 1 }, 5, 0, 12, 0, 1.3 }
 };
 /* clang-format on */
 #undef STICK

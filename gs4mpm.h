@@ -170,8 +170,9 @@
  * alpha_m = (alpha_f dt + d)/w, gamma = (dt/2 + d)/w, w = (3/2 - gamma) dt + d, d that of the last
  * step, (gamma - 1/2) dt: what changes evenly in time stays exact. The first step, and the first
  * after an edit, has alpha_m = gamma = 1, alpha_f = 1/2 and no rates; alpha_f of heat is
- * 1 - h^2/(D dt), if that is more, D = k/(rho c). Where R depends on y~ itself, linearly, (4) is
- * solved for it:
+ * 1 - h^2/(D dt), if that is more, D = k/(rho c), and that of the semi-implicit scheme
+ * 1 - h^2/(nu dt), nu the largest mu/rho. Where R depends on y~ itself, linearly, (4) is solved for
+ * it:
  *     (y~ - y**) / s = R(y~),   y** = y + (alpha_f dt - s) r,   s = alpha_f gamma dt / alpha_m
  *
  * THE STEP, as in gs4i_make_step:
@@ -23832,6 +23833,23 @@ static void gs4i_adapt_family(gs4i_integrator *k, gs4_real shift)
     k->gamma = (GS4I_C(0.5) * k->dt + shift) / between;
 }
 
+/* nu dt/h^2 of the most viscous liquid: cells^2 that motion goes in a step. */
+static gs4_real gs4i_viscous_number(const gs4_sim *sim, gs4_real dt)
+{
+    gs4_real most = 0;
+    int i;
+    for (i = 0; i < sim->material_count; i++)
+        most = gs4i_max(most, sim->constants[i].viscosity * sim->constants[i].inv_density);
+    return most * dt * sim->grid.inv_h * sim->grid.inv_h;
+}
+
+/* Without rates alpha_f = 1/2 would answer what is faster than the step with the opposite of it, so
+ * it goes to 1, backward Euler, as motion or heat goes further in the step, by `cells`^1/2. */
+static void gs4i_damp_first_step(gs4i_integrator *k, gs4_real cells)
+{
+    k->alpha_f = gs4i_max(k->alpha_f, 1 - 1 / gs4i_max(cells, GS4I_C(1)));
+}
+
 static gs4i_integrator gs4i_make_integrator(const gs4_sim *sim, gs4_real dt)
 {
     const gs4_real r = sim->desc.rho_inf, s = sim->desc.rho_inf_spurious, h = sim->grid.h;
@@ -23846,6 +23864,8 @@ static gs4i_integrator gs4i_make_integrator(const gs4_sim *sim, gs4_real dt)
     if (k.restart && sim->desc.integrator == GS4_INTEGRATOR_GS4)
         k.impact /= 1 + k.alpha_m - k.gamma;
     if (k.restart) gs4i_family(&k, r, s, 1);
+    if (k.restart && sim->desc.scheme == GS4_SEMI_IMPLICIT)
+        gs4i_damp_first_step(&k, gs4i_viscous_number(sim, dt));
     if (sim->desc.integrator == GS4_INTEGRATOR_BACKWARD_EULER) k.alpha_m = k.alpha_f = k.gamma = 1;
     k.affine_ratio = k.restart || sim->desc.integrator != GS4_INTEGRATOR_GS4 || !(sim->last_dt > 0)
                          ? GS4I_C(0)
@@ -23904,8 +23924,7 @@ static gs4_real gs4i_heat_number(const gs4_sim *sim, const gs4i_integrator *k)
 
 /* The same for heat, which has steps far beyond its own limit: there a rate is what a step as
  * long as the last one has left to do, and where dt has grown by more than twice, rates start
- * anew. Without rates alpha_f = 1/2 would answer a wall with twice its temperature, so it goes to
- * 1, backward Euler, as heat goes further in the step. */
+ * anew. */
 static gs4i_integrator gs4i_make_heat_integrator(const gs4_sim *sim)
 {
     gs4i_integrator k = sim->integrator;
@@ -23913,7 +23932,7 @@ static gs4i_integrator gs4i_make_heat_integrator(const gs4_sim *sim)
     if (!sim->particles.with_rates || !(k.restart || grown)) return k;
     if (!k.restart) k.prediction.ahead = k.before = 0;
     gs4i_family(&k, 0, 0, 1);
-    k.alpha_f = gs4i_max(k.alpha_f, 1 - 1 / gs4i_max(gs4i_heat_number(sim, &k), GS4I_C(1)));
+    gs4i_damp_first_step(&k, gs4i_heat_number(sim, &k));
     k.s = k.alpha_f * k.gamma * k.dt / k.alpha_m;
     k.inv_alpha_m = 1 / k.alpha_m;
     return k;
@@ -28905,6 +28924,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  * 1e6 any more, beyond which all crept too fast; the residual counts volume beside what flows.
  * Where steps outlast a fall by far they are a fifth as many, as six layers of faces go on from
  * liquid. Noise decays more slowly where all motion that the grid does not see does at once (dt
- * above 0.5 s): by both, single particles swung for ever.
+ * above 0.5 s): by both, single particles swung for ever. A first step that is longer than flow
+ * lasts takes it to rest, before to its opposite.
  * Partitioned: what flies past dry walls does not feel them, falls in uneven steps are exact, the
  * limit of viscosity is that of the member. */

@@ -171,7 +171,7 @@
  * step, (gamma - 1/2) dt: what changes evenly in time stays exact. The first step, and the first
  * after an edit, has alpha_m = gamma = 1, alpha_f = 1/2 and no rates; alpha_f of heat is
  * 1 - h^2/(D dt), if that is more, D = k/(rho c), and that of the semi-implicit scheme
- * 1 - h^2/(nu dt), nu the largest mu/rho. Where R depends on y~ itself, linearly, (4) is solved for
+ * 1 - (16 h^2/(nu dt))^2, nu the largest mu/rho. Where R depends on y~ itself, linearly, (4) is solved for
  * it:
  *     (y~ - y**) / s = R(y~),   y** = y + (alpha_f dt - s) r,   s = alpha_f gamma dt / alpha_m
  *
@@ -23844,10 +23844,10 @@ static gs4_real gs4i_viscous_number(const gs4_sim *sim, gs4_real dt)
 }
 
 /* Without rates alpha_f = 1/2 would answer what is faster than the step with the opposite of it, so
- * it goes to 1, backward Euler, as motion or heat goes further in the step, by `cells`^1/2. */
-static void gs4i_damp_first_step(gs4i_integrator *k, gs4_real cells)
+ * it goes to 1, backward Euler, as `excess` grows, what the step is too long by. */
+static void gs4i_damp_first_step(gs4i_integrator *k, gs4_real excess)
 {
-    k->alpha_f = gs4i_max(k->alpha_f, 1 - 1 / gs4i_max(cells, GS4I_C(1)));
+    k->alpha_f = gs4i_max(k->alpha_f, 1 - 1 / gs4i_max(excess, GS4I_C(1)));
 }
 
 static gs4i_integrator gs4i_make_integrator(const gs4_sim *sim, gs4_real dt)
@@ -23864,8 +23864,10 @@ static gs4i_integrator gs4i_make_integrator(const gs4_sim *sim, gs4_real dt)
     if (k.restart && sim->desc.integrator == GS4_INTEGRATOR_GS4)
         k.impact /= 1 + k.alpha_m - k.gamma;
     if (k.restart) gs4i_family(&k, r, s, 1);
-    if (k.restart && sim->desc.scheme == GS4_SEMI_IMPLICIT)
-        gs4i_damp_first_step(&k, gs4i_viscous_number(sim, dt));
+    if (k.restart && sim->desc.scheme == GS4_SEMI_IMPLICIT) {
+        const gs4_real excess = gs4i_viscous_number(sim, dt) / 16;
+        gs4i_damp_first_step(&k, excess * excess);
+    }
     if (sim->desc.integrator == GS4_INTEGRATOR_BACKWARD_EULER) k.alpha_m = k.alpha_f = k.gamma = 1;
     k.affine_ratio = k.restart || sim->desc.integrator != GS4_INTEGRATOR_GS4 || !(sim->last_dt > 0)
                          ? GS4I_C(0)

@@ -171,8 +171,8 @@
  * step, (gamma - 1/2) dt: what changes evenly in time stays exact. The first step, and the first
  * after an edit, has alpha_m = gamma = 1, alpha_f = 1/2 and no rates; alpha_f of heat is
  * 1 - h^2/(D dt), if that is more, D = k/(rho c), and that of the semi-implicit scheme
- * 1 - (16 h^2/(nu dt))^2, nu the largest mu/rho. Where R depends on y~ itself, linearly, (4) is solved for
- * it:
+ * 1 - (16 h^2/(nu dt))^2, nu the largest mu/rho. Where R depends on y~ itself, linearly, (4) is
+ * solved for it:
  *     (y~ - y**) / s = R(y~),   y** = y + (alpha_f dt - s) r,   s = alpha_f gamma dt / alpha_m
  *
  * THE STEP, as in gs4i_make_step:
@@ -224,7 +224,7 @@
  * with both explicit integrators, and pressure makes room: the depth is 0.998, after 100 jolts
  * 0.988. Fresh fillings have J f up to 1.03; they, smooth flow and surfaces stay below 1.08 and are
  * left alone, films and spray too. It adds less than 1e-3 to the energy: with symplectic Euler, too,
- * noise of J decays where f Jbar > 0.95 and a node with f > 1.08 is seen, by the last term of k_J,
+ * noise of J decays where f Jbar > 1 and a node with f > 1.08 is seen, by the last term of k_J,
  * Jbar being the mean over a cell; a packed tank costs it 1.1 times as much a step, a block of 1.15
  * times its density 1.5. Not so in scenes with solids, with sharp_gradients or with densities that
  * differ by more than 1 %, nor within reach of sticky colliders.
@@ -309,8 +309,13 @@
  * s mu/(rho h^2) is far above 1 bodies with a curved surface brake what turns along it, as faces
  * are flat within a cell: a bucket of 13 cells across at 1/1000 of the rate of a sticky one.
  *     Where a step outlasts a fall, |g| dt^2 > h, six layers of faces go on from liquid, as far as
- * its particles see, else what falls around would count as its motion. A cylinder of 8 cells that
- * spreads on a sticky floor follows Huppert's law within 5 % in 120 steps (tests: semi_current).
+ * its particles see, else what falls around would count as its motion. What no liquid is near, and
+ * something sticky within half a cell, stays there. A cylinder that spreads on a sticky floor
+ * follows Huppert's law within 5 % to t g H^3/(nu R0^2) = 3 in 40 steps; one of 12 cells from 0.3
+ * to 30 in 700, most of them where single particles fall from its front (tests: semi_current).
+ *     Where nu dt > 22 h^2 viscosity takes in a step what faces remember and particles do not see,
+ * so it is forgotten, by (16 h^2/(nu dt))^2; and where steps are longer than a quarter of the time
+ * in which a surface of the domain's width levels, places of the stage go without the acceleration.
  *     Steps go from a fall to creeping: waves on a pool of 16 cells fall level at the exact rate
  * within 1 % in steps of a tenth of their time constant, whatever the viscosity, at
  * s mu/(rho h^2) up to 1e12. Materials that differ in viscosity do so by at most a factor of 30
@@ -8849,7 +8854,8 @@ typedef struct gs4i_integrator {
     gs4_real s;          /* s = alpha_f gamma dt / alpha_m: weight of the new rate at the stage */
     gs4_real before;     /* y** = y + before r: alpha_f dt - s; 0 for symplectic Euler */
     gs4_real next_shift; /* prediction.shift of the next step */
-    int restart;         /* no rates yet: first step, or after an edit */
+    gs4_real inertia; /* 1, and less where viscosity takes all in a step: see gs4i_predict_faces */
+    int restart;      /* no rates yet: first step, or after an edit */
     /* Share of feedback after an impact. As a rate a it gives velocity in later steps, too; after
      * a first step, which takes it whole, (alpha_m - gamma) a dt in all. */
     gs4_real impact;
@@ -17319,9 +17325,9 @@ static void gs4i_load_pressure(const gs4_sim *sim, int o, const gs4i_integrator 
 }
 
 /* dJ/dt has k (Jbar - J) more, implicit in J, for particles i to i + n; u: nodes' masses there.
- * Not where f Jbar < 0.95, by surfaces: with that tanks sank by 4 % in a minute of rest after 100
+ * Not where f Jbar < 1, by surfaces: with that tanks sank by 4 % in a minute of rest after 100
  * jolts. With 1.02 their energy grew by 3e-3. */
-#define GS4I_LEAST_PACKED 0.95
+#define GS4I_LEAST_PACKED 1
 static void gs4i_settle_volume(const gs4i_response *r, const gs4i_pressure_tile *t,
                                const gs4i_stencils *s, size_t i, int n, const gs4i_gathered *u,
                                gs4i_batch *q)
@@ -18347,7 +18353,9 @@ static const gs4_real *gs4i_remembered_of_face(const gs4_sim *sim, const int at[
 }
 
 /* ag, which faces without one take from the particles; v** = v_i - s ag; the first guess of u~:
- * v** + s (forces of stress over mass + g). */
+ * v** + s (forces of stress over mass + g). What of ag particles do not see, being rough from face
+ * to face, no particle takes out of v_i again. Where viscosity leaves u~ = 0 it would stay for ever,
+ * so there ag is what particles have: nu dt > 22 h^2. */
 static void gs4i_predict_faces(int z, void *context)
 {
     const gs4i_staggered_pass *pass = (const gs4i_staggered_pass *)context;
@@ -18363,7 +18371,7 @@ static void gs4i_predict_faces(int z, void *context)
             const gs4_real m = q[GS4I_FACE_MASS], *ag = gs4i_remembered_of_face(sim, at, c);
             gs4_real acc = gravity[c];
             if (f->force[c] && m > pass->lightest) acc = f->force[c][i] / m + acc;
-            if (ag && !f->is_plain) q[GS4I_FACE_RATE] = *ag;
+            if (ag && !f->is_plain) q[GS4I_FACE_RATE] += r->inertia * (*ag - q[GS4I_FACE_RATE]);
             if (r->restart) q[GS4I_FACE_RATE] = 0;
             f->seen[c][i] = q[GS4I_FACE_VELOCITY];
             q[GS4I_FACE_VELOCITY] -= r->s * q[GS4I_FACE_RATE];
@@ -20436,6 +20444,7 @@ static int gs4i_accelerate_faces(gs4_sim *sim, gs4i_node_pass *nodes,
     gs4i_parallel_for(&sim->tasks, planes + 1, gs4i_finish_taken, &pass);
     gs4i_mirror_faces(sim, f->taken, gs4i_fill_taken);
     f->is_safe = !sim->particles.elastic_reals && !sim->particles.deformation_reals
+                 && !(f->is_implicit && gs4i_outlasts_fall(sim)) /* what nothing holds falls */
                  && fastest * sim->integrator.dt < sim->grid.h
                  && most * sim->integrator.dt < GS4I_C(GS4I_SAFE_STRAIN);
     sim->seconds[GS4I_CLOCK_SOLVE] += gs4i_since(sim, start);
@@ -20494,6 +20503,29 @@ GS4I_INLINE int gs4i_is_near_liquid(const gs4i_taken_tiles *t, const gs4i_stenci
     return t->near_liquid[middle / GS4I_TILE] >> middle % GS4I_TILE & 1;
 }
 
+/* Does something sticky hold what is at p, so near to it that a cell of it would be half in it? Then
+ * that has the velocity `own`. */
+static int gs4i_sticks_to(const gs4_sim *sim, gs4_vec3 p, gs4_vec3 *own)
+{
+    const gs4i_grid *g = &sim->grid;
+    const gs4i_boundary *b = &sim->boundary;
+    const gs4_real from_low[3] = { p.x - g->origin.x, p.y - g->origin.y, p.z - g->origin.z },
+                   reach = GS4I_C(0.5) * g->h;
+    int i;
+    *own = gs4i_vec3(0, 0, 0);
+    for (i = 0; i < 6; i++) {
+        const gs4_real low = from_low[i / 2], size = GS4I_C(g->cells[i / 2]) * g->h;
+        if (b->walls[i] == GS4_WALL_STICK && (i & 1 ? size - low : low) < reach) return 1;
+    }
+    for (i = 0; i < b->collider_count; i++) {
+        const gs4i_collider *c = &b->colliders[i];
+        if (!gs4i_is_sticky(c) || gs4i_collider_distance(c, p) >= reach) continue;
+        *own = gs4i_collider_velocity(c, p);
+        return 1;
+    }
+    return 0;
+}
+
 /* Component c for all: u~, acc and feedback, v_i, u_c, and the slopes of u~. */
 static void gs4i_gather_component(const gs4_sim *sim, int c, const gs4i_taken_tiles *t,
                                   const gs4i_batch *q, int n, const gs4i_stencils s[4],
@@ -20511,7 +20543,16 @@ static void gs4i_gather_component(const gs4_sim *sim, int c, const gs4i_taken_ti
             gs4i_x_weights(&s[1 + c], b, &x, &d);
             gs4i_gather_local(t->face[c] + 4 * s[1 + c].base[b], &s[1 + c], b, &x, &d, g);
         } else {
+            gs4_vec3 own;
             memcpy(g->value + 4 * b, alone, sizeof alone);
+            if (sim->staggered.is_implicit
+                && gs4i_sticks_to(sim,
+                                  gs4i_vec3(GS4I_NTH_CONST(q->x[0], b), GS4I_NTH_CONST(q->x[1], b),
+                                            GS4I_NTH_CONST(q->x[2], b)),
+                                  &own)) {
+                g->value[4 * b] = gs4i_axis_of(own, c);
+                g->value[4 * b + 1] = (gs4i_axis_of(own, c) - (v + r->before * a)) / r->s;
+            }
             g->dx[4 * b] = g->dy[4 * b] = g->dz[4 * b] = 0;
         }
     }
@@ -23589,6 +23630,9 @@ static int gs4i_empty_shape(gs4_sim *sim, const gs4_shape *shape)
 static int gs4i_fail_bad(gs4_sim *sim, const gs4i_report *r)
 {
     gs4i_text t = gs4i_begin_error(&sim->error);
+    if (r->bad == GS4I_BAD_MOTION && sim->desc.scheme == GS4_SEMI_IMPLICIT
+        && gs4i_outlasts_fall(sim)) /* something fell */
+        sim->stage_limit = GS4I_SQRT(sim->grid.h / gs4i_length(sim->desc.gravity));
     gs4i_put(&t, "particle ");
     gs4i_put_integer(&t, (int64_t)r->bad_id);
     gs4i_put(
@@ -23843,6 +23887,24 @@ static gs4_real gs4i_viscous_number(const gs4_sim *sim, gs4_real dt)
     return most * dt * sim->grid.inv_h * sim->grid.inv_h;
 }
 
+/* Does the surface of something that viscosity holds (nu dt > 22 h^2) creep back by more than a
+ * quarter in dt, as far as a deep liquid's longest wave? At the stage x + alpha_f dt dx/dt is stable
+ * there, see gs4i_stable_semi_implicit_dt; with the acceleration as well, nearer to where surfaces
+ * will be, waves swing by themselves from a rate times dt of 4/7 on, 2/5 with backward Euler. */
+static int gs4i_levels_at_once(const gs4_sim *sim, gs4_real dt)
+{
+    const int *n = sim->desc.cells;
+    const gs4_real h = sim->grid.h, waves = gs4i_length(sim->desc.gravity) * h
+                                            * GS4I_C(fmax(n[0], fmax(n[1], n[2])))
+                                            / GS4I_C(2 * 3.14159265358979);
+    int i;
+    for (i = 0; i < sim->material_count; i++) {
+        const gs4_real nu = sim->constants[i].viscosity * sim->constants[i].inv_density;
+        if (nu * dt > 22 * h * h && waves * dt > GS4I_C(0.25) * nu) return 1;
+    }
+    return 0;
+}
+
 /* Without rates alpha_f = 1/2 would answer what is faster than the step with the opposite of it, so
  * it goes to 1, backward Euler, as `excess` grows, what the step is too long by. */
 static void gs4i_damp_first_step(gs4i_integrator *k, gs4_real excess)
@@ -23864,9 +23926,11 @@ static gs4i_integrator gs4i_make_integrator(const gs4_sim *sim, gs4_real dt)
     if (k.restart && sim->desc.integrator == GS4_INTEGRATOR_GS4)
         k.impact /= 1 + k.alpha_m - k.gamma;
     if (k.restart) gs4i_family(&k, r, s, 1);
-    if (k.restart && sim->desc.scheme == GS4_SEMI_IMPLICIT) {
+    k.inertia = 1;
+    if (sim->desc.scheme == GS4_SEMI_IMPLICIT) {
         const gs4_real excess = gs4i_viscous_number(sim, dt) / 16;
-        gs4i_damp_first_step(&k, excess * excess);
+        if (k.restart) gs4i_damp_first_step(&k, excess * excess);
+        k.inertia = 1 / gs4i_max(excess * excess, GS4I_C(1));
     }
     if (sim->desc.integrator == GS4_INTEGRATOR_BACKWARD_EULER) k.alpha_m = k.alpha_f = k.gamma = 1;
     k.affine_ratio = k.restart || sim->desc.integrator != GS4_INTEGRATOR_GS4 || !(sim->last_dt > 0)
@@ -23874,9 +23938,11 @@ static gs4i_integrator gs4i_make_integrator(const gs4_sim *sim, gs4_real dt)
                          : dt / GS4I_C(sim->last_dt);
     k.prediction.ahead = with_rates && !grown ? k.alpha_f * dt : GS4I_C(0);
     k.prediction.shift = sim->restart ? GS4I_C(0) : sim->shift;
-    k.prediction.bend = sim->desc.scheme != GS4_EXPLICIT
-                            ? GS4I_C(0.5) * k.prediction.ahead * k.prediction.ahead
-                            : GS4I_C(0);
+    k.prediction.bend =
+        sim->desc.scheme == GS4_PARTITIONED
+                || (sim->desc.scheme == GS4_SEMI_IMPLICIT && !gs4i_levels_at_once(sim, dt))
+            ? GS4I_C(0.5) * k.prediction.ahead * k.prediction.ahead
+            : GS4I_C(0);
     k.next_shift = (k.gamma - GS4I_C(0.5)) * dt;
     if (!k.restart && sim->desc.scheme == GS4_PARTITIONED
         && sim->desc.integrator == GS4_INTEGRATOR_GS4 && sim->shift != k.next_shift)
@@ -28927,6 +28993,9 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  * Where steps outlast a fall by far they are a fifth as many, as six layers of faces go on from
  * liquid. Noise decays more slowly where all motion that the grid does not see does at once (dt
  * above 0.5 s): by both, single particles swung for ever. A first step that is longer than flow
- * lasts takes it to rest, before to its opposite.
+ * lasts takes it to rest, before to its opposite. In steps that outlast a fall motion between
+ * neighbours dies, which lasted for hundreds of steps; surfaces that level swing no more near the
+ * limit; single particles stay on sticky walls and bodies, where they slid, and a step that would
+ * let them fall through more than two cells is refused.
  * Partitioned: what flies past dry walls does not feel them, falls in uneven steps are exact, the
  * limit of viscosity is that of the member. */

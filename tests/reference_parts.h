@@ -502,7 +502,7 @@ static void ref_restart(ref_sim *s)
 /* --- symplectic Euler: MLS-MPM with APIC ------------------------------------------------------ */
 
 /* J goes to B = 1 + sum w b_i / (rho0 c0^2/7 sum w near_i) at the rate c0 |B - J| / h - g / c0,
- * implicit in J, where f B > 0.95 and one of the nodes is packed, m_i > 1.08 rho0 h^3. */
+ * implicit in J, where f B > 1 and one of the nodes is packed, m_i > 1.08 rho0 h^3. */
 static void ref_settle(const ref_sim *s, ref_particle *p, const ref_stencil *t)
 {
     const double g = sqrt(s->g[0] * s->g[0] + s->g[1] * s->g[1] + s->g[2] * s->g[2]);
@@ -515,7 +515,7 @@ static void ref_settle(const ref_sim *s, ref_particle *p, const ref_stencil *t)
     }
     b = 1 + b / (ref_tait(p->is) * near);
     if (!(s->unpacking > 0 && most > 1.08 * s->least_rho * s->h * s->h * s->h)) return;
-    if (!(ref_filled(s, t) * b > 0.95)) return;
+    if (!(ref_filled(s, t) * b > 1)) return;
     decay = s->dt * fmax(0, s->most_c0 * fabs(b - p->J) / s->h - g / s->most_c0);
     p->J += decay / (1 + decay) * (b - p->J);
 }

@@ -680,17 +680,19 @@ static void test_semi_levelling_limit(void)
             if (i < 50) most = fmax(most, gs4_get_stats(sim).kinetic_energy);
             if (i > 75) late = fmax(late, gs4_get_stats(sim).kinetic_energy);
         }
-        CHECK_BETWEEN(late, 0, viscosity[c / 2] < 0.01 ? most : 0.5 * most);
+        CHECK_BETWEEN(late, 0, viscosity[c / 2] < 0.01 ? most : 0.01 * most);
+        if (test_filter[0])
+            printf("viscosity %g: %.2e of it late\n", viscosity[c / 2], late / most);
         gs4_destroy(sim);
     }
 }
 
 /* A cylinder of liquid spreads on a sticky floor by its weight, in steps that outlast a fall
- * thousands of times: R = .89391 (g V^3 t/(3 nu))^(1/8) (Huppert 1982), which such a block follows
- * from t g H^3/(nu R0^2) = 1 on within 5 % (shared/reference, lubrication). A quarter of it,
- * between two slippery walls. With what kernels saw of falling faces around it took 548 steps of
- * cfl 0.5 at 8 cells, 117 without; with one particle's sub-grid velocity that swung 123 to 148 of
- * 0.8. */
+ * 1e4 times: R = .89391 (g V^3 t/(3 nu))^(1/8) (Huppert 1982), which such a block follows from
+ * t g H^3/(nu R0^2) = .3 on within 5 % (shared/reference, lubrication), with --slow over two decades.
+ * A quarter of it, between two slippery walls. To 3 it takes 24 to 26 steps; with what kernels saw of
+ * falling faces around it took 548 at 8 cells, with what faces remember and particles do not see 90
+ * to 117. */
 static void test_semi_current(void)
 {
     const double g = 10, nu = 1e4, height = 0.5, unit = nu / (g * height * height * height);
@@ -717,8 +719,9 @@ static void test_semi_current(void)
         f.material = gs4_add_material(sim, &m);
         CHECK(gs4_add_particles(sim, gs4_cylinder(at(0, 0, 0), at(top[0], top[1], top[2]), 1), &f)
               > 0);
-        for (k = 0; k < 2; k++) {
-            const double volume = 4 * gs4_get_stats(sim).mass / 1000, T = k ? 3 : 1;
+        for (k = 0; k < (test_slow && turn == 3 ? 5 : 3); k++) {
+            static const double times[5] = { 0.3, 1, 3, 10, 30 };
+            const double volume = 4 * gs4_get_stats(sim).mass / 1000, T = times[k];
             double front = 0, law;
             gs4_view x;
             CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)(T * unit - gs4_get_stats(sim).time)),
@@ -733,8 +736,8 @@ static void test_semi_current(void)
                 printf("axis %d: %.4f of the law at %g in %d steps\n", a, front / law, T,
                        (int)gs4_get_stats(sim).steps);
             CHECK_BETWEEN(front / law, 0.95, 1.05);
+            CHECK(gs4_get_stats(sim).steps < (k < 3 ? 40 : 700));
         }
-        CHECK(gs4_get_stats(sim).steps < 115);
         gs4_destroy(sim);
     }
 }

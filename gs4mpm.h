@@ -311,10 +311,10 @@
  *     Where a step outlasts a fall, |g| dt^2 > h, six layers of faces go on from liquid, as far as
  * its particles see, else what falls around would count as its motion. What no liquid is near, and
  * something sticky within half a cell, stays there. A cylinder that spreads on a sticky floor
- * follows Huppert's law within 5 % to t g H^3/(nu R0^2) = 3 in 40 steps; one of 12 cells from 0.3
+ * follows Huppert's law within 5 % to t g H^3/(nu R0^2) = 3 in 60 steps; one of 12 cells from 0.3
  * to 30 in 700, most of them where single particles fall from its front (tests: semi_current).
- *     Where nu dt > 22 h^2 viscosity takes in a step what faces remember and particles do not see,
- * so it is forgotten, by (16 h^2/(nu dt))^2; and where steps are longer than a quarter of the time
+ *     Where nu dt > 22 h^2 viscosity leaves nothing that would take from faces what they remember
+ * and particles do not see, so a tenth of it is forgotten in each step; and where steps are longer than a quarter of the time
  * in which a surface of the domain's width levels, places of the stage go without the acceleration.
  *     Steps go from a fall to creeping: waves on a pool of 16 cells fall level at the exact rate
  * within 1 % in steps of a tenth of their time constant, whatever the viscosity, at
@@ -8854,8 +8854,8 @@ typedef struct gs4i_integrator {
     gs4_real s;          /* s = alpha_f gamma dt / alpha_m: weight of the new rate at the stage */
     gs4_real before;     /* y** = y + before r: alpha_f dt - s; 0 for symplectic Euler */
     gs4_real next_shift; /* prediction.shift of the next step */
-    gs4_real inertia; /* 1, and less where viscosity takes all in a step: see gs4i_predict_faces */
-    int restart;      /* no rates yet: first step, or after an edit */
+    gs4_real inertia;    /* 1, 0.9 where viscosity takes all in a step: see gs4i_predict_faces */
+    int restart;         /* no rates yet: first step, or after an edit */
     /* Share of feedback after an impact. As a rate a it gives velocity in later steps, too; after
      * a first step, which takes it whole, (alpha_m - gamma) a dt in all. */
     gs4_real impact;
@@ -18355,7 +18355,7 @@ static const gs4_real *gs4i_remembered_of_face(const gs4_sim *sim, const int at[
 /* ag, which faces without one take from the particles; v** = v_i - s ag; the first guess of u~:
  * v** + s (forces of stress over mass + g). What of ag particles do not see, being rough from face
  * to face, no particle takes out of v_i again. Where viscosity leaves u~ = 0 it would stay for ever,
- * so there ag is what particles have: nu dt > 22 h^2. */
+ * so there, nu dt > 22 h^2, a tenth of it goes in each step. */
 static void gs4i_predict_faces(int z, void *context)
 {
     const gs4i_staggered_pass *pass = (const gs4i_staggered_pass *)context;
@@ -23930,7 +23930,8 @@ static gs4i_integrator gs4i_make_integrator(const gs4_sim *sim, gs4_real dt)
     if (sim->desc.scheme == GS4_SEMI_IMPLICIT) {
         const gs4_real excess = gs4i_viscous_number(sim, dt) / 16;
         if (k.restart) gs4i_damp_first_step(&k, excess * excess);
-        k.inertia = 1 / gs4i_max(excess * excess, GS4I_C(1));
+        /* all of it at once would brake what turns: .7 % in half a turn of 40 steps, so .1 % */
+        k.inertia = gs4i_max(GS4I_C(0.9), 1 / gs4i_max(excess * excess, GS4I_C(1)));
     }
     if (sim->desc.integrator == GS4_INTEGRATOR_BACKWARD_EULER) k.alpha_m = k.alpha_f = k.gamma = 1;
     k.affine_ratio = k.restart || sim->desc.integrator != GS4_INTEGRATOR_GS4 || !(sim->last_dt > 0)

@@ -223,8 +223,8 @@
  *     dJ/dt gets c0/(200 h) (max(1.08/f, 0.9) - J~), at most 0,
  * with both explicit integrators, and pressure makes room: the depth is 0.998, after 100 jolts
  * 0.988. Fresh fillings have J f up to 1.03; they, smooth flow and surfaces stay below 1.08 and are
- * left alone, films and spray too. It adds less than 1e-3 to the energy: with symplectic Euler, too,
- * noise of J decays where f Jbar > 1 and a node with f > 1.08 is seen, by the last term of k_J,
+ * left alone, films and spray too. It adds less than 1e-3 to the energy: with symplectic Euler,
+ * too, noise of J decays where f Jbar > 1 and a node with f > 1.08 is seen, by the last term of k_J,
  * Jbar being the mean over a cell; a packed tank costs it 1.1 times as much a step, a block of 1.15
  * times its density 1.5. Not so in scenes with solids, with sharp_gradients or with densities that
  * differ by more than 1 %, nor within reach of sticky colliders.
@@ -313,9 +313,10 @@
  * something sticky within half a cell, stays there. A cylinder that spreads on a sticky floor
  * follows Huppert's law within 5 % to t g H^3/(nu R0^2) = 3 in 60 steps; one of 12 cells from 0.3
  * to 30 in 700, most of them where single particles fall from its front (tests: semi_current).
- *     Where nu dt > 22 h^2 viscosity leaves nothing that would take from faces what they remember
- * and particles do not see, so a tenth of it is forgotten in each step; and where steps are longer than a quarter of the time
- * in which a surface of the domain's width levels, places of the stage go without the acceleration.
+ *     Where nu dt > 16 h^2 viscosity leaves nothing that would take from faces what they remember
+ * and particles do not see, so a tenth of it is forgotten in each step; and where steps are longer
+ * than a quarter of the time in which a surface of the domain's width levels, places of the stage
+ * go without the acceleration.
  *     Steps go from a fall to creeping: waves on a pool of 16 cells fall level at the exact rate
  * within 1 % in steps of a tenth of their time constant, whatever the viscosity, at
  * s mu/(rho h^2) up to 1e12. Materials that differ in viscosity do so by at most a factor of 30
@@ -18353,9 +18354,9 @@ static const gs4_real *gs4i_remembered_of_face(const gs4_sim *sim, const int at[
 }
 
 /* ag, which faces without one take from the particles; v** = v_i - s ag; the first guess of u~:
- * v** + s (forces of stress over mass + g). What of ag particles do not see, being rough from face
- * to face, no particle takes out of v_i again. Where viscosity leaves u~ = 0 it would stay for ever,
- * so there, nu dt > 22 h^2, a tenth of it goes in each step. */
+ * v** + s (forces of stress over mass + g). What of ag particles do not see, as it is rough from
+ * face to face, no particle takes out of v_i again. Where viscosity leaves u~ = 0 it would stay for
+ * ever, so there, nu dt > 16 h^2, a tenth of it goes in each step. */
 static void gs4i_predict_faces(int z, void *context)
 {
     const gs4i_staggered_pass *pass = (const gs4i_staggered_pass *)context;
@@ -20503,8 +20504,8 @@ GS4I_INLINE int gs4i_is_near_liquid(const gs4i_taken_tiles *t, const gs4i_stenci
     return t->near_liquid[middle / GS4I_TILE] >> middle % GS4I_TILE & 1;
 }
 
-/* Does something sticky hold what is at p, so near to it that a cell of it would be half in it? Then
- * that has the velocity `own`. */
+/* Does something sticky hold what is at p, within half a cell of it? Then that has the velocity
+ * `own`. */
 static int gs4i_sticks_to(const gs4_sim *sim, gs4_vec3 p, gs4_vec3 *own)
 {
     const gs4i_grid *g = &sim->grid;
@@ -23888,9 +23889,10 @@ static gs4_real gs4i_viscous_number(const gs4_sim *sim, gs4_real dt)
 }
 
 /* Does the surface of something that viscosity holds (nu dt > 22 h^2) creep back by more than a
- * quarter in dt, as far as a deep liquid's longest wave? At the stage x + alpha_f dt dx/dt is stable
- * there, see gs4i_stable_semi_implicit_dt; with the acceleration as well, nearer to where surfaces
- * will be, waves swing by themselves from a rate times dt of 4/7 on, 2/5 with backward Euler. */
+ * quarter in dt, as far as a deep liquid's longest wave does? At the stage x + alpha_f dt dx/dt is
+ * stable there, see gs4i_stable_semi_implicit_dt; with the acceleration as well, nearer to where
+ * surfaces will be, waves swing by themselves from a rate times dt of 4/7 on, 2/5 with backward
+ * Euler. */
 static int gs4i_levels_at_once(const gs4_sim *sim, gs4_real dt)
 {
     const int *n = sim->desc.cells;
@@ -23912,6 +23914,14 @@ static void gs4i_damp_first_step(gs4i_integrator *k, gs4_real excess)
     k->alpha_f = gs4i_max(k->alpha_f, 1 - 1 / gs4i_max(excess, GS4I_C(1)));
 }
 
+/* The same of the semi-implicit scheme; and faces forget. All at once would brake what turns, by .7 %
+ * in half a turn of 40 steps, so by .1 %. */
+static void gs4i_damp_creeping(gs4i_integrator *k, gs4_real excess)
+{
+    if (k->restart) gs4i_damp_first_step(k, excess * excess);
+    k->inertia = gs4i_max(GS4I_C(0.9), 1 / gs4i_max(excess * excess, GS4I_C(1)));
+}
+
 static gs4i_integrator gs4i_make_integrator(const gs4_sim *sim, gs4_real dt)
 {
     const gs4_real r = sim->desc.rho_inf, s = sim->desc.rho_inf_spurious, h = sim->grid.h;
@@ -23927,12 +23937,8 @@ static gs4i_integrator gs4i_make_integrator(const gs4_sim *sim, gs4_real dt)
         k.impact /= 1 + k.alpha_m - k.gamma;
     if (k.restart) gs4i_family(&k, r, s, 1);
     k.inertia = 1;
-    if (sim->desc.scheme == GS4_SEMI_IMPLICIT) {
-        const gs4_real excess = gs4i_viscous_number(sim, dt) / 16;
-        if (k.restart) gs4i_damp_first_step(&k, excess * excess);
-        /* all of it at once would brake what turns: .7 % in half a turn of 40 steps, so .1 % */
-        k.inertia = gs4i_max(GS4I_C(0.9), 1 / gs4i_max(excess * excess, GS4I_C(1)));
-    }
+    if (sim->desc.scheme == GS4_SEMI_IMPLICIT)
+        gs4i_damp_creeping(&k, gs4i_viscous_number(sim, dt) / 16);
     if (sim->desc.integrator == GS4_INTEGRATOR_BACKWARD_EULER) k.alpha_m = k.alpha_f = k.gamma = 1;
     k.affine_ratio = k.restart || sim->desc.integrator != GS4_INTEGRATOR_GS4 || !(sim->last_dt > 0)
                          ? GS4I_C(0)

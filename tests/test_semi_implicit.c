@@ -688,11 +688,11 @@ static void test_semi_levelling_limit(void)
 }
 
 /* A cylinder of liquid spreads on a sticky floor by its weight, in steps that outlast a fall
- * 1e4 times: R = .89391 (g V^3 t/(3 nu))^(1/8) (Huppert 1982), which such a block follows from
- * t g H^3/(nu R0^2) = .3 on within 5 % (shared/reference, lubrication), with --slow over two decades.
- * A quarter of it, between two slippery walls. To 3 it takes 41 to 44 steps; with what kernels saw of
- * falling faces around it took 548 at 8 cells, with what faces remember and particles do not see 90
- * to 117. */
+ * thousands of times: R = .89391 (g V^3 t/(3 nu))^(1/8) (Huppert 1982), which such a block follows
+ * from t g H^3/(nu R0^2) = .3 on within 5 % (shared/reference, lubrication), with --slow over two
+ * decades. A quarter of it, between two slippery walls. To 3 it takes 41 to 44 steps; with what
+ * kernels saw of falling faces around it took 548 at 8 cells, with what faces remember and
+ * particles do not see 90 to 117. */
 static void test_semi_current(void)
 {
     const double g = 10, nu = 1e4, height = 0.5, unit = nu / (g * height * height * height);

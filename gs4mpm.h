@@ -224,8 +224,8 @@
  * with both explicit integrators, and pressure makes room: the depth is 0.998, after 100 jolts
  * 0.988. Fresh fillings have J f up to 1.03; they, smooth flow and surfaces stay below 1.08 and are
  * left alone, films and spray too. It adds less than 1e-3 to the energy: with symplectic Euler,
- * too, noise of J decays where f Jbar > 1 and a node with f > 1.08 is seen, by the last term of k_J,
- * Jbar being the mean over a cell; a packed tank costs it 1.1 times as much a step, a block of 1.15
+ * too, noise of J decays where f Jbar > 1 and a node with f > 1.08 is seen, by the last term of
+ * k_J, Jbar being the mean over a cell; a packed tank costs it 1.1 times as much a step, a block of 1.15
  * times its density 1.5. Not so in scenes with solids, with sharp_gradients or with densities that
  * differ by more than 1 %, nor within reach of sticky colliders.
  *
@@ -23914,8 +23914,8 @@ static void gs4i_damp_first_step(gs4i_integrator *k, gs4_real excess)
     k->alpha_f = gs4i_max(k->alpha_f, 1 - 1 / gs4i_max(excess, GS4I_C(1)));
 }
 
-/* The same of the semi-implicit scheme; and faces forget. All at once would brake what turns, by .7 %
- * in half a turn of 40 steps, so by .1 %. */
+/* The same of the semi-implicit scheme; and faces forget. All at once would brake what turns, by
+ * .7 % in half a turn of 40 steps, so by .1 %. */
 static void gs4i_damp_creeping(gs4i_integrator *k, gs4_real excess)
 {
     if (k->restart) gs4i_damp_first_step(k, excess * excess);

@@ -225,9 +225,9 @@
  * 0.988. Fresh fillings have J f up to 1.03; they, smooth flow and surfaces stay below 1.08 and are
  * left alone, films and spray too. It adds less than 1e-3 to the energy: with symplectic Euler,
  * too, noise of J decays where f Jbar > 1 and a node with f > 1.08 is seen, by the last term of
- * k_J, Jbar being the mean over a cell; a packed tank costs it 1.1 times as much a step, a block of 1.15
- * times its density 1.5. Not so in scenes with solids, with sharp_gradients or with densities that
- * differ by more than 1 %, nor within reach of sticky colliders.
+ * k_J, Jbar being the mean over a cell; a packed tank costs it 1.1 times as much a step, a block of
+ * 1.15 times its density 1.5. Not so in scenes with solids, with sharp_gradients or with densities
+ * that differ by more than 1 %, nor within reach of sticky colliders.
  *
  * In detail, as tests/reference_step.h has it in plain loops:
  *     S3  sqrt(2) |spin~| dt (Euler: |C| dt) counts by at most 1/4.

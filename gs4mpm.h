@@ -171,7 +171,7 @@
  * step, (gamma - 1/2) dt: what changes evenly in time stays exact. The first step, and the first
  * after an edit, has alpha_m = gamma = 1, alpha_f = 1/2 and no rates; alpha_f of heat is
  * 1 - h^2/(D dt), if that is more, D = k/(rho c), and that of the semi-implicit scheme
- * 1 - (16 h^2/(nu dt))^2, nu the largest mu/rho. Where R depends on y~ itself, linearly, (4) is
+ * without solids 1 - (16 h^2/(nu dt))^2, nu the largest mu/rho. Where R depends on y~ itself, linearly, (4) is
  * solved for it:
  *     (y~ - y**) / s = R(y~),   y** = y + (alpha_f dt - s) r,   s = alpha_f gamma dt / alpha_m
  *
@@ -23937,7 +23937,7 @@ static gs4i_integrator gs4i_make_integrator(const gs4_sim *sim, gs4_real dt)
         k.impact /= 1 + k.alpha_m - k.gamma;
     if (k.restart) gs4i_family(&k, r, s, 1);
     k.inertia = 1;
-    if (sim->desc.scheme == GS4_SEMI_IMPLICIT)
+    if (sim->desc.scheme == GS4_SEMI_IMPLICIT && !sim->particles.deformation_reals)
         gs4i_damp_creeping(&k, gs4i_viscous_number(sim, dt) / 16);
     if (sim->desc.integrator == GS4_INTEGRATOR_BACKWARD_EULER) k.alpha_m = k.alpha_f = k.gamma = 1;
     k.affine_ratio = k.restart || sim->desc.integrator != GS4_INTEGRATOR_GS4 || !(sim->last_dt > 0)

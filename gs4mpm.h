@@ -171,8 +171,8 @@
  * step, (gamma - 1/2) dt: what changes evenly in time stays exact. The first step, and the first
  * after an edit, has alpha_m = gamma = 1, alpha_f = 1/2 and no rates; alpha_f of heat is
  * 1 - h^2/(D dt), if that is more, D = k/(rho c), and that of the semi-implicit scheme
- * without solids 1 - (16 h^2/(nu dt))^2, nu the largest mu/rho. Where R depends on y~ itself, linearly, (4) is
- * solved for it:
+ * without solids 1 - (16 h^2/(nu dt))^2, nu the largest mu/rho. Where R depends on y~ itself,
+ * linearly, (4) is solved for it:
  *     (y~ - y**) / s = R(y~),   y** = y + (alpha_f dt - s) r,   s = alpha_f gamma dt / alpha_m
  *
  * THE STEP, as in gs4i_make_step:
@@ -20546,7 +20546,7 @@ static void gs4i_gather_component(const gs4_sim *sim, int c, const gs4i_taken_ti
         } else {
             gs4_vec3 own;
             memcpy(g->value + 4 * b, alone, sizeof alone);
-            if (sim->staggered.is_implicit
+            if (sim->staggered.is_implicit && !sim->particles.deformation_reals
                 && gs4i_sticks_to(sim,
                                   gs4i_vec3(GS4I_NTH_CONST(q->x[0], b), GS4I_NTH_CONST(q->x[1], b),
                                             GS4I_NTH_CONST(q->x[2], b)),
@@ -23900,7 +23900,7 @@ static int gs4i_levels_at_once(const gs4_sim *sim, gs4_real dt)
                                             * GS4I_C(fmax(n[0], fmax(n[1], n[2])))
                                             / GS4I_C(2 * 3.14159265358979);
     int i;
-    for (i = 0; i < sim->material_count; i++) {
+    for (i = 0; i < sim->material_count && !sim->particles.deformation_reals; i++) {
         const gs4_real nu = sim->constants[i].viscosity * sim->constants[i].inv_density;
         if (nu * dt > 22 * h * h && waves * dt > GS4I_C(0.25) * nu) return 1;
     }

@@ -18372,7 +18372,8 @@ static void gs4i_predict_faces(int z, void *context)
             const gs4_real m = q[GS4I_FACE_MASS], *ag = gs4i_remembered_of_face(sim, at, c);
             gs4_real acc = gravity[c];
             if (f->force[c] && m > pass->lightest) acc = f->force[c][i] / m + acc;
-            if (ag && !f->is_plain) q[GS4I_FACE_RATE] += r->inertia * (*ag - q[GS4I_FACE_RATE]);
+            if (ag && !f->is_plain) /* without rounding where all of it stays */
+                q[GS4I_FACE_RATE] = *ag + (1 - r->inertia) * (q[GS4I_FACE_RATE] - *ag);
             if (r->restart) q[GS4I_FACE_RATE] = 0;
             f->seen[c][i] = q[GS4I_FACE_VELOCITY];
             q[GS4I_FACE_VELOCITY] -= r->s * q[GS4I_FACE_RATE];

@@ -221,9 +221,9 @@
  * of its right depth after 16 jolts. So where J f > 1.08, f = sum w m_i / (rho0 h^3) around a
  * particle with mirror nodes as full as inner ones,
  *     dJ/dt gets c0/(200 h) (max(1.08/f, 0.9) - J~), at most 0,
- * with both explicit integrators, and pressure makes room: the depth is 0.998, after 100 jolts
- * 0.988. Fresh fillings have J f up to 1.03; they, smooth flow and surfaces stay below 1.08 and are
- * left alone, films and spray too. It adds less than 1e-3 to the energy: with symplectic Euler,
+ * with both explicit integrators, and pressure makes room: the depth is 0.998, after 100 jolts 0.98
+ * to 1.01. Fresh fillings have J f up to 1.03; they, smooth flow and surfaces stay below 1.08 and
+ * are left alone, films and spray too. It adds less than 1e-3 to the energy: with symplectic Euler,
  * too, noise of J decays where f Jbar > 1 and a node with f > 1.08 is seen, by the last term of
  * k_J, Jbar being the mean over a cell; a packed tank costs it 1.1 times as much a step, a block of
  * 1.15 times its density 1.5. Not so in scenes with solids, with sharp_gradients or with densities
@@ -312,7 +312,8 @@
  * its particles see, else what falls around would count as its motion. What no liquid is near, and
  * something sticky within half a cell, stays there. A cylinder that spreads on a sticky floor
  * follows Huppert's law within 5 % to t g H^3/(nu R0^2) = 3 in 60 steps; one of 12 cells from 0.3
- * to 30 in 700, most of them where single particles fall from its front (tests: semi_current).
+ * to 30 in 600 to 1000, most of them where single particles fall from its front (tests:
+ * semi_current).
  *     Where nu dt > 16 h^2 viscosity leaves nothing that would take from faces what they remember
  * and particles do not see, so a tenth of it is forgotten in each step; and where steps are longer
  * than a quarter of the time in which a surface of the domain's width levels, places of the stage
@@ -13860,20 +13861,24 @@ static int gs4i_separates(const gs4i_collider *b)
     return b->is.contact == GS4_WALL_SEPARATE && !b->is_emitter && !b->is_off;
 }
 
-/* Is a sticky wall, or a sticky body other than `c`, within `reach` (m) of p? */
+/* Is a sticky wall, or a sticky body other than `c`, within `reach` (m) of p? `by`, if it is not
+ * NULL, becomes the body, or NULL for a wall. */
 static int gs4i_sticks_elsewhere(const gs4i_boundary *b, const gs4i_grid *g, const gs4i_collider *c,
-                                 gs4_vec3 p, gs4_real reach)
+                                 gs4_vec3 p, gs4_real reach, const gs4i_collider **by)
 {
     const gs4_real from_low[3] = { p.x - g->origin.x, p.y - g->origin.y, p.z - g->origin.z };
     int i;
+    if (by) *by = NULL;
     for (i = 0; i < 6; i++) {
         const gs4_real low = from_low[i / 2], size = GS4I_C(g->cells[i / 2]) * g->h;
         if (b->walls[i] == GS4_WALL_STICK && (i & 1 ? size - low : low) < reach) return 1;
     }
     for (i = 0; i < b->collider_count; i++) {
         const gs4i_collider *other = &b->colliders[i];
-        if (other != c && gs4i_is_sticky(other) && gs4i_collider_distance(other, p) < reach)
-            return 1;
+        if (other == c || !gs4i_is_sticky(other) || gs4i_collider_distance(other, p) >= reach)
+            continue;
+        if (by) *by = other;
+        return 1;
     }
     return 0;
 }
@@ -13888,7 +13893,7 @@ static int gs4i_holds_node(const gs4i_boundary *b, const gs4i_grid *g, const gs4
 {
     if (d < 0 || !gs4i_is_sticky(c)) return d < 0;
     return d < GS4I_STICKY_REACH * g->h
-           && !gs4i_sticks_elsewhere(b, g, c, p, GS4I_IMAGE_REACH * g->h);
+           && !gs4i_sticks_elsewhere(b, g, c, p, GS4I_IMAGE_REACH * g->h, NULL);
 }
 
 /* What body `b` does to a node at p that it holds and that would go with velocity v and
@@ -17513,7 +17518,8 @@ static int gs4i_accelerate_euler(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     const gs4i_grid *g = &sim->grid;
     gs4i_integrator *k = &sim->integrator;
-    if (!gs4i_is_packed(k, gs4i_velocity(g), GS4I_BLOCK_NODES * (size_t)g->active))
+    if (k->volume_crossing > 0
+        && !gs4i_is_packed(k, gs4i_velocity(g), GS4I_BLOCK_NODES * (size_t)g->active))
         k->volume_crossing = 0;
     if (k->volume_crossing > 0) gs4i_scatter(sim, gs4i_scatter_pressure);
     if (k->unpacking > 0) gs4i_fill_mirror_masses(&sim->boundary, g);
@@ -17830,12 +17836,14 @@ static int gs4i_has_known_stress(const gs4_sim *sim)
            && !sim->particles.deformation_reals;
 }
 
-/* Would what nothing holds fall by more than a cell in this step? What has liquid around is held,
- * so all that it sees has to go on from that: corners of kernels are six faces away along axes. */
+/* Would what nothing holds fall by more than a cell in this step of the semi-implicit scheme? What
+ * has liquid around is held, so all that it sees has to go on from that: corners of kernels are six
+ * faces away along axes. */
 static int gs4i_outlasts_fall(const gs4_sim *sim)
 {
     const double dt = (double)sim->integrator.dt;
-    return (double)gs4i_length(sim->desc.gravity) * dt * dt > (double)sim->grid.h;
+    return sim->desc.scheme == GS4_SEMI_IMPLICIT
+           && (double)gs4i_length(sim->desc.gravity) * dt * dt > (double)sim->grid.h;
 }
 
 /* Room for a step, with nothing on the faces. */
@@ -17871,7 +17879,7 @@ static int gs4i_begin_staggered(gs4_sim *sim)
     for (a = 0; a < sim->material_count; a++) f->compressible |= sim->constants[a].compliance > 0;
     f->is_plain = f->compressible || gs4i_has_slippery(sim);
     f->layers = GS4I_FACE_LAYERS;
-    if (f->is_implicit && gs4i_outlasts_fall(sim)) f->layers *= 2;
+    if (gs4i_outlasts_fall(sim)) f->layers *= 2;
     return GS4_OK;
 }
 
@@ -20446,7 +20454,7 @@ static int gs4i_accelerate_faces(gs4_sim *sim, gs4i_node_pass *nodes,
     gs4i_parallel_for(&sim->tasks, planes + 1, gs4i_finish_taken, &pass);
     gs4i_mirror_faces(sim, f->taken, gs4i_fill_taken);
     f->is_safe = !sim->particles.elastic_reals && !sim->particles.deformation_reals
-                 && !(f->is_implicit && gs4i_outlasts_fall(sim)) /* what nothing holds falls */
+                 && !gs4i_outlasts_fall(sim) /* what nothing holds falls */
                  && fastest * sim->integrator.dt < sim->grid.h
                  && most * sim->integrator.dt < GS4I_C(GS4I_SAFE_STRAIN);
     sim->seconds[GS4I_CLOCK_SOLVE] += gs4i_since(sim, start);
@@ -20505,29 +20513,6 @@ GS4I_INLINE int gs4i_is_near_liquid(const gs4i_taken_tiles *t, const gs4i_stenci
     return t->near_liquid[middle / GS4I_TILE] >> middle % GS4I_TILE & 1;
 }
 
-/* Does something sticky hold what is at p, within half a cell of it? Then that has the velocity
- * `own`. */
-static int gs4i_sticks_to(const gs4_sim *sim, gs4_vec3 p, gs4_vec3 *own)
-{
-    const gs4i_grid *g = &sim->grid;
-    const gs4i_boundary *b = &sim->boundary;
-    const gs4_real from_low[3] = { p.x - g->origin.x, p.y - g->origin.y, p.z - g->origin.z },
-                   reach = GS4I_C(0.5) * g->h;
-    int i;
-    *own = gs4i_vec3(0, 0, 0);
-    for (i = 0; i < 6; i++) {
-        const gs4_real low = from_low[i / 2], size = GS4I_C(g->cells[i / 2]) * g->h;
-        if (b->walls[i] == GS4_WALL_STICK && (i & 1 ? size - low : low) < reach) return 1;
-    }
-    for (i = 0; i < b->collider_count; i++) {
-        const gs4i_collider *c = &b->colliders[i];
-        if (!gs4i_is_sticky(c) || gs4i_collider_distance(c, p) >= reach) continue;
-        *own = gs4i_collider_velocity(c, p);
-        return 1;
-    }
-    return 0;
-}
-
 /* Component c for all: u~, acc and feedback, v_i, u_c, and the slopes of u~. */
 static void gs4i_gather_component(const gs4_sim *sim, int c, const gs4i_taken_tiles *t,
                                   const gs4i_batch *q, int n, const gs4i_stencils s[4],
@@ -20545,16 +20530,7 @@ static void gs4i_gather_component(const gs4_sim *sim, int c, const gs4i_taken_ti
             gs4i_x_weights(&s[1 + c], b, &x, &d);
             gs4i_gather_local(t->face[c] + 4 * s[1 + c].base[b], &s[1 + c], b, &x, &d, g);
         } else {
-            gs4_vec3 own;
             memcpy(g->value + 4 * b, alone, sizeof alone);
-            if (sim->staggered.is_implicit && !sim->particles.deformation_reals
-                && gs4i_sticks_to(sim,
-                                  gs4i_vec3(GS4I_NTH_CONST(q->x[0], b), GS4I_NTH_CONST(q->x[1], b),
-                                            GS4I_NTH_CONST(q->x[2], b)),
-                                  &own)) {
-                g->value[4 * b] = gs4i_axis_of(own, c);
-                g->value[4 * b + 1] = (gs4i_axis_of(own, c) - (v + r->before * a)) / r->s;
-            }
             g->dx[4 * b] = g->dy[4 * b] = g->dz[4 * b] = 0;
         }
     }
@@ -20575,6 +20551,31 @@ static void gs4i_gather_from_cells(const gs4_sim *sim, const gs4i_taken_tiles *t
         gs4i_gather_value(t->cells + 4 * cells->base[b], cells, b, &x, value);
         slope->dx[4 * b + 3] = value[4 * b + GS4I_CELL_PRESSURE];
         if (sim->staggered.compressible) GS4I_NTH(div, b) = value[4 * b + GS4I_CELL_DIVERGENCE];
+    }
+}
+
+/* Semi-implicit liquids: what no liquid is near, and something sticky within half a cell, goes with
+ * that. Lanes beyond n, too, which hold the first of the batch. */
+static void gs4i_stick_alone(const gs4_sim *sim, const gs4i_taken_tiles *t, const gs4i_batch *q,
+                             const gs4i_stencils *cells, gs4i_face_corrections *k)
+{
+    const gs4i_integrator *r = &sim->integrator;
+    int b, c;
+    for (b = 0; b < GS4I_BATCH; b++) {
+        const gs4_vec3 p = gs4i_vec3(GS4I_NTH_CONST(q->x[0], b), GS4I_NTH_CONST(q->x[1], b),
+                                     GS4I_NTH_CONST(q->x[2], b));
+        const gs4i_collider *body;
+        gs4_vec3 own;
+        if (gs4i_is_near_liquid(t, cells, b)
+            || !gs4i_sticks_elsewhere(&sim->boundary, &sim->grid, NULL, p,
+                                      GS4I_C(0.5) * sim->grid.h, &body))
+            continue;
+        own = body ? gs4i_collider_velocity(body, p) : gs4i_vec3(0, 0, 0);
+        for (c = 0; c < 3; c++) {
+            const gs4_real v = GS4I_NTH_CONST(q->v[c], b), a = GS4I_NTH_CONST(q->a[c], b);
+            GS4I_NTH(k->U[c], b) = gs4i_axis_of(own, c);
+            GS4I_NTH(k->A[c], b) = (gs4i_axis_of(own, c) - (v + r->before * a)) / r->s;
+        }
     }
 }
 
@@ -20606,6 +20607,8 @@ static void gs4i_gather_from_faces(const gs4_sim *sim, const gs4i_taken_tiles *t
             slope->dz[4 * b + c] = g.dz[4 * b];
         }
     }
+    if (sim->staggered.is_implicit && !sim->particles.deformation_reals)
+        gs4i_stick_alone(sim, t, q, &s[0], k);
     gs4i_subgrid_of(&sim->integrator, q, 0, k->subgrid);
     gs4i_gradient_lanes(slope->dx, slope->dy, slope->dz, n, k->L);
 }
@@ -23632,8 +23635,7 @@ static int gs4i_empty_shape(gs4_sim *sim, const gs4_shape *shape)
 static int gs4i_fail_bad(gs4_sim *sim, const gs4i_report *r)
 {
     gs4i_text t = gs4i_begin_error(&sim->error);
-    if (r->bad == GS4I_BAD_MOTION && sim->desc.scheme == GS4_SEMI_IMPLICIT
-        && gs4i_outlasts_fall(sim)) /* something fell */
+    if (r->bad == GS4I_BAD_MOTION && gs4i_outlasts_fall(sim)) /* something fell */
         sim->stage_limit = GS4I_SQRT(sim->grid.h / gs4i_length(sim->desc.gravity));
     gs4i_put(&t, "particle ");
     gs4i_put_integer(&t, (int64_t)r->bad_id);

@@ -34,6 +34,7 @@
 #include "test_partitioned_exact.c"
 #include "test_partitioned_extremes.c"
 #include "test_semi_implicit.c"
+#include "test_semi_long.c"
 #include "test_semi_viscoelastic.c"
 #include "test_semi_solids.c"
 #include "test_mesh.c"
@@ -131,6 +132,7 @@ int main(int count, char **values)
     run_partitioned_exact();
     run_partitioned_extremes();
     run_semi_implicit();
+    run_semi_long();
     run_semi_viscoelastic();
     run_semi_solids();
     run_mesh();

@@ -314,6 +314,11 @@
  * follows Huppert's law within 5 % to t g H^3/(nu R0^2) = 3 in 60 steps; one of 12 cells from 0.3
  * to 30 in 600 to 1000, most of them where single particles fall from its front (tests:
  * semi_current).
+ *     A thread of 6 cells across that hangs from a wall and stretches under its weight is within
+ * 2 % of the slender limit in length and area until its area has halved, in 40 steps (tests:
+ * semi_thread). A rope of 6 cells across that falls on a bare sticky floor by 8 to 12 diameters,
+ * without gravity and inertia, coils within 6 % of 4.00 U/H, H to the middle of what lies (tests:
+ * semi_coiling); on a heap of its own rings, which is uneven, 8 to 19 % slower than that.
  *     Where nu dt > 16 h^2 viscosity leaves nothing that would take from faces what they remember
  * and particles do not see, so a tenth of it is forgotten in each step; and where steps are longer
  * than a quarter of the time in which a surface of the domain's width levels, places of the stage

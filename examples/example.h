@@ -52,6 +52,9 @@ typedef struct example {
     /* of a table of materials: --row 1 to rows, in the names of files too; rows 0: no such
      * option */
     int row, rows;
+    /* of the program: --scheme explicit, partitioned or semi-implicit, in the names of files too */
+    int takes_scheme;
+    gs4_scheme scheme;
     double frame_time; /* s from frame to frame; 0: 1/30 */
     /* what the pictures show: one colour, the number of the material, the speed or the
      * temperature */
@@ -83,12 +86,16 @@ static double example_clock(void *user)
     return clock_gettime(CLOCK_MONOTONIC, &t) ? 0 : (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
+static const char *const example_schemes[3] = { "explicit", "partitioned", "semi-implicit" };
+
 static void example_usage(const example *e, FILE *to)
 {
     fprintf(to,
-            "usage: %s%s [--frames N] [--cells N] [--threads N] [--out DIR]   (here %d frames, %d "
-            "cells, %d threads, %s)\n",
-            e->name, e->rows ? " [--row N]" : "", e->frames, e->cells, e->threads, e->out);
+            "usage: %s%s%s [--frames N] [--cells N] [--threads N] [--out DIR]   (here %d frames, "
+            "%d cells, %d threads, %s)\n",
+            e->name, e->rows ? " [--row N]" : "",
+            e->takes_scheme ? " [--scheme explicit|partitioned|semi-implicit]" : "", e->frames,
+            e->cells, e->threads, e->out);
 }
 
 /* Says what is wrong and how it is meant, and leaves. */
@@ -107,6 +114,15 @@ static int example_number(const example *e, const char *option, const char *text
     if (end == text || *end || n < low || n > high)
         example_misuse(e, say, *text ? text : "nothing");
     return (int)n;
+}
+
+static gs4_scheme example_scheme(const example *e, const char *text)
+{
+    for (int i = 0; i < 3; ++i)
+        if (!strcmp(text, example_schemes[i])) return (gs4_scheme)i;
+    example_misuse(e, "--scheme takes explicit, partitioned or semi-implicit, not ",
+                   *text ? text : "nothing");
+    return GS4_EXPLICIT;
 }
 
 static void example_options(example *e, int argc, char **argv)
@@ -130,6 +146,8 @@ static void example_options(example *e, int argc, char **argv)
             e->threads = example_number(e, o, value, 1, 256);
         else if (e->rows && !strcmp(o, "--row"))
             e->row = example_number(e, o, value, 1, e->rows);
+        else if (e->takes_scheme && !strcmp(o, "--scheme"))
+            e->scheme = example_scheme(e, value);
         else if (strcmp(o, "--out"))
             example_misuse(e, "there is no option ", o);
         else if (!*value)
@@ -158,6 +176,7 @@ static gs4_sim *example_create(const example *e, gs4_sim_desc *desc)
 {
     gs4_sim *sim = NULL;
     desc->threads = e->threads;
+    if (e->takes_scheme) desc->scheme = e->scheme;
     desc->now = example_clock;
     example_need(NULL, gs4_create(desc, &sim));
     return sim;
@@ -192,11 +211,13 @@ static void example_write(const example *e, gs4_sim *sim)
 {
     preview_settings look = e->look;
     gs4_triangles t;
+    const char *scheme = e->scheme ? example_schemes[e->scheme] : "";
     char path[1024], row[16] = "";
     int failed = 0;
     if (!gs4_particles(sim, GS4_FIELD_POSITION).count) return;
     if (e->rows) sprintf(row, "_%d", e->row);
-    sprintf(path, "%.900s/%.64s%s_%04d.ply", e->out, e->name, row, e->frame);
+    sprintf(path, "%.900s/%.64s%s%s%s_%04d.ply", e->out, e->name, row, *scheme ? "_" : "", scheme,
+            e->frame);
     example_need(sim, gs4_write_ply(sim, path));
     strcpy(strrchr(path, '.'), ".png");
     if (e->colour == EXAMPLE_TEMPERATURE) {

@@ -841,6 +841,14 @@ static int goes_on(void *user)
     return ++questions < 4;
 }
 
+/* With so few iterations steps of an implicit scheme may have to be 1e5 times as short as
+ * gs4_stable_dt before their solve converges. */
+static int hardly_converges(void)
+{
+    return r.desc.scheme != GS4_EXPLICIT && r.desc.solver_max_iterations > 0
+           && r.desc.solver_max_iterations < 20;
+}
+
 static int advance(void)
 {
     const double stable = (double)gs4_stable_dt(r.s.sim),
@@ -850,7 +858,7 @@ static int advance(void)
     gs4_budget budget = { 0, 0, NULL, NULL };
     double done = -1;
     int result;
-    if ((double)duration <= 8 * step && one_in(2)) {
+    if ((double)duration <= 8 * step && one_in(2) && !hardly_converges()) {
         begin_time("gs4_advance");
         result = gs4_advance(r.s.sim, duration);
         if (result == GS4_OK) check_time((double)duration);

@@ -66,6 +66,7 @@
  *                                                    [[files]]     frames and checkpoints
  *                                                    [[surface]]   the surface as triangles
  *                                                    [[public]]    values checked, then the work
+ *                                                    [[estimate]] a trial of a run in large cells
  *
  * UNITS AND CONVENTIONS. SI, or any consistent system. L_ij = dv_i/dx_j, D = (L + L^T)/2.
  * Stresses are Cauchy, tension positive. Nodes are cell centres, x fastest; walls lie on the faces
@@ -464,6 +465,23 @@
  *         draw(gs4_particles(sim, GS4_FIELD_POSITION));
  *     }
  *
+ * WHAT A RUN WILL TAKE. Ask before it, once the scene is set up, of any scheme and integrator:
+ *
+ *     gs4_cost cost;
+ *     if (gs4_estimate(sim, GS4_PARTITIONED, GS4_INTEGRATOR_GS4, 2.0, &cost) == GS4_OK)
+ *         printf("%.0f s, %.0f MB, limited by %s\n", cost.seconds, cost.bytes / 1e6, cost.limit);
+ *
+ * It makes a trial: the scene with particles of some cells merged into one, in cells so much
+ * larger, is advanced through the duration or as far as 2e6 particle steps go (implicit schemes:
+ * 2.5e5); beyond, its last half goes on. What emitters will have given counts. Stability rules of
+ * the real cells, asked for the extremes that the trial sees, give the real steps. A few steps of
+ * it and of the same in half its cells, by `now` and on the threads of the description, say what a
+ * particle and a cell cost. Steps and bytes do not depend on the machine. Where the trial cannot
+ * see what will happen, as where a film of a cell or a drop that falls longer than it lasts counts
+ * most, neither can the estimate. What the scheme has no use for is left out (rho_inf,
+ * sharp_gradients); with GS4_EXPLICIT what is `incompressible` has the default speed of sound. What
+ * calls of gs4_advance cut off costs a step each, which the estimate does not know.
+ *
  * SURFACES. gs4_surface gives triangles of what the material is now, gs4_write_surface writes them:
  *
  *     gs4_triangles t;
@@ -583,6 +601,7 @@ typedef double gs4_real;
 #define gs4_destroy gs4_destroy_f64
 #define gs4_edit_particles gs4_edit_particles_f64
 #define gs4_emitter_pose gs4_emitter_pose_f64
+#define gs4_estimate gs4_estimate_f64
 #define gs4_get_desc gs4_get_desc_f64
 #define gs4_get_stats gs4_get_stats_f64
 #define gs4_last_error gs4_last_error_f64
@@ -1014,6 +1033,21 @@ GS4_API gs4_real gs4_stable_dt(const gs4_sim *sim);
 /* What sets it: "sound", "viscosity", "elasticity", "surface", "flow", "strain", "relaxation" or
  * "none"; "max_dt" where that is less than gs4_advance would take. */
 GS4_API const char *gs4_limit_name(const gs4_sim *sim);
+
+/* What a run will take. */
+typedef struct gs4_cost {
+    const char *limit; /* what sets most of the steps, as gs4_limit_name says it */
+    double dt;         /* s, their mean */
+    uint64_t steps;
+    double seconds; /* of computing; 0 without `now` of the description */
+    uint64_t bytes; /* gs4_stats.memory_bytes at its end */
+    int particles;  /* at its end */
+} gs4_cost;
+
+/* What gs4_advance(sim, duration) would take, with this scheme and integrator; see WHAT A RUN WILL
+ * TAKE. The simulation stays as it is. */
+GS4_API int gs4_estimate(const gs4_sim *sim, gs4_scheme scheme, gs4_integrator integrator,
+                         double duration, gs4_cost *cost);
 
 /* Of each particle; SI. A scene has stress to flux only where a material needs them. */
 typedef enum gs4_field {
@@ -27148,6 +27182,13 @@ static GS4I_COLD int gs4i_check_fill(gs4_sim *sim, gs4_fill *f)
     return gs4i_check(e, "fill.jitter", f->jitter, GS4I_FRACTION);
 }
 
+static int gs4i_check_friction(gs4i_error *e, const gs4_collider *c, gs4_scheme scheme)
+{
+    return gs4i_require(e, c->friction == 0 || scheme == GS4_EXPLICIT,
+                        "friction: separating colliders of the implicit schemes of this version "
+                        "have none; leave it 0");
+}
+
 static int gs4i_check_collider(gs4_sim *sim, gs4_collider *c)
 {
     gs4i_error *e = &sim->error;
@@ -27157,9 +27198,7 @@ static int gs4i_check_collider(gs4_sim *sim, gs4_collider *c)
     GS4I_TRY(gs4i_require(e, (int)c->contact >= 0 && c->contact <= GS4_WALL_SEPARATE,
                           "contact of a collider must be stick, slip or separate"));
     GS4I_TRY(gs4i_check(e, "friction", c->friction, GS4I_NOT_NEGATIVE));
-    GS4I_TRY(gs4i_require(e, c->friction == 0 || sim->desc.scheme == GS4_EXPLICIT,
-                          "friction: separating colliders of the implicit schemes of this "
-                          "version have none; leave it 0"));
+    GS4I_TRY(gs4i_check_friction(e, c, sim->desc.scheme));
     GS4I_TRY(gs4i_require(e, c->friction == 0 || c->contact == GS4_WALL_SEPARATE,
                           "friction is for contact GS4_WALL_SEPARATE, leave it 0"));
     GS4I_TRY(gs4i_check3(e, "velocity", c->velocity));
@@ -28783,6 +28822,848 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
     gs4i_free(&memory, p, 1, sizeof *p);
 }
 
+/* ==== [[estimate]] what a run will take, by a trial in larger cells ============================ *
+ *
+ * A trial is the same scene in cells that are `ratio` times as large, with the scheme and the
+ * integrator that are asked for. Particles of one cube, of `ratio` times their own side, are one
+ * there. Its steps say of each moment what limits a step: the extremes of its particles, put into
+ * the rules of the real cells, give the real step. Two short runs, of the trial as it ends and of
+ * the same in half its cells, say what a particle and a cell cost. All of that but the seconds
+ * follows from the scene alone, not from the machine. */
+
+enum {
+    GS4I_TRIAL_PARTICLES = 1000, /* of a trial, at the least */
+    GS4I_TRIAL_CUBES = 16384,    /* at most, at its begin */
+    GS4I_TRIAL_WORK = 2000000,   /* particles times steps; of implicit schemes an eighth */
+    GS4I_TIMED_STEPS = 20,       /* of each short run; of implicit schemes a quarter */
+    GS4I_LIMIT_NAMES = 10
+};
+
+/* What particles and nodes there are, and what a step takes of them. */
+typedef struct gs4i_run_load {
+    double particles, nodes, box; /* nodes near material; cells of the boxes of solves */
+    double size[3];               /* of the larger of those, cells */
+    double seconds;               /* of a step */
+} gs4i_run_load;
+
+/* Steps up to a time: how many; the particles and cells of all of them. */
+typedef struct gs4i_tally {
+    double time, steps, particles, cells;
+} gs4i_tally;
+
+typedef struct gs4i_trial {
+    const gs4_sim *of;
+    gs4_sim_desc desc; /* of what is asked about */
+    double duration, ratio;
+    double side;                  /* m, of the cube of a particle */
+    double stretch[3];            /* where the larger cells do not fit the domain */
+    double *first, *rate;         /* of each emitter: particles at once, and in a second */
+    gs4_sim *sim;                 /* the trial */
+    gs4i_tally now, before, half; /* so far; half of that ago or more; later */
+    gs4i_tally own;               /* of its own steps but the first; `time`: that they took */
+    double work;                  /* particles times steps */
+    double pace;                  /* sum over those steps of what they worked on in a second */
+    double most;                  /* nodes and cells that it has had */
+    double last_dt;               /* s, real */
+    const char *name[GS4I_LIMIT_NAMES];
+    double by[GS4I_LIMIT_NAMES]; /* steps that it limits */
+    /* measured: seconds of a particle and of a cell of the trial in a real step; real nodes and
+     * cells of its own at the end; bytes */
+    double of_particle, of_cell, nodes, box, cells, bytes, each;
+} gs4i_trial;
+
+/* --- the scene once more ---------------------------------------------------------------------- */
+
+/* The same with another scheme, which has no use for some fields. */
+static gs4_sim_desc gs4i_desc_with(const gs4_sim *of, gs4_scheme scheme, gs4_integrator integrator)
+{
+    gs4_sim_desc d = of->desc;
+    d.scheme = scheme;
+    d.integrator = integrator;
+    if (integrator != GS4_INTEGRATOR_GS4) d.rho_inf = d.rho_inf_spurious = 0;
+    if (integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER) d.flip_decay_time = 0;
+    if (scheme != GS4_EXPLICIT || integrator != GS4_INTEGRATOR_GS4) d.sharp_gradients = 0;
+    d.log = NULL;
+    d.max_particles = 0;
+    return d;
+}
+
+/* A material, with the speed of sound that it has in the real cells. */
+static gs4_material gs4i_material_with(const gs4_sim *of, int i, gs4_scheme scheme)
+{
+    gs4_material m = of->constants[i].is;
+    if (scheme == GS4_EXPLICIT) m.incompressible = 0;
+    if (!m.incompressible && !(m.sound_speed > 0) && !(m.bulk_modulus > 0))
+        m.sound_speed =
+            GS4I_C(gs4i_sound_speed_of(&of->desc, &m, of->top_speed, gs4i_extreme_density(of, 1)));
+    return m;
+}
+
+/* What the scheme refuses of this scene. */
+static int gs4i_check_scheme(gs4_sim *of, const gs4_sim_desc *d)
+{
+    gs4i_scene scene = gs4i_scene_of(of);
+    int i;
+    GS4I_TRY(gs4i_check_numerics(&of->error, d));
+    scene.scheme = d->scheme;
+    scene.is_deconvolved = d->sharp_gradients;
+    for (i = 0; i < of->material_count; i++) {
+        gs4_material m = gs4i_material_with(of, i, d->scheme);
+        if (m.viscosity_law != GS4_VISCOSITY_CROSS_WLF) memset(&m.cross_wlf, 0, sizeof m.cross_wlf);
+        GS4I_TRY(gs4i_check_material(&of->error, &scene, &m));
+    }
+    for (i = 0; i < of->boundary.collider_count; i++)
+        GS4I_TRY(gs4i_check_friction(&of->error, &of->boundary.colliders[i].is, d->scheme));
+    return GS4_OK;
+}
+
+/* Colliders and emitters as they are now. An emitter too thin for larger cells is left out. */
+static int gs4i_copy_bodies(gs4_sim *to, const gs4_sim *of)
+{
+    int i, k;
+    for (i = 0; i < of->boundary.collider_count; i++) {
+        const gs4i_collider *b = &of->boundary.colliders[i];
+        gs4i_collider *copy;
+        const gs4i_emitter *from = NULL;
+        int result;
+        for (k = 0; k < of->emitter_count && !from; k++)
+            if (of->emitters[k].collider == i) from = &of->emitters[k];
+        if (from) {
+            gs4_emitter is = from->is;
+            is.fill.spacing *= to->grid.h * of->grid.inv_h;
+            result = gs4i_add_emitter(to, &is);
+            if (result == GS4_ERROR_ARGUMENT) continue;
+        } else
+            result = gs4i_add_collider(to, &b->is, 0.5 * (double)to->grid.h);
+        if (result < 0) return result;
+        if (from) {
+            gs4i_emitter *e = &to->emitters[result];
+            e->flowed = from->flowed;
+            e->emitted = from->emitted;
+            e->has_emitted = from->has_emitted;
+        }
+        copy = &to->boundary.colliders[to->boundary.collider_count - 1];
+        copy->is = b->is;
+        memcpy(copy->at, b->at, sizeof b->at);
+        memcpy(copy->turn, b->turn, sizeof b->turn);
+        copy->flow = b->flow;
+        copy->is_off = b->is_off;
+        gs4i_collider_orient(copy);
+    }
+    return GS4_OK;
+}
+
+/* A simulation like `of` without particles, in `cells` of h (m). */
+static int gs4i_copy_scene(const gs4_sim *of, const gs4_sim_desc *like, const int cells[3],
+                           double h, gs4_sim **to)
+{
+    gs4_sim_desc d = *like;
+    gs4i_error e;
+    int i;
+    memset(&e, 0, sizeof e);
+    memcpy(d.cells, cells, sizeof d.cells);
+    d.cell_size = GS4I_C(h);
+    GS4I_TRY(gs4i_create(&e, &d, to));
+    (*to)->time = of->time;
+    (*to)->top_speed = of->top_speed;
+    if (of->desc.scheme == d.scheme) (*to)->last_dt = of->last_dt;
+    for (i = 0; i < of->material_count; i++) {
+        const gs4_material m = gs4i_material_with(of, i, d.scheme);
+        const int id = gs4i_add_material(*to, &m);
+        if (id < 0) return id;
+    }
+    return gs4i_copy_bodies(*to, of);
+}
+
+/* What particle `from` has of history, to particle `to`; it starts without rates. */
+static void gs4i_copy_history(const gs4i_particles *p, size_t from, gs4i_particles *q, size_t to)
+{
+    const size_t real = sizeof(gs4_real);
+    int k;
+    q->velocity[4 * to + 3] = p->velocity[4 * from + 3];
+    if (q->elastic_reals && p->elastic_reals)
+        memcpy(q->elastic + (size_t)q->elastic_reals * to,
+               p->elastic + (size_t)p->elastic_reals * from, 6 * real);
+    if (q->deformation_reals && p->deformation_reals)
+        memcpy(q->deformation + (size_t)q->deformation_reals * to,
+               p->deformation + (size_t)p->deformation_reals * from, 9 * real);
+    for (k = 0; k < 3 && q->affine[k] && p->affine[k] && !q->with_rates; k++)
+        memcpy(q->affine[k] + 4 * to, p->affine[k] + 4 * from, 3 * real);
+    if (q->with_heat && p->with_heat) {
+        memcpy(q->heat + 4 * to, p->heat + 4 * from, 2 * real);
+        q->liquid[to] = p->liquid[from];
+    }
+    if (q->with_flux && p->with_flux) memcpy(q->flux + 4 * to, p->flux + 4 * from, 3 * real);
+}
+
+/* A particle of a trial, before it is one. */
+typedef struct gs4i_cube {
+    uint64_t key; /* of its place, material and phase */
+    double mass, x[3], v[3];
+    int first, next; /* of its particles, for history; the cube that came after it */
+} gs4i_cube;
+
+/* Particles by the cubes that they are in, the first of which is number `head`; -1: there are too
+ * many of those. In cells as they are each particle has a cube of its own. */
+static int gs4i_fill_cubes(const gs4i_trial *t, gs4i_cube *cubes, int room, int *head)
+{
+    const gs4i_particles *p = &t->of->particles;
+    const gs4_vec3 o = t->of->grid.origin;
+    const double origin[3] = { (double)o.x, (double)o.y, (double)o.z };
+    int i, a, count = 0, last = -1;
+    for (i = 0; i < p->count; i++) {
+        const gs4_real *x = p->position + 4 * (size_t)i, *v = p->velocity + 4 * (size_t)i;
+        const double mass = (double)x[3];
+        uint64_t key = 1 + p->material[i] + (uint64_t)(p->liquid ? 256 * p->liquid[i] : 0);
+        size_t at;
+        if (t->ratio <= 1) key += (uint64_t)i << 10;
+        for (a = 0; a < 3; a++)
+            key = gs4i_mix(key ^ (uint64_t)(int64_t)floor(((double)x[a] - origin[a]) / t->side));
+        key |= 1;
+        for (at = (size_t)key & (size_t)(room - 1); cubes[at].key && cubes[at].key != key;)
+            at = (at + 1) & (size_t)(room - 1);
+        if (!cubes[at].key) {
+            if (++count > GS4I_TRIAL_CUBES) return -1;
+            cubes[at].key = key;
+            cubes[at].first = i;
+            *(last < 0 ? head : &cubes[last].next) = (int)at;
+            last = (int)at;
+        }
+        cubes[at].mass += mass;
+        for (a = 0; a < 3; a++) {
+            cubes[at].x[a] += mass * ((double)x[a] - origin[a]);
+            cubes[at].v[a] += mass * (double)v[a];
+        }
+    }
+    return count;
+}
+
+/* A particle like number `from` of another simulation. */
+static int gs4i_copy_particle(gs4_sim *to, const gs4_sim *of, size_t from, const double x[3],
+                              const double v[3], double mass)
+{
+    const gs4i_particles *p = &of->particles;
+    const gs4_vec3 o = to->grid.origin,
+                   at = gs4i_add(o, gs4i_vec3(GS4I_C(x[0]), GS4I_C(x[1]), GS4I_C(x[2]))),
+                   goes = gs4i_vec3(GS4I_C(v[0]), GS4I_C(v[1]), GS4I_C(v[2]));
+    const gs4_real place[3] = { at.x, at.y, at.z };
+    const size_t i = (size_t)to->particles.count;
+    gs4_fill f;
+    if (!gs4i_is_in_domain(&to->grid, place)) return GS4_OK; /* by rounding */
+    memset(&f, 0, sizeof f);
+    f.material = p->material[from];
+    if (p->with_heat) f.temperature = p->heat[4 * from];
+    if (!gs4i_add_particle(to, at, goes, GS4I_C(mass), &f)) return gs4i_fail_memory(&to->error);
+    gs4i_copy_history(p, from, &to->particles, i);
+    return GS4_OK;
+}
+
+/* Room for all particles that a simulation will have before it ends. */
+static int gs4i_reserve_trial(gs4_sim *to, double count)
+{
+    return gs4i_particles_reserve(&to->memory, &to->particles, (int)count) == GS4_OK
+               ? GS4_OK
+               : gs4i_fail_memory(&to->error);
+}
+
+/* The particles of the trial; GS4I_TRIAL_CUBES + 1 where larger cells have to be. */
+static int gs4i_merge_particles(gs4i_trial *t)
+{
+    const int room = 2 * GS4I_TRIAL_CUBES;
+    const double more = t->stretch[0] * t->stretch[1] * t->stretch[2];
+    gs4i_memory *m = &t->sim->memory;
+    gs4i_cube *cubes = (gs4i_cube *)gs4i_alloc(m, (size_t)room, sizeof *cubes);
+    int count, result, at = 0, a;
+    if (!cubes) return GS4_ERROR_MEMORY;
+    count = gs4i_fill_cubes(t, cubes, room, &at);
+    result = count < 0 ? GS4I_TRIAL_CUBES + 1 : gs4i_reserve_trial(t->sim, count);
+    while (result == GS4_OK && count-- > 0) {
+        gs4i_cube *c = &cubes[at];
+        for (a = 0; a < 3; a++) {
+            c->x[a] *= t->stretch[a] / c->mass;
+            c->v[a] /= c->mass;
+        }
+        result = gs4i_copy_particle(t->sim, t->of, (size_t)c->first, c->x, c->v, more * c->mass);
+        at = c->next;
+    }
+    gs4i_free(m, cubes, (size_t)room, sizeof *cubes);
+    return result;
+}
+
+/* Each particle of `of` is eight of half the side. */
+static int gs4i_split_particles(gs4_sim *to, const gs4_sim *of)
+{
+    const gs4i_particles *p = &of->particles;
+    const gs4_real o[3] = { of->grid.origin.x, of->grid.origin.y, of->grid.origin.z };
+    int i, k, a, result = gs4i_reserve_trial(to, 8.0 * p->count);
+    for (i = 0; i < p->count && result == GS4_OK; i++) {
+        const gs4_real *at = p->position + 4 * (size_t)i, *goes = p->velocity + 4 * (size_t)i;
+        const double mass = (double)at[3],
+                     volume = mass * (double)of->constants[p->material[i]].inv_density,
+                     quarter = 0.25 * cbrt(volume);
+        for (k = 0; k < 8 && result == GS4_OK; k++) {
+            double x[3], v[3];
+            for (a = 0; a < 3; a++) {
+                const double size = of->grid.cells[a] * (double)of->grid.h;
+                x[a] = (double)(at[a] - o[a]) + (k >> a & 1 ? quarter : -quarter);
+                x[a] = fmax(0, fmin(x[a], size * (1 - 4 * (double)GS4I_EPSILON)));
+                v[a] = (double)goes[a];
+            }
+            result = gs4i_copy_particle(to, of, (size_t)i, x, v, mass / 8);
+        }
+    }
+    return result;
+}
+
+/* --- what emitters will give ------------------------------------------------------------------ */
+
+/* Places that come into an emitter until material has flowed by `flowed`. */
+static double gs4i_count_places(const gs4_sim *sim, const gs4i_emitter *e, double flowed)
+{
+    gs4i_emission q =
+        gs4i_begin_emission(&sim->grid, e, &sim->boundary.colliders[e->collider], flowed);
+    gs4_real x[3];
+    double n = 0;
+    while (gs4i_next_emitted(&q, x)) n += gs4i_is_in_domain(&sim->grid, x);
+    return n;
+}
+
+/* What emitter i gives when it begins, and in each second: a particle a row and spacing. */
+static int gs4i_plan_emitter(gs4i_trial *t, int i)
+{
+    gs4i_emitter e = t->of->emitters[i];
+    const double speed = (double)gs4i_length(e.is.fill.velocity);
+    gs4i_emission q;
+    e.active = 1;
+    q = gs4i_begin_emission(&t->of->grid, &e, &t->of->boundary.colliders[e.collider], e.flowed);
+    GS4I_TRY(gs4i_check_emission(t->of->self, &q));
+    t->first[i] = e.has_emitted ? 0 : gs4i_count_places(t->of, &e, e.flowed);
+    e.has_emitted = 1;
+    e.emitted = e.flowed;
+    if (speed > 0)
+        t->rate[i] = gs4i_count_places(t->of, &e, e.flowed + e.spacing[0]) * speed / e.spacing[0];
+    return GS4_OK;
+}
+
+/* Real particles that there are or were after `time` (s) from now. */
+static double gs4i_given_until(const gs4i_trial *t, double time)
+{
+    const double most = t->of->desc.max_particles ? t->of->desc.max_particles : GS4I_MAX_PARTICLES;
+    double n = t->of->particles.count;
+    int i;
+    for (i = 0; i < t->of->emitter_count; i++) {
+        const double on = gs4i_emitter_active(&t->of->emitters[i], t->of->time, time);
+        n += on > 0 ? t->first[i] + on * t->rate[i] : 0;
+    }
+    return fmin(n, most);
+}
+
+/* --- the trial -------------------------------------------------------------------------------- */
+
+/* How much larger its cells are: so that the domain is some of them at least. */
+static void gs4i_fit_trial(gs4i_trial *t, int cells[3])
+{
+    int a;
+    for (a = 0; a < 3; a++) {
+        const double n = t->of->grid.cells[a], least = fmax(4, ceil(n / t->ratio - 1e-9));
+        const int is_free = !t->of->boundary.collider_count || t->of->grid.periodic[a];
+        cells[a] = (int)least;
+        t->stretch[a] = is_free || n < 4 * t->ratio ? least * t->ratio / n : 1;
+    }
+}
+
+/* Side of the cube of a particle, m: of the mean of those that are there. */
+static double gs4i_mean_side(const gs4_sim *sim)
+{
+    const gs4i_particles *p = &sim->particles;
+    double volume = 0;
+    int i;
+    for (i = 0; i < p->count; i++)
+        volume +=
+            (double)(p->position[4 * (size_t)i + 3] * sim->constants[p->material[i]].inv_density);
+    return p->count ? cbrt(volume / p->count) : 0.5 * (double)sim->grid.h;
+}
+
+/* The trial, in the smallest cells with no more than so many particles. */
+static int gs4i_build_trial(gs4i_trial *t)
+{
+    const double side = gs4i_mean_side(t->of), all = gs4i_given_until(t, t->duration);
+    int cells[3], result;
+    gs4_sim_desc d = t->desc;
+    t->ratio = fmax(1, floor(cbrt(all / GS4I_TRIAL_PARTICLES) + 1e-9));
+    if (t->ratio > 1) {
+        d.threads = 1;
+        d.parallel_for = NULL;
+    }
+    for (;; t->ratio = ceil(1.2 * t->ratio)) {
+        t->side = t->ratio * side;
+        gs4i_fit_trial(t, cells);
+        GS4I_TRY(gs4i_copy_scene(t->of, &d, cells, t->ratio * (double)t->of->grid.h, &t->sim));
+        result = gs4i_merge_particles(t);
+        if (result <= 0) break;
+        gs4_destroy(t->sim);
+        t->sim = NULL;
+    }
+    t->sim->needs_spin = t->sim->particles.with_rates;
+    return result;
+}
+
+/* What a cell costs of what a particle does, by and large. */
+#define GS4I_COST_OF_CELL 0.25
+
+/* Particles, and cells that cost `w` of one. */
+static double gs4i_weigh(const gs4i_run_load *l, double w)
+{
+    return l->particles + w * (l->nodes + l->box);
+}
+
+/* What its steps work on now. */
+static gs4i_run_load gs4i_run_load_of(const gs4_sim *sim)
+{
+    gs4i_run_load l;
+    int k, a;
+    memset(&l, 0, sizeof l);
+    l.particles = sim->particles.count;
+    l.nodes = (double)sim->grid.active * GS4I_BLOCK_NODES;
+    for (k = 0; k < 2; k++) {
+        const gs4i_box *box = k ? &sim->conduction.box : &sim->staggered.box;
+        for (a = 0; a < 3 && box->fields; a++) l.size[a] = fmax(l.size[a], box->size[a]);
+        if (box->fields) l.box += (double)box->size[0] * box->size[1] * box->size[2];
+    }
+    return l;
+}
+
+/* The stable dt of these extremes in real cells, s. The fastest particle of many is faster: in a
+ * dam break, ratios of 4, 5 and 7, steps by flow were 0.81, 0.83 and 0.75 of the real ones without
+ * the eighth root. Gradients are steepest where cells end them: they grow by half of the way. */
+static double gs4i_real_limit(const gs4i_trial *t, gs4i_report r, const char **by)
+{
+    gs4_sim *s = t->sim;
+    const gs4i_grid grid = s->grid;
+    const gs4_sim_desc desc = s->desc;
+    double limit;
+    r.max_speed *= GS4I_C(pow(t->ratio, 0.125));
+    r.max_gradient *= GS4I_C(sqrt(t->ratio));
+    s->grid.h = t->of->grid.h;
+    s->grid.inv_h = t->of->grid.inv_h;
+    memcpy(s->desc.cells, t->of->desc.cells, sizeof desc.cells);
+    limit = (double)gs4i_stable_dt(s, &r, by);
+    s->grid = grid;
+    s->desc = desc;
+    return limit;
+}
+
+/* `steps` real ones, which this limits. */
+static void gs4i_add_steps(gs4i_trial *t, double steps, const char *by)
+{
+    const gs4i_run_load l = gs4i_run_load_of(t->sim);
+    const double stay = t->sim->next_id ? l.particles / t->sim->next_id : 1;
+    int i;
+    for (i = 0; i < GS4I_LIMIT_NAMES - 1 && t->name[i] && strcmp(t->name[i], by) != 0; i++) {
+    }
+    t->name[i] = by;
+    t->by[i] += steps;
+    t->now.steps += steps;
+    t->now.particles += steps * stay * gs4i_given_until(t, t->now.time);
+    t->now.cells += steps * (l.nodes + l.box);
+}
+
+/* Real steps of dt at most in the time that has passed in one of the trial, s. */
+static void gs4i_count_steps(gs4i_trial *t, double passed, double dt, const char *by)
+{
+    double steps = 0;
+    t->now.time += passed;
+    while (t->desc.scheme == GS4_SEMI_IMPLICIT && t->last_dt > 0 && 2 * t->last_dt < dt
+           && passed > 0) { /* they double at most: see gs4i_longest_dt */
+        t->last_dt *= 2;
+        passed -= t->last_dt;
+        steps++;
+    }
+    if (passed > 0 || !(t->last_dt > 0)) t->last_dt = dt;
+    gs4i_add_steps(t, steps + passed / t->last_dt, by);
+    if (t->now.time < 2 * t->half.time) return;
+    t->before = t->half;
+    t->half = t->now;
+}
+
+/* One step of the trial, and what that is in real cells. */
+static int gs4i_step_trial(gs4i_trial *t)
+{
+    const gs4_budget one = { 1, 0, NULL, NULL };
+    gs4_sim *s = t->sim;
+    const gs4i_run_load l = gs4i_run_load_of(s);
+    const double left = t->duration - t->now.time, most = (double)t->desc.max_dt;
+    const uint64_t refused = s->refused;
+    gs4i_report r;
+    gs4_real limit;
+    const char *by;
+    double dt, start, took;
+    GS4I_TRY(gs4i_limit_now(s, &r, &limit, &by));
+    dt = (double)s->desc.cfl * gs4i_real_limit(t, r, &by);
+    if (most > 0 && most < dt) {
+        dt = most;
+        by = "max_dt";
+    }
+    s->time_left = left;
+    start = gs4i_now(s);
+    GS4I_TRY(gs4i_advance(s, &one));
+    took = gs4i_since(s, start);
+    t->work += l.particles + 100;
+    t->most = fmax(t->most, l.nodes + l.box);
+    if (t->now.steps > 0) { /* a first one finds how particles turn */
+        t->own.time += took;
+        t->own.steps += took > 0;
+        t->pace += took > 0 ? gs4i_weigh(&l, GS4I_COST_OF_CELL) / took : 0;
+        t->own.particles += l.particles;
+        t->own.cells += l.nodes + l.box;
+    }
+    if (s->refused > refused) dt *= fmin(1, s->last_dt / ((double)s->desc.cfl * (double)limit));
+    /* what is far below `left` leaves it as it is */
+    gs4i_count_steps(t, s->time_left > 0 ? s->last_dt : left, dt, by);
+    return GS4_OK;
+}
+
+/* Why a trial came to nothing. */
+static int gs4i_fail_trial(const gs4i_trial *t, int result)
+{
+    gs4i_error *e = &t->of->self->error;
+    gs4i_text text;
+    if (result == GS4_ERROR_MEMORY || !t->sim) return gs4i_fail_memory(e);
+    text = gs4i_begin_error(e);
+    gs4i_put(&text, "a trial of the scene in larger cells failed: ");
+    gs4i_put(&text, t->sim->error.text);
+    return gs4i_end_error(e, result);
+}
+
+/* Steps of the trial to its end or as many as it may take. What is left goes on as its last half
+ * did, but for what emitters give. */
+static int gs4i_run_trial(gs4i_trial *t)
+{
+    const double most = GS4I_TRIAL_WORK / (t->desc.scheme == GS4_EXPLICIT ? 1.0 : 8.0);
+    double rest, rate, each, stay;
+    gs4i_run_load l;
+    int k;
+    while (t->now.time < t->duration && t->work < most) {
+        const int result = gs4i_step_trial(t);
+        if (result == GS4_ERROR_MEMORY || (result < 0 && !(t->work > 0)))
+            return gs4i_fail_trial(t, result);
+        if (result < 0) break;
+        if (t->sim->time_left <= 0) t->now.time = t->duration;
+    }
+    rest = t->duration - t->now.time;
+    if (!(rest > 0)) return GS4_OK;
+    l = gs4i_run_load_of(t->sim);
+    each = l.particles > 0 ? (l.nodes + l.box) / gs4i_given_until(t, t->now.time) : 0;
+    stay = t->sim->next_id ? l.particles / t->sim->next_id : 1;
+    rate = t->now.time > t->before.time
+               ? (t->now.steps - t->before.steps) / (t->now.time - t->before.time)
+               : 1 / t->last_dt;
+    for (k = 0; k < 16; k++) {
+        const double n = rate * rest / 16,
+                     given = gs4i_given_until(t, t->now.time + (k + 0.5) / 16 * rest);
+        t->now.steps += n;
+        t->now.particles += n * stay * given;
+        t->now.cells += n * each * given;
+    }
+    return GS4_OK;
+}
+
+/* --- what a particle and a cell cost ---------------------------------------------------------- */
+
+/* Blocks of the real grid, or of one in half the cells of the trial. */
+typedef struct gs4i_cover {
+    double h, stretch[3];
+    int cells[3], blocks[3], low[3], high[3]; /* and which are first and last */
+    uint8_t *seen;
+} gs4i_cover;
+
+/* All blocks around those that a cube of `reach` (m) each way around x is in. How many are new. */
+static int gs4i_cover_cube(gs4i_cover *c, const double x[3], double reach)
+{
+    int first[3], last[3], at[3], a, count = 0;
+    for (a = 0; a < 3; a++) {
+        first[a] = gs4i_block_at((int)fmax(0, floor((x[a] - reach) / c->h))) - 1;
+        last[a] = gs4i_block_at((int)floor((x[a] + reach) / c->h)) + 1;
+        if (last[a] >= c->blocks[a]) last[a] = c->blocks[a] - 1;
+        if (first[a] > last[a]) first[a] = last[a];
+        if (first[a] < c->low[a]) c->low[a] = first[a];
+        if (last[a] > c->high[a]) c->high[a] = last[a];
+    }
+    for (at[2] = first[2]; at[2] <= last[2]; at[2]++)
+        for (at[1] = first[1]; at[1] <= last[1]; at[1]++)
+            for (at[0] = first[0]; at[0] <= last[0]; at[0]++) {
+                const size_t b =
+                    ((size_t)at[2] * (size_t)c->blocks[1] + (size_t)at[1]) * (size_t)c->blocks[0]
+                    + (size_t)at[0];
+                count += !(c->seen[b / 8] >> b % 8 & 1);
+                c->seen[b / 8] = (uint8_t)(c->seen[b / 8] | 1 << b % 8);
+            }
+    return count;
+}
+
+/* Nodes and box of smaller cells, whose particles fill the cubes that are particles of the trial.
+ */
+static int gs4i_count_nodes(const gs4i_trial *t, gs4i_cover *c, gs4i_run_load *l)
+{
+    const gs4_sim *s = t->sim;
+    const gs4_real o[3] = { s->grid.origin.x, s->grid.origin.y, s->grid.origin.z };
+    const double reach = 0.5 * t->side * (1 - c->h / (double)s->grid.h);
+    size_t blocks = 1;
+    int a, i;
+    for (a = 0; a < 3; a++) {
+        c->low[a] = c->blocks[a] = (c->cells[a] + 4) / 4 + 2;
+        c->high[a] = 0;
+        blocks *= (size_t)c->blocks[a];
+    }
+    c->seen = (uint8_t *)gs4i_alloc(&t->sim->memory, blocks / 8 + 1, 1);
+    if (!c->seen) return GS4_ERROR_MEMORY;
+    for (i = 0; i < s->particles.count; i++) {
+        const gs4_real *at = s->particles.position + 4 * (size_t)i;
+        double x[3];
+        for (a = 0; a < 3; a++) x[a] = (double)(at[a] - o[a]) / c->stretch[a];
+        l->nodes += GS4I_BLOCK_NODES * gs4i_cover_cube(c, x, reach);
+    }
+    gs4i_free(&t->sim->memory, c->seen, blocks / 8 + 1, 1);
+    for (a = 0; a < 3; a++) {
+        const int from = 4 * c->low[a] - 4, to = 4 * c->high[a], n = c->cells[a];
+        const double size = fmin(to, n) - fmax(from, 0);
+        l->size[a] = s->grid.periodic[a] ? n : fmax(size, 1);
+    }
+    return GS4_OK;
+}
+
+/* The middle one of a few steps by the clock, s; 0 where one fails. */
+static int gs4i_time_steps(gs4_sim *sim, gs4i_run_load *l)
+{
+    const gs4_budget one = { 1, 0, NULL, NULL };
+    const int steps = sim->desc.scheme == GS4_EXPLICIT ? GS4I_TIMED_STEPS : GS4I_TIMED_STEPS / 4;
+    double took[GS4I_TIMED_STEPS] = { 0 };
+    int i, k, result = GS4_OK;
+    for (i = -2; i < steps && result == GS4_OK; i++) {
+        const double start = gs4i_now(sim);
+        double next;
+        sim->time_left = 1e4 * fmin((double)gs4_stable_dt(sim), 1e9);
+        result = gs4i_advance(sim, &one);
+        next = gs4i_since(sim, start);
+        for (k = 0; k < i && took[k] < next; k++) {
+        }
+        for (; k <= i; k++) {
+            const double after = took[k];
+            took[k] = next;
+            next = after;
+        }
+    }
+    *l = gs4i_run_load_of(sim);
+    if (result == GS4_OK) l->seconds = took[steps / 2];
+    return result == GS4_ERROR_MEMORY ? result : GS4_OK;
+}
+
+/* The same on all threads of the description: how much faster it is. */
+static int gs4i_time_threads(gs4_sim *sim, const gs4i_tasks *tasks, const gs4i_run_load *one,
+                             double *faster)
+{
+    gs4i_run_load l;
+    *faster = 1;
+    if (sim->desc.threads <= 1 && !sim->desc.parallel_for) return GS4_OK;
+    sim->tasks = *tasks;
+    GS4I_TRY(gs4i_time_steps(sim, &l));
+    if (l.seconds > 0) *faster = fmax(1, one->seconds / l.seconds);
+    return GS4_OK;
+}
+
+/* Of a particle, in all that it carries; of the nodes of a block. */
+static int gs4i_bytes_of(const gs4_sim *sim, double *particle, double *node)
+{
+    gs4i_memory m = gs4i_memory_with(sim->desc.allocator);
+    gs4i_particles p = sim->particles;
+    gs4i_array a[GS4I_ARRAYS];
+    gs4i_grid g;
+    int i, result;
+    gs4i_particle_arrays(&p, a);
+    for (i = 0, *particle = 0; i < GS4I_ARRAYS; i++) *particle += a[i].wanted * (double)a[i].size;
+    memset(&g, 0, sizeof g);
+    g.with_deconvolution = sim->grid.with_deconvolution;
+    result = gs4i_grid_reserve(&m, &g, 64, p.with_rates);
+    *node = result == GS4_OK ? (double)m.bytes / g.capacity / GS4I_BLOCK_NODES : 0;
+    gs4i_grid_free(&m, &g);
+    return result;
+}
+
+/* What a cell costs of what a particle does: 0.15 to 0.35. Beyond a tenth and a half the clock was
+ * disturbed. */
+static double gs4i_cost_of_cells(const gs4i_run_load *one, const gs4i_run_load *two)
+{
+    const double p = one->particles, c = one->nodes + one->box, s = one->seconds,
+                 q = two->particles, d = two->nodes + two->box, u = two->seconds,
+                 sign = p * d < q * c ? -1 : 1, a = sign * (s * d - u * c),
+                 b = sign * (p * u - q * s);
+    if (!(b > 0.1 * a)) return 0.1;
+    return b > 0.5 * a ? 0.5 : b / a;
+}
+
+/* What a particle and a cell cost, by two runs: s = a p + b c in each; and how much slower steps of
+ * the trial were than those at its end: solves take more where there is more to do. Means of what
+ * was done in a second, so that few steps that the machine has interrupted do not count much. */
+static void gs4i_fit_costs(gs4i_trial *t, const gs4i_run_load *one, const gs4i_run_load *two,
+                           double faster)
+{
+    const double w = gs4i_cost_of_cells(one, two);
+    double more = 1;
+    if (!(two->seconds > 0 && two->particles > 0)) return;
+    if (t->pace > 0 && one->seconds > 0)
+        more = t->own.steps * gs4i_weigh(one, GS4I_COST_OF_CELL) / (t->pace * one->seconds);
+    more = fmax(0.5, fmin(more, 2));
+    t->of_particle = more / faster * two->seconds / gs4i_weigh(two, w);
+    t->of_cell = w * t->of_particle;
+}
+
+/* Nodes, box and bytes of the real scene as the trial ends: as many times those of `half`, a
+ * simulation in half its cells, as its particles cover more there. */
+static int gs4i_fit_sizes(gs4i_trial *t, const gs4_sim *half)
+{
+    const gs4i_run_load l = gs4i_run_load_of(half);
+    gs4i_run_load cover[2];
+    gs4i_cover c;
+    double particle, node;
+    int k, a;
+    GS4I_TRY(gs4i_bytes_of(half, &particle, &node));
+    t->nodes = l.nodes;
+    t->box = l.box;
+    t->bytes = (double)half->memory.bytes - particle * half->particles.capacity
+               - node * half->grid.capacity * GS4I_BLOCK_NODES
+               - (double)(half->grid.table_count * sizeof *half->grid.table);
+    if (t->ratio > 1) {
+        memset(cover, 0, sizeof cover);
+        for (k = 0; k < 2; k++) {
+            const gs4_sim *like = k ? t->of : half;
+            c.h = (double)like->grid.h;
+            for (a = 0; a < 3; a++) {
+                c.cells[a] = like->grid.cells[a];
+                c.stretch[a] = k ? t->stretch[a] : 1;
+            }
+            GS4I_TRY(gs4i_count_nodes(t, &c, &cover[k]));
+        }
+        if (cover[0].nodes > 0) t->nodes *= cover[1].nodes / cover[0].nodes;
+        /* the box has as many cells more on each side */
+        for (a = 0; a < 3 && l.box > 0; a++)
+            t->box *= fmax(1, cover[1].size[a] + l.size[a] - cover[0].size[a]) / l.size[a];
+    }
+    if (t->cells > 0) t->bytes *= fmax(1, t->most / t->cells);
+    if (l.nodes > 0) t->bytes *= l.box > 0 ? t->box / l.box : t->nodes / l.nodes;
+    t->bytes += node * t->nodes + (double)(t->of->grid.table_count * sizeof *t->of->grid.table);
+    t->each = particle;
+    return GS4_OK;
+}
+
+/* The trial in half its cells, for a few steps. */
+static int gs4i_measure_half(gs4i_trial *t, gs4_sim **made)
+{
+    gs4_sim *half;
+    gs4i_run_load one, two, own;
+    gs4i_tasks tasks;
+    double faster;
+    int cells[3], a, result;
+    for (a = 0; a < 3; a++) cells[a] = 2 * t->sim->grid.cells[a];
+    GS4I_TRY(gs4i_time_steps(t->sim, &one));
+    own = gs4i_run_load_of(t->sim);
+    GS4I_TRY(gs4i_copy_scene(t->sim, &t->desc, cells, 0.5 * (double)t->sim->grid.h, made));
+    half = *made;
+    GS4I_TRY(gs4i_split_particles(half, t->sim));
+    half->needs_spin = half->particles.with_rates;
+    tasks = half->tasks;
+    memset(&half->tasks, 0, sizeof half->tasks);
+    result = gs4i_time_steps(half, &two);
+    if (result == GS4_OK) result = gs4i_time_threads(half, &tasks, &two, &faster);
+    half->tasks = tasks;
+    GS4I_TRY(result);
+    gs4i_fit_costs(t, &one, &two, faster);
+    t->cells = own.nodes + own.box;
+    return gs4i_fit_sizes(t, half);
+}
+
+/* What a step takes, and how large the scene is in the end. */
+static int gs4i_measure_trial(gs4i_trial *t)
+{
+    gs4_sim *half = NULL;
+    int result;
+    if (t->ratio > 1) {
+        result = gs4i_measure_half(t, &half);
+        gs4_destroy(half);
+        return result;
+    }
+    if (t->own.particles > 0) t->of_particle = t->own.time / t->own.particles;
+    result = gs4i_fit_sizes(t, t->sim);
+    t->cells = t->nodes + t->box;
+    return result;
+}
+
+/* What has been found, in numbers. */
+static void gs4i_tell_cost(const gs4i_trial *t, gs4_cost *cost)
+{
+    const gs4_sim *of = t->of, *s = t->sim;
+    const double end = gs4i_given_until(t, t->duration),
+                 stay = s->next_id ? (double)s->particles.count / s->next_id : 1,
+                 grown = end / fmax(1, gs4i_given_until(t, t->now.time)),
+                 more = t->cells > 0 ? (t->nodes + t->box) / t->cells : 1,
+                 steps = fmax(1, ceil(t->now.steps * (1 - 1e-9)));
+    int i, most = 0;
+    for (i = 1; i < GS4I_LIMIT_NAMES && t->name[i]; i++)
+        if (t->by[i] > t->by[most]) most = i;
+    cost->limit = t->name[most] ? t->name[most] : "none";
+    cost->steps = (uint64_t)fmin(steps, 1e18);
+    cost->dt = t->duration / fmin(steps, 1e18);
+    cost->seconds = t->of_particle * t->now.particles + t->of_cell * more * t->now.cells;
+    cost->particles = (int)(end * stay + 0.5);
+    cost->bytes = (uint64_t)(t->each
+                                 * fmax(of->desc.max_particles,
+                                        end * stay * (of->emitter_count ? 1 + 1.0 / 16 : 1))
+                             + fmax(0, t->bytes) * (t->now.time < t->duration ? grown : 1));
+}
+
+/* The estimate, with all that it takes for it; freed by the caller. */
+static int gs4i_estimate(gs4i_trial *t, gs4_scheme scheme, gs4_integrator integrator)
+{
+    int i, result;
+    t->desc = gs4i_desc_with(t->of, scheme, integrator);
+    if (t->of->desc.scheme == scheme) t->last_dt = t->of->last_dt;
+    GS4I_TRY(gs4i_check_scheme(t->of->self, &t->desc));
+    for (i = 0; i < t->of->emitter_count; i++) GS4I_TRY(gs4i_plan_emitter(t, i));
+    result = gs4i_build_trial(t);
+    if (result == GS4_OK) GS4I_TRY(gs4i_run_trial(t));
+    if (result == GS4_OK) result = gs4i_measure_trial(t);
+    return result == GS4_OK ? GS4_OK : gs4i_fail_trial(t, result);
+}
+
+GS4_API GS4I_COLD int gs4_estimate(const gs4_sim *sim, gs4_scheme scheme, gs4_integrator integrator,
+                                   double duration, gs4_cost *cost)
+{
+    gs4_sim *self = sim ? sim->self : NULL;
+    gs4i_memory *m;
+    gs4i_trial t;
+    size_t n;
+    int result;
+    if (cost) memset(cost, 0, sizeof *cost);
+    GS4I_TRY(gs4i_check_idle(self));
+    GS4I_TRY(gs4i_require(&self->error, cost != NULL, "cost is NULL"));
+    GS4I_TRY(gs4i_check(&self->error, "duration", GS4I_C(duration), GS4I_POSITIVE));
+    GS4I_TRY(gs4i_check_edit(self));
+    memset(&t, 0, sizeof t);
+    t.of = sim;
+    t.duration = duration;
+    m = &self->memory;
+    n = 2 * (size_t)sim->emitter_count + 1;
+    t.first = (double *)gs4i_alloc(m, n, sizeof *t.first);
+    if (!t.first) return gs4i_fail_memory(&self->error);
+    t.rate = t.first + sim->emitter_count;
+    self->busy = 1;
+    result = gs4i_estimate(&t, scheme, integrator);
+    if (result == GS4_OK) gs4i_tell_cost(&t, cost);
+    gs4_destroy(t.sim);
+    self->busy = 0;
+    gs4i_free(m, t.first, n, sizeof *t.first);
+    return result;
+}
+
 #undef GS4I_BACKSLASHES
 #undef GS4I_BATCH_LOOP
 #undef GS4I_BEFORE_SURFACE
@@ -28799,6 +29680,7 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
 #undef GS4I_CHUNK
 #undef GS4I_COLD
 #undef GS4I_CONDUCTS
+#undef GS4I_COST_OF_CELL
 #undef GS4I_DECONVOLVED_EIGENVALUES
 #undef GS4I_DEFAULT_ITERATIONS
 #undef GS4I_DEFAULT_TOLERANCE
@@ -28986,7 +29868,8 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *p)
  * viscous_iterations. Its colliders may slip and separate, too; it has solids, and gs4_stats their
  * elastic_iterations. Backward Euler has no velocity gradients of the step before, so checkpoints
  * of implicit scenes with it that were written before cannot be read.
- * New: gs4_surface, gs4_surface_free and gs4_write_surface, triangles of the surface.
+ * New: gs4_surface, gs4_surface_free and gs4_write_surface, triangles of the surface. New:
+ * gs4_estimate, what a run will take.
  * Coulomb friction holds without a creep. New: poses, gs4_advance_within, gs4_set_gravity,
  * gs4_set_viscosity, gs4_remove_particles; Herschel-Bulkley liquids and presets of such, with which
  * gs4_material has new members: checkpoints written before cannot be read. A step that gs4_advance

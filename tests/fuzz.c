@@ -879,6 +879,23 @@ static int advance(void)
     return end(result, -1);
 }
 
+/* Of any scheme, for some steps; what it says is numbers. */
+static int estimate(void)
+{
+    const double stable = (double)gs4_stable_dt(r.s.sim),
+                 duration = (double)any((gs4_real)(stable * (double)number(0, 20, 10)));
+    gs4_cost c;
+    int result;
+    begin("gs4_estimate");
+    result = gs4_estimate(r.s.sim, (gs4_scheme)pick(-1, 3), (gs4_integrator)pick(-1, 3), duration,
+                          one_in(50) ? NULL : &c);
+    if (result == GS4_OK)
+        check(c.steps > 0 && c.limit && c.dt > 0 && c.seconds >= 0 && c.seconds < 1e30
+                  && c.particles >= 0,
+              "what a run takes", c.dt);
+    return end(result, -1);
+}
+
 /* ==== edits by hand =========================================================================== */
 
 /* The particle with this id or the next there is, whatever their order; -1: none */
@@ -1257,6 +1274,7 @@ static int use_nothing(void)
     bad += gs4_add_collider(NULL, NULL) != GS4_ERROR_ARGUMENT;
     bad += gs4_put_collider(NULL, 0, &pose) != GS4_ERROR_ARGUMENT;
     bad += gs4_step(NULL, 1) != GS4_ERROR_ARGUMENT;
+    bad += gs4_estimate(NULL, GS4_EXPLICIT, GS4_INTEGRATOR_GS4, 1, NULL) != GS4_ERROR_ARGUMENT;
     bad += gs4_advance(NULL, 1) != GS4_ERROR_ARGUMENT;
     gs4_surface_free(NULL, NULL);
     bad += gs4_surface(NULL, GS4_FIELD_MASS, NULL) != GS4_ERROR_ARGUMENT
@@ -1292,7 +1310,8 @@ static int any_call(void)
         { set_viscosity, 4 }, { move_body, 5 },        { place_body, 8 },
         { edit, 5 },          { edit_absurdly, 5 },    { save, 3 },
         { load, 3 },          { load_damaged, 5 },     { write_frames, 2 },
-        { use_point, 3 },     { use_poisson, 2 },      { use_nothing, 1 }
+        { use_point, 3 },     { use_poisson, 2 },      { use_nothing, 1 },
+        { estimate, 1 }
     };
     int i, which, all = 0;
     for (i = 0; i < COUNT(kinds); i++) all += kinds[i].weight;

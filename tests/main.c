@@ -38,6 +38,7 @@
 #include "test_semi_viscoelastic.c"
 #include "test_semi_solids.c"
 #include "test_mesh.c"
+#include "test_estimate.c"
 #include "test_reference.c"
 
 #ifdef GS4_FEW
@@ -136,6 +137,7 @@ int main(int count, char **values)
     run_semi_viscoelastic();
     run_semi_solids();
     run_mesh();
+    run_estimate();
     RUN_ONCE(test_reference);
     RUN_FULL(test_stability);
     RUN(test_stability_by_hand);

@@ -1137,9 +1137,9 @@ static int write_frames(void)
     const int bad = one_in(10);
     begin("gs4_write_ply");
     if (end(gs4_write_ply(r.s.sim, bad ? NULL : r.path), -1) < 0) return -1;
+    r.saved_version = -1; /* a frame has taken the place of a checkpoint */
     if (get_surface() < 0) return -1;
     begin("gs4_write_raw");
-    r.saved_version = -1;
     return end(gs4_write_raw(r.s.sim, bad ? "/nowhere/at/all" : r.path), -1);
 }
 

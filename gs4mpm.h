@@ -315,10 +315,13 @@
  * follows Huppert's law within 5 % to t g H^3/(nu R0^2) = 3 in 60 steps; one of 12 cells from 0.3
  * to 30 in 600 to 1000, most of them where single particles fall from its front (tests:
  * semi_current).
+ *     Free fall is exact, but in a first step with e = nu dt/(16 h^2) above sqrt(2): its alpha_f is
+ * 1 - 1/e^2, so that what creeps does at once; what falls is (1/2 - 1/e^2) g dt^2 too low after it
+ * and 1.5 times that after a few more.
  *     A thread of 6 cells across that hangs from a wall and stretches under its weight is within
  * 2 % of the slender limit in length and area until its area has halved, in 40 steps (tests:
  * semi_thread). A rope of 6 cells across that falls on a bare sticky floor by 8 to 12 diameters,
- * without gravity and inertia, coils within 6 % of 4.00 U/H, H to the middle of what lies (tests:
+ * without gravity and inertia, coils within 5 % of 4.00 U/H, H to the middle of what lies (tests:
  * semi_coiling); on a heap of its own rings, which is uneven, 8 to 19 % slower than that.
  *     Where nu dt > 16 h^2 viscosity leaves nothing that would take from faces what they remember
  * and particles do not see, so a tenth of it is forgotten in each step; and where steps are longer
@@ -27520,6 +27523,7 @@ GS4_API GS4I_COLD int gs4_set_viscosity(gs4_sim *sim, int material, gs4_real vis
     m.viscosity = viscosity;
     if (m.viscosity_law != GS4_VISCOSITY_CROSS_WLF) memset(&m.cross_wlf, 0, sizeof m.cross_wlf);
     GS4I_TRY(gs4i_check_material(&sim->error, &scene, &m));
+    gs4i_restart(sim); /* rates are of the viscosity before */
     sim->constants[material].is.viscosity = viscosity;
     gs4i_set_constants(sim);
     sim->limits_stale = 1;
@@ -29896,4 +29900,6 @@ GS4_API GS4I_COLD int gs4_estimate(const gs4_sim *sim, gs4_scheme scheme, gs4_in
  * limit; single particles stay on sticky walls and bodies, where they slid, and a step that would
  * let them fall through more than two cells is refused.
  * Partitioned: what flies past dry walls does not feel them, falls in uneven steps are exact, the
- * limit of viscosity is that of the member. */
+ * limit of viscosity is that of the member. gs4_set_viscosity starts the integrator anew, as
+ * gs4_set_gravity does: one step of the semi-implicit scheme decayed with the viscosity before.
+ * gs4_estimate. */

@@ -29565,7 +29565,7 @@ static int gs4i_measure_half(gs4i_trial *t, gs4_sim **made)
     gs4_sim *half;
     gs4i_run_load one, two, own;
     gs4i_tasks tasks;
-    double faster;
+    double faster = 1;
     int cells[3], a, result;
     for (a = 0; a < 3; a++) cells[a] = 2 * t->sim->grid.cells[a];
     GS4I_TRY(gs4i_time_steps(t->sim, &one));

@@ -29197,7 +29197,7 @@ static int gs4i_build_trial(gs4i_trial *t)
     const double side = gs4i_mean_side(t->of), all = gs4i_given_until(t, t->duration);
     int cells[3], result;
     gs4_sim_desc d = t->desc;
-    t->ratio = fmax(1, floor(cbrt(all / GS4I_TRIAL_PARTICLES) + 1e-9));
+    t->ratio = fmax(1, floor(cbrt(all / (double)GS4I_TRIAL_PARTICLES) + 1e-9));
     if (t->ratio > 1) {
         d.threads = 1;
         d.parallel_for = NULL;
@@ -29346,7 +29346,7 @@ static int gs4i_fail_trial(const gs4i_trial *t, int result)
  * did, but for what emitters give. */
 static int gs4i_run_trial(gs4i_trial *t)
 {
-    const double most = GS4I_TRIAL_WORK / (t->desc.scheme == GS4_EXPLICIT ? 1.0 : 8.0);
+    const double most = (double)GS4I_TRIAL_WORK / (t->desc.scheme == GS4_EXPLICIT ? 1.0 : 8.0);
     double rest, rate, each, stay;
     gs4i_run_load l;
     int k;

@@ -27903,7 +27903,7 @@ GS4_API const char *gs4_limit_name(const gs4_sim *sim)
 static int gs4i_try_step(gs4_sim *sim, gs4_real dt)
 {
     gs4i_report r;
-    gs4_real limit;
+    gs4_real limit, longest;
     const char *by;
     int result;
     GS4I_TRY(gs4i_check(&sim->error, "dt", dt, GS4I_POSITIVE));
@@ -27924,10 +27924,12 @@ static int gs4i_try_step(gs4_sim *sim, gs4_real dt)
     sim->limits = r;
     if (sim->limits_stale) gs4i_warn_of_soft(sim);
     sim->limits_stale = 0;
-    if (limit < GS4I_C(1e-6))
-        gs4i_warn_value(sim, GS4I_WARN_SHORT_STEPS, "the stable step is ", (double)limit,
+    longest = gs4i_min(sim->desc.cfl * limit, sim->desc.max_dt > 0 ? sim->desc.max_dt : limit);
+    if (longest < GS4I_C(1e-6))
+        gs4i_warn_value(sim, GS4I_WARN_SHORT_STEPS, "gs4_advance takes steps of ", (double)longest,
                         " s: a second of the scene takes more than a million steps; less "
-                        "viscosity, stiffness, sound_speed or speed, or larger cells, would do");
+                        "viscosity, stiffness, sound_speed or speed, larger cells, or more cfl or "
+                        "max_dt would do");
     sim->busy = 1;
     result = gs4i_step(sim, dt);
     sim->busy = 0;

@@ -2540,7 +2540,7 @@ static void err_walk_into(err_trap trap, err_words *words)
     d.log = err_hear;
     d.log_user = words;
     if (trap == ERR_NO_DECAY) d.flip_decay_time = (gs4_real)ERR_INFINITY;
-    if (trap == ERR_SHORT_STEPS) m.viscosity = (gs4_real)3e7;
+    if (trap == ERR_SHORT_STEPS) m.viscosity = (gs4_real)5e6; /* 1.4e-6 s, half of it by cfl */
     m.heat_capacity = 1000;
     m.solid = GS4_NEO_HOOKEAN;
     m.shear_modulus = 1000;

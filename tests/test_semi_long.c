@@ -114,8 +114,8 @@ static gs4_real coil_distance(gs4_vec3 point, void *user)
     return (gs4_real)(sqrt(least) - 1e-4);
 }
 
-/* Leaves of the rope `length` below the nozzle and half a diameter above, and all that is higher
- * than 1.5 diameters. */
+/* Takes away what lies lower than 1.5 diameters and came more than `length` of rope ago, of all
+ * that was given. */
 static void coil_clear(gs4_sim *sim, int down, double across, double given, double length)
 {
     const gs4_view x = gs4_particles(sim, GS4_FIELD_POSITION);
@@ -205,7 +205,8 @@ static void test_semi_coiling(void)
         const double period = 2 * pi * middle / (4 * speed), piece = period / 40;
         double angle = 0, turned = 0, rate;
         gs4_sim *sim = coil_rope(down, across, height, mouth);
-        int i, pieces = 200;
+        const int pieces = 200;
+        int i;
         for (i = 1; i <= pieces; i++) {
             const int result = gs4_advance(sim, (gs4_real)piece);
             double now;

@@ -28690,12 +28690,6 @@ GS4_API GS4I_COLD int gs4_material_preset(const char *name, gs4_material *materi
     return gs4i_tell(&e, gs4i_find_preset(&e, name, material));
 }
 
-#if defined(__clang__)
-#pragma STDC FP_CONTRACT DEFAULT
-#elif defined(__GNUC__) && !defined(__TINYC__)
-#pragma GCC pop_options
-#endif
-
 /* --- the elliptic solver by itself ------------------------------------------------------------ */
 
 struct gs4_poisson {
@@ -29672,6 +29666,12 @@ GS4_API GS4I_COLD int gs4_estimate(const gs4_sim *sim, gs4_scheme scheme, gs4_in
     gs4i_free(m, t.first, n, sizeof *t.first);
     return result;
 }
+
+#if defined(__clang__)
+#pragma STDC FP_CONTRACT DEFAULT
+#elif defined(__GNUC__) && !defined(__TINYC__)
+#pragma GCC pop_options
+#endif
 
 #undef GS4I_BACKSLASHES
 #undef GS4I_BATCH_LOOP

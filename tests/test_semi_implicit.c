@@ -742,6 +742,38 @@ static void test_semi_current(void)
     }
 }
 
+/* A drop that turns falls by g t^2/2, in a first step and after, however long that is for what
+ * creeps: by gravity along every axis at once, nu dt/h^2 from 1 to 1.6e6. */
+static void test_semi_free_fall(void)
+{
+    static const double u[3] = { 0.1, 0.2, -0.1 }, g[3] = { 30, -60, 30 };
+    static double x0[3 * 8192], x1[3 * 8192];
+    double number;
+    for (number = 1; number < 1e7; number *= 36) {
+        gs4_sim *sim = semi_drop(5, GS4_INTEGRATOR_GS4, number, 0.1, 5);
+        const int count = gs4_get_stats(sim).particles;
+        int c, i, k;
+        sim->desc.gravity = at(g[0], g[1], g[2]);
+        sim->desc.solver_tolerance = (gs4_real)1e-6;
+        scene_by_id(sim, GS4_FIELD_POSITION, x0);
+        for (k = 1; k <= 5; k++) {
+            const double t = 0.01 * k;
+            double move[3] = { 0, 0, 0 };
+            CHECK_RESULT(sim, gs4_step(sim, (gs4_real)0.01), GS4_OK);
+            scene_by_id(sim, GS4_FIELD_POSITION, x1);
+            for (i = 0; i < 3 * count; i++) move[i % 3] += (x1[i] - x0[i]) / count;
+            if (test_filter[0]) printf("nu dt/h^2 %g, step %d:", number, k);
+            for (c = 0; c < 3; c++) {
+                const double fallen = (move[c] - u[c] * t) / (0.5 * g[c] * t * t);
+                if (test_filter[0]) printf(" %.5f", fallen);
+                CHECK_CLOSE(fallen, 1, 1e-3);
+            }
+            if (test_filter[0]) printf("\n");
+        }
+        gs4_destroy(sim);
+    }
+}
+
 /* A block that a floor has held for long falls freely once that is pulled away: steps that outlast
  * the fall are refused, none of them is taken, and gs4_advance finds shorter ones. */
 static void test_semi_let_fall(void)
@@ -981,6 +1013,7 @@ static void run_semi_implicit(void)
     RUN_FULL(test_semi_order);
     RUN_FULL(test_semi_levelling);
     RUN_FULL_ONCE(test_semi_levelling_limit);
+    RUN(test_semi_free_fall);
     RUN_FULL(test_semi_let_fall);
     RUN_FULL(test_semi_current);
     RUN(test_semi_refusals);

@@ -310,6 +310,41 @@ static void test_yield_regularised(void)
     }
 }
 
+/* The same by the semi-implicit scheme, whose viscosity is that of the step before: steady after 40
+ * steps of a fifth of rho h^2/consistency, h half the channel. Plug and flux within 1.3 % at 16
+ * cells, 0.4 % at 32; the profile's order, which is 1.8 from 32 to 64, is not yet 2 here, where
+ * cells are wider than what creeps at the plug's edge. */
+static void test_yield_semi_implicit(void)
+{
+    int i, k, fine;
+    physics_scheme = GS4_SEMI_IMPLICIT;
+    for (i = test_slow ? 1 : 2; i < 4; i++) {
+        const gs4_material m = yield_material(yield_rows[i].Bn, yield_rows[i].index, 0.05);
+        double u[YIELD_STEPS + 1], error[2];
+        const double flux = yield_profile(&m, u);
+        for (fine = 0; fine < 2; fine++) {
+            const int along = i % 3, across = (i + 1) % 3;
+            const double share = fine ? 0.004 : 0.013;
+            gs4_sim *sim = yield_channel(&m, 16 << fine, along, across, GS4_INTEGRATOR_GS4);
+            yield_flow q;
+            for (k = 0; k < 40; k++) CHECK_RESULT(sim, gs4_step(sim, (gs4_real)0.2), GS4_OK);
+            q = yield_measure(sim, along, across, 1, u);
+            error[fine] = q.error / u[0];
+            if (test_filter[0])
+                printf(
+                    "  index %g, Bn %g, %d cells: plug %+.2f %%, flux %+.2f %%, profile %.2f %%\n",
+                    yield_rows[i].index, yield_rows[i].Bn, 16 << fine, 100 * (q.plug / u[0] - 1),
+                    100 * (q.flux / flux - 1), 100 * error[fine]);
+            CHECK_CLOSE(q.plug / u[0], 1, share);
+            CHECK_CLOSE(q.flux / flux, 1, share);
+            gs4_destroy(sim);
+        }
+        if (test_filter[0]) printf("order %.2f\n", log2(error[0] / error[1]));
+        CHECK_BETWEEN(log2(error[0] / error[1]), 1.55, 2);
+    }
+    physics_scheme = GS4_EXPLICIT;
+}
+
 /* How far from the middle the velocity falls to `level`, between the particles next to there. */
 static double yield_width_at(const gs4_sim *sim, double level)
 {
@@ -720,6 +755,7 @@ static void run_yield(void)
     RUN(test_yield_newtonian);
     RUN_FULL(test_yield_stands);
     RUN_FULL_ONCE(test_yield_regularised);
+    RUN_FULL(test_yield_semi_implicit);
     RUN_FULL_ONCE(test_yield_channel);
     RUN_SLOW(test_yield_dimensional);
     RUN_FULL_ONCE(test_yield_slump);

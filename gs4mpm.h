@@ -305,8 +305,10 @@
  * spheres of 8 cells decay within 5 %. In steps of 100 times the explicit limit Poiseuille flow is
  * within 0.5 % at 8 cells. Viscous heating is that of u~. The solve to 1e-6 takes 9 to 25
  * iterations (viscous_iterations) for any s mu/(rho h^2) in compact bodies, pools and rooms; up to
- * 65 in ropes and folded sheets, 40 in porous matter and spray, 90 in pools with inclusions 1e6
- * times stiffer (bench/stokes.c). A step that does not converge is refused.
+ * 50 in ropes and folded sheets of 32 cells, 75 in sheets of 64, 40 in porous matter and spray, 90
+ * in pools with inclusions 1e6 times stiffer (bench/stokes.c); a coil four cells thick and a
+ * hundred times as long, which touches itself nowhere, does not converge from s mu/(rho h^2) = 1e4
+ * on. A step that does not converge is refused.
  *     On slippery planes liquid slides with g sin within 1 %, from s mu/(rho h^2) = 0.3 on within
  * 2.5 %; shear waves between such, wherever they cut cells, fall within 1 % of the exact. Where
  * s mu/(rho h^2) is far above 1 bodies with a curved surface brake what turns along it, as faces
@@ -7620,7 +7622,8 @@ static void gs4i_rigid_count_blocks(const gs4i_stokes *s, int32_t blocks[3])
 }
 
 /* Faces of a plane: block, arm, themselves as root. They belong to the cell behind, or, where that
- * is not liquid, to that before. */
+ * is not liquid, to that before. At a surface rows join a face to that across its cell alone, so it
+ * belongs to where that does: a node by itself, it would hold the other's. */
 static void gs4i_rigid_place_plane(int z, void *context)
 {
     const gs4i_stokes *s = (const gs4i_stokes *)context;
@@ -7633,14 +7636,19 @@ static void gs4i_rigid_place_plane(int z, void *context)
     for (c = 0; c < 3; c++)
         GS4I_STOKES_PLANE(s, 1 << c, z, at, i) {
             const int32_t f = y->number[c][i];
-            int p[3], before;
+            int p[3], steps; /* from the cell behind to the one it belongs to */
             if (!f) continue;
-            before = !y->face_cells[f][1];
+            steps = -!y->face_cells[f][1];
+            if (!y->face_cells[f][0]) {
+                const int32_t across = y->cell_faces[y->face_cells[f][1]][2 * c + 1];
+                steps = across && y->face_cells[across][1];
+            }
             for (a = 0; a < 3; a++) p[a] = at[a] - s->first[a];
-            p[c] -= before;
+            p[c] += steps;
             if (p[c] < 0) p[c] = s->end[c] - s->first[c] - 1;
+            if (p[c] >= s->end[c] - s->first[c]) p[c] = 0;
             for (a = 0; a < 3; a++) m->arm[f][a] = (int8_t)(2 * (p[a] & 1) - 1);
-            m->arm[f][c] = (int8_t)(m->arm[f][c] + 2 * before - 1);
+            m->arm[f][c] = (int8_t)(m->arm[f][c] - 2 * steps - 1);
             m->arm[f][3] = (int8_t)c;
             m->block[f] = ((p[2] >> 1) * blocks[1] + (p[1] >> 1)) * blocks[0] + (p[0] >> 1);
             m->parent[f] = gs4i_stokes_stiffness(y, f) >= (double)y->mass[f] ? f : 0;

@@ -23577,7 +23577,6 @@ static void gs4i_note_emission(gs4_sim *sim, const gs4i_material_constants *m)
     r->max_sound = gs4i_max(r->max_sound, m->sound_speed * GS4I_SQRT(m->lone));
     r->max_viscosity = gs4i_max(r->max_viscosity, m->viscosity * m->inv_density);
     r->min_viscosity = gs4i_min(r->min_viscosity, m->local * m->viscosity * m->inv_density);
-    r->max_rate = gs4i_max(r->max_rate, gs4i_fall_of(sim));
     r->max_stiffness =
         gs4i_max(r->max_stiffness, gs4i_max(2 * m->modulus, GS4I_SOLID_WAVES * m->shear_modulus)
                                        * m->lone * m->inv_density);
@@ -23619,6 +23618,9 @@ static void gs4i_emit(gs4_sim *sim)
         if (!gs4i_emission_is_due(e, e->flowed)) continue;
         gs4i_emit_rows(sim, i, e->flowed);
         e->emitted = e->flowed;
+        /* a stream that goes on is held, or falls, as the step has seen; another may fall */
+        if (!e->has_emitted || e->active < (double)sim->integrator.dt * (1 - 1e-6))
+            sim->limits.max_rate = gs4i_max(sim->limits.max_rate, gs4i_fall_of(sim));
         e->has_emitted = 1;
         gs4i_note_emission(sim, &sim->constants[e->is.fill.material]);
     }

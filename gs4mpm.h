@@ -29897,8 +29897,9 @@ GS4_API GS4I_COLD int gs4_estimate(const gs4_sim *sim, gs4_scheme scheme, gs4_in
  * the partitioned scheme too; there a step much longer than the last one gives no energy.
  * gs4_limit_name; gs4_stats has `refused`. gs4_advance tries half of what was refused, before
  * half of the limit, which a max_dt could keep the same. Semi-implicit: steps are limited by
- * what moves, not by a fall that viscosity holds; viscosity is not cut off at s mu/(rho h^2) of
- * 1e6 any more, beyond which all crept too fast; the residual counts volume beside what flows.
+ * what moves, not by a fall that viscosity holds, in streams of emitters neither; viscosity is not
+ * cut off at s mu/(rho h^2) of 1e6 any more, beyond which all crept too fast; the residual counts
+ * volume beside what flows.
  * Where steps outlast a fall by far they are a fifth as many, as six layers of faces go on from
  * liquid. Noise decays more slowly where all motion that the grid does not see does at once (dt
  * above 0.5 s): by both, single particles swung for ever. A first step that is longer than flow

@@ -220,12 +220,13 @@ static void test_semi_stream(void)
 }
 
 /* Turns of the rope, rad, in the second half of `time`, s, while what is farther from the nozzle
- * than `length` of rope at its first width is taken off the floor. */
-static double coil_turn(gs4_sim *sim, const coil_rope *r, int down, double time, double length)
+ * than `length` of rope at its first width is taken off the floor, `pauses` pieces apart: under
+ * gravity each time costs some steps, which begin with that of a fall. */
+static double coil_turn(gs4_sim *sim, const coil_rope *r, int down, double time, double length,
+                        int pauses)
 {
     enum {
-        PIECES = 200,
-        CLEARED = 5
+        PIECES = 200
     };
     const double pi = 3.14159265358979, piece = time / PIECES;
     double angle = 0, turned = 0;
@@ -238,7 +239,7 @@ static double coil_turn(gs4_sim *sim, const coil_rope *r, int down, double time,
         now = coil_angle(sim, down, r->height, angle);
         if (i > PIECES / 2) turned += remainder(now - angle, 2 * pi);
         angle = now;
-        if (i % CLEARED == 0)
+        if (i % pauses == 0)
             coil_clear(sim, down, r->across, i * piece * r->speed + r->mouth, length);
     }
     return fabs(turned);
@@ -260,7 +261,7 @@ static void test_semi_coiling(void)
         const coil_rope rope = { 1, across, height, 2, speed, 1e4, 0, 0.25 * height + across / 2 };
         gs4_sim *sim = coil_make(&rope, down);
         const double rate =
-            coil_turn(sim, &rope, down, time, 1.9 * height) / (0.5 * time) * middle / speed;
+            coil_turn(sim, &rope, down, time, 1.9 * height, 1) / (0.5 * time) * middle / speed;
         if (test_filter[0])
             printf("%g across, %g high: %.3f U/H, %d steps\n", across, height, rate,
                    (int)gs4_get_stats(sim).steps);
@@ -332,7 +333,7 @@ static void test_semi_coiling_gravity(void)
         time = 6 * 2 * pi / law;
         /* what falls has the mean of both speeds; of a ring half is left */
         rate = coil_turn(sim, &rope, down, time,
-                         length * H * 2 / (1 + U) + 0.5 * 2 * pi * radius * H / U)
+                         length * H * 2 / (1 + U) + 0.5 * 2 * pi * radius * H / U, 5)
                / (0.5 * time);
         if (test_filter[0])
             printf("%g across, %g high: %.3f of %.4f, %d steps\n", across, H, rate / law, law,

@@ -306,10 +306,10 @@
  * 65 in ropes and folded sheets, 40 in porous matter and spray, 90 in pools with inclusions 1e6
  * times stiffer (bench/stokes.c). A step that does not converge is refused.
  *     Thin bodies need both in one solve: of the bending stiffness mu d^3/3 of an incompressible
- * sheet half is due to its pressure. One that solves viscosity first, then pressure, has sheets bend
- * 1.98 times as fast as they should, in short steps as in long ones. Together a sheet of 6 cells
- * bends within 1 % of beam theory between clamps and within 3 % of the exact in waves, one of 12
- * within .8 % (tests: stokes_sheet).
+ * sheet half is due to its pressure. One that solves viscosity first, then pressure, has sheets
+ * bend 1.98 times as fast as they should, in short steps as in long ones. Together a sheet of 6
+ * cells bends within 1 % of beam theory between clamps and within 3 % of the exact in waves, one of
+ * 12 within .8 % (tests: stokes_sheet).
  *     On slippery planes liquid slides with g sin within 1 %, from s mu/(rho h^2) = 0.3 on within
  * 2.5 %; shear waves between such, wherever they cut cells, fall within 1 % of the exact. Where
  * s mu/(rho h^2) is far above 1 bodies with a curved surface brake what turns along it, as faces

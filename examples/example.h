@@ -250,10 +250,10 @@ static void example_advance(gs4_sim *sim, double time)
         if (result == GS4_OK && !(now < end)) return;
         if (result == GS4_OK)
             most *= 4;
-        else if ((result != GS4_ERROR_UNSTABLE && result != GS4_ERROR_NOT_CONVERGED) || most < 1e-5)
-            example_need(sim, result);
-        else
+        else if ((result == GS4_ERROR_UNSTABLE || result == GS4_ERROR_NOT_CONVERGED) && most > 1e-5)
             most = 1e-3 * fmin(most, s.dt);
+        else
+            example_need(sim, result);
     }
 }
 

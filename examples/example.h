@@ -237,8 +237,8 @@ static void example_write(const example *e, gs4_sim *sim)
     }
 }
 
-/* Where a thread of pitch breaks, milliseconds follow a step of hours: when gs4_advance has found no
- * step that is good, a thousandth of its last is tried, down to 10 us. */
+/* Where a thread of pitch breaks, milliseconds follow a step of hours: when gs4_advance has found
+ * no step that is good, a thousandth of its last is tried, down to 10 us. */
 static void example_advance(gs4_sim *sim, double time)
 {
     double now = gs4_get_stats(sim).time, most = time;

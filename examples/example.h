@@ -247,7 +247,7 @@ static void example_advance(gs4_sim *sim, double time)
         const int result = gs4_advance(sim, real(fmin(end - now, most)));
         const gs4_stats s = gs4_get_stats(sim);
         now = most < time || result < 0 ? s.time : end;
-        if (result == GS4_OK && !(now < end)) return;
+        if (result == GS4_OK && end - now < 1e-6 * time) return;
         if (result == GS4_OK)
             most *= 4;
         else if ((result == GS4_ERROR_UNSTABLE || result == GS4_ERROR_NOT_CONVERGED) && most > 1e-5)

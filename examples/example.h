@@ -237,7 +237,7 @@ static void example_write(const example *e, gs4_sim *sim)
     }
 }
 
-/* Where a thread of pitch breaks, milliseconds follow a step of hours: when gs4_advance has found
+/* Where a thread of pitch tears, milliseconds follow a step of hours: when gs4_advance has found
  * no step that is good, a thousandth of its last is tried, down to 10 us. */
 static void example_advance(gs4_sim *sim, double time)
 {

@@ -1,17 +1,17 @@
-/* pitch.c - the pitch drop experiment: a drop forms below a funnel, hangs, thins and falls.
+/* pitch.c - the pitch drop experiment: a drop forms below a funnel, hangs and thins.
  *     cc -O3 -march=native examples/pitch.c -Iexamples -I. -lm -lpthread -o pitch
  *     ./pitch                             three minutes; pictures in out/
- *     ./pitch --frames 40                 and on, until the thread tears: many minutes
+ *     ./pitch --frames 40                 on to where the thread tears: many minutes
  *
  * Pitch of 2.3e8 Pa s in the funnel of Brisbane: a stem of 9.4 by 29 mm under 75 mm of pitch, here
  * in a cylinder of 24 mm (Edgeworth, Dalton & Parnell 1984). The semi-implicit scheme: explicit
- * steps would be 4 ps, here they are days while it creeps and milliseconds while it falls. What has
+ * steps would be 4 ps, here they are up to a week, and milliseconds where crumbs fall. What has
  * left the stem is printed beside the law of Poiseuille. Sticky bodies hold what is inside, on
  * average half a cell behind their surface: the stem is made narrower by that, and so is what it
  * lets through, by some %. There is no surface tension: weight alone thins the drop, and its thread
- * tears where it is less than about two cells wide. A slender thread would break after
- * sqrt(12 mu A/(rho g Q)) = 0.7 years (Wilson 1988), A the section of the stem, Q what flows; those
- * of the experiment last 8 to 13, so theirs are not as simple. */
+ * crumbles where it is less than about two cells wide, which is where this ends. A slender thread
+ * would break after sqrt(12 mu A/(rho g Q)) = 0.7 years (Wilson 1988), A the section of the stem, Q
+ * what flows; those of the experiment last 8 to 13, so theirs are not as simple. */
 #include "example.h"
 
 enum {

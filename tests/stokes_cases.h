@@ -96,8 +96,8 @@ static double stokes_contrast(const char *name, int n, double x, double y, doubl
 
 static int stokes_kind(const stokes_case *k, int x, int y, int z)
 {
-    const int n = k->box.size[0];
-    if (x < 0 || y < 0 || z < 0 || x >= n || y >= n || z >= n) return GS4_CELL_SOLID;
+    const int *n = k->box.size;
+    if (x < 0 || y < 0 || z < 0 || x >= n[0] || y >= n[1] || z >= n[2]) return GS4_CELL_SOLID;
     return k->kind[gs4i_box_index(&k->box, GS4I_AT_CELL, x, y, z)];
 }
 
@@ -133,35 +133,26 @@ static void *stokes_alloc(size_t count, size_t size)
     return p;
 }
 
-/* All of mu times what `contrast` says ("": the same everywhere). */
-static stokes_case *stokes_make(const char *name, int n, double mu, const char *contrast)
+/* A box of cells without anything, of which nothing moves yet. */
+static stokes_case *stokes_reserve(const int size[3])
 {
     stokes_case *k = (stokes_case *)stokes_alloc(1, sizeof *k);
-    int at[3], z, c;
-    size_t i;
-    stokes_seed = 7;
+    int c;
     k->memory.hook.alloc_fn = gs4i_default_alloc;
     k->memory.hook.free_fn = gs4i_default_free;
-    for (c = 0; c < 3; c++) k->box.size[c] = n;
-    k->cells = (size_t)n * (size_t)n * (size_t)n;
+    for (c = 0; c < 3; c++) k->box.size[c] = size[c];
+    k->cells = gs4i_box_count(&k->box, GS4I_AT_CELL);
     k->kind = (uint8_t *)stokes_alloc(k->cells, 1);
     k->viscosity = (gs4_real *)stokes_alloc(k->cells, sizeof(gs4_real));
     k->p = (gs4_real *)stokes_alloc(k->cells, sizeof(gs4_real));
     k->e = (gs4_real *)stokes_alloc(k->cells, sizeof(gs4_real));
-    for (z = 0; z < n; z++) STOK_PLANE(&k->box, GS4I_AT_CELL, z, at, i)
-        {
-            const double x = at[0] + 0.5, y = at[1] + 0.5;
-            k->kind[i] = (uint8_t)stokes_kind_at(name, n, x, y, z + 0.5);
-            k->viscosity[i] = (gs4_real)(mu * stokes_contrast(contrast, n, x, y, z + 0.5));
-        }
     for (c = 0; c < 3; c++) {
         const size_t count = gs4i_box_count(&k->box, 1 << c);
         k->face[c] = (uint8_t *)stokes_alloc(count, 1);
         k->mass[c] = (gs4_real *)stokes_alloc(count, sizeof(gs4_real));
         k->rhs[c] = (gs4_real *)stokes_alloc(count, sizeof(gs4_real));
         k->u[c] = (gs4_real *)stokes_alloc(count, sizeof(gs4_real));
-        stokes_set_faces(k, c);
-        k->s.end[c] = n;
+        k->s.end[c] = size[c];
         k->s.face[c] = k->face[c];
         k->s.mass[c] = k->mass[c];
         k->s.rhs[c] = k->rhs[c];
@@ -177,6 +168,25 @@ static stokes_case *stokes_make(const char *name, int n, double mu, const char *
     k->s.p = k->p;
     k->s.tolerance = 1e-6;
     k->s.max_iterations = 200;
+    return k;
+}
+
+/* All of mu times what `contrast` says ("": the same everywhere). */
+static stokes_case *stokes_make(const char *name, int n, double mu, const char *contrast)
+{
+    int size[3], at[3], z, c;
+    stokes_case *k;
+    size_t i;
+    size[0] = size[1] = size[2] = n;
+    k = stokes_reserve(size);
+    stokes_seed = 7;
+    for (z = 0; z < n; z++) STOK_PLANE(&k->box, GS4I_AT_CELL, z, at, i)
+        {
+            const double x = at[0] + 0.5, y = at[1] + 0.5;
+            k->kind[i] = (uint8_t)stokes_kind_at(name, n, x, y, z + 0.5);
+            k->viscosity[i] = (gs4_real)(mu * stokes_contrast(contrast, n, x, y, z + 0.5));
+        }
+    for (c = 0; c < 3; c++) stokes_set_faces(k, c);
     return k;
 }
 

@@ -237,26 +237,6 @@ static void example_write(const example *e, gs4_sim *sim)
     }
 }
 
-/* Where a thread of pitch tears, milliseconds follow a step of hours: when gs4_advance has found
- * no step that is good, a thousandth of its last is tried, down to 10 us. */
-static void example_advance(gs4_sim *sim, double time)
-{
-    double now = gs4_get_stats(sim).time, most = time;
-    const double end = now + time;
-    for (;;) {
-        const int result = gs4_advance(sim, real(fmin(end - now, most)));
-        const gs4_stats s = gs4_get_stats(sim);
-        now = most < time || result < 0 ? s.time : end;
-        if (result == GS4_OK && end - now < 1e-6 * time) return;
-        if (result == GS4_OK)
-            most *= 4;
-        else if ((result == GS4_ERROR_UNSTABLE || result == GS4_ERROR_NOT_CONVERGED) && most > 1e-5)
-            most = 1e-3 * fmin(most, s.dt);
-        else
-            example_need(sim, result);
-    }
-}
-
 /* Simulates and writes one frame; 0 when all are done. */
 static int example_frame(example *e, gs4_sim *sim)
 {
@@ -266,7 +246,7 @@ static int example_frame(example *e, gs4_sim *sim)
         if (isatty(2)) fputc('\n', stderr);
         return 0;
     }
-    example_advance(sim, e->frame_time);
+    example_need(sim, gs4_advance(sim, real(e->frame_time)));
     s = gs4_get_stats(sim);
     ++e->frame;
     example_write(e, sim);

@@ -774,9 +774,9 @@ static void test_semi_free_fall(void)
     }
 }
 
-/* A block that a floor has held for long falls freely once that is pulled away: steps that outlast
- * the fall are refused, none of them is taken, and gs4_advance finds shorter ones. */
-static void test_semi_let_fall(void)
+/* A block on a sticky floor in the air, held for `time` in long steps; then that is pulled away, as
+ * if nobody had said so. */
+static gs4_sim *semi_held(double time)
 {
     gs4_sim_desc d = semi_cube(16);
     const gs4_material m = partitioned_liquid(1e7);
@@ -785,7 +785,6 @@ static void test_semi_let_fall(void)
     gs4_pose pose;
     gs4_stats s;
     gs4_sim *sim;
-    uint64_t before;
     int body;
     d.gravity = at(0, -1, 0);
     d.solver_tolerance = (gs4_real)1e-5;
@@ -796,17 +795,27 @@ static void test_semi_let_fall(void)
     body = gs4_add_collider(sim, &c);
     f.material = gs4_add_material(sim, &m);
     gs4_add_particles(sim, gs4_box(at(0.25, 0.5, 0.25), at(0.75, 0.75, 0.75)), &f);
-    CHECK_RESULT(sim, gs4_advance(sim, 100), GS4_OK);
+    CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)time), GS4_OK);
     s = gs4_get_stats(sim);
     CHECK_BETWEEN(s.steps, 1, 60);
     CHECK_BETWEEN(s.max_speed, 0, 1e-5);
     CHECK_RESULT(sim, gs4_collider_pose(sim, body, &pose), GS4_OK);
     pose.position.x += 10;
     CHECK_RESULT(sim, gs4_put_collider(sim, body, &pose), GS4_OK);
-    /* as if nobody had said so */
     sim->limits_stale = 0;
     sim->limits.max_rate = 0;
-    before = gs4_state_hash(sim);
+    return sim;
+}
+
+/* A block that a floor has held for long falls freely once that is pulled away: steps that outlast
+ * the fall are refused, none of them is taken, and gs4_advance finds shorter ones, also where they
+ * are a ten thousandth of the last. */
+static void test_semi_let_fall(void)
+{
+    gs4_sim *sim = semi_held(100);
+    uint64_t before = gs4_state_hash(sim);
+    gs4_budget one;
+    gs4_stats s;
     CHECK_RESULT(sim, gs4_step(sim, 2), GS4_ERROR_UNSTABLE);
     CHECK(strstr(gs4_last_error(sim), "would move") != NULL);
     CHECK(gs4_state_hash(sim) == before);
@@ -815,6 +824,16 @@ static void test_semi_let_fall(void)
     CHECK_BETWEEN(s.refused, 1, 8);
     /* the rate takes a step to know: a third of one, at most 0.45 s, is lost */
     CHECK_BETWEEN(-s.momentum[1] / s.mass, 0.75, 0.9);
+    gs4_destroy(sim);
+    memset(&one, 0, sizeof one);
+    one.steps = 1;
+    sim = semi_held(1e5);
+    CHECK(gs4_get_stats(sim).dt > 1e3);
+    CHECK_RESULT(sim, gs4_advance_within(sim, (gs4_real)1e4, &one, NULL), GS4_OK);
+    s = gs4_get_stats(sim);
+    if (test_filter[0]) printf("%g steps refused, %g s taken\n", (double)s.refused, s.dt);
+    CHECK_BETWEEN(s.refused, 1, 7);
+    CHECK_BETWEEN(s.dt, 1e-4, 1);
     gs4_destroy(sim);
 }
 

@@ -469,9 +469,9 @@
  *     strain, relaxation    |grad v| dt <= 1, of colliders too (sqrt(2) |w|),  dt <= 1000 lambda_b
  *                           (semi-implicit: of Pom-Pom alone)
  * and gs4_step refuses more; gs4_limit_name says which it is. gs4_advance takes the fraction `cfl`
- * of it, and half of that again, up to 7 times, where a step is refused, by an implicit scheme also
- * one whose solve did not converge; the semi-implicit scheme less each time, 2^-22 in all. Its steps
- * grow by at most twice each.
+ * of it, and half of that again, up to 7 times, where a step is refused, by an implicit scheme
+ * also one whose solve did not converge; the semi-implicit scheme less each time, 2^-22 in all.
+ * Its steps grow by at most twice each.
  *
  * IN A GAME. Sixty times a second, in 10 ms of computing each; desc.now is a clock. What does not
  * fit waits for the next frame, up to a tenth of a second: from there on the scene is slower than
@@ -28032,8 +28032,8 @@ static double gs4i_longest_dt(const gs4_sim *sim)
 }
 
 /* What part of a refused step to try: half, or as much as is stable by what it saw. Liquids that
- * thicken have little to say at rest. The semi-implicit scheme, after hours of creeping, may have to
- * find the milliseconds in which something falls: from the third try on 1/4, 1/8, ..., 2^-22 in
+ * thicken have little to say at rest. The semi-implicit scheme, after hours of creeping, may have
+ * to find the milliseconds in which something falls: from the third try on 1/4, 1/8, ..., 2^-22 in
  * all. */
 static double gs4i_less(const gs4_sim *sim, int tries)
 {

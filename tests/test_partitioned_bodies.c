@@ -415,6 +415,84 @@ static void test_partitioned_bodies_slope(void)
     }
 }
 
+/* Distance from the inside of a pipe along an axis: outside of it is the body. */
+typedef struct bodies_pipe {
+    int along;
+    double radius, centre[3];
+} bodies_pipe;
+
+static gs4_real bodies_in_pipe(gs4_vec3 p, void *user)
+{
+    const bodies_pipe *k = (const bodies_pipe *)user;
+    const double x[3] = { (double)p.x, (double)p.y, (double)p.z };
+    const int b = (k->along + 1) % 3, c = (k->along + 2) % 3;
+    return (gs4_real)(k->radius - hypot(x[b] - k->centre[b], x[c] - k->centre[c]));
+}
+
+/* Mean velocity in a sticky pipe of radius 1 and 12 cells across under g = 1, over that of
+ * Poiseuille, g R^2/(8 nu); wherever its centre is in a cell. */
+static double bodies_pipe_flow(gs4_scheme scheme, int along, double high, double wide)
+{
+    const int b = (along + 1) % 3, c = (along + 2) % 3;
+    const double h = 1.0 / 6;
+    gs4_material m = scene_liquid(1, 1, 0);
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    bodies_pipe pipe;
+    double down[3] = { 0, 0, 0 }, low[3], end[3], flow = 0;
+    gs4_sim_desc d;
+    gs4_collider body;
+    gs4_sim *sim;
+    gs4_view v;
+    int i;
+    memset(&d, 0, sizeof d);
+    memset(&body, 0, sizeof body);
+    m.incompressible = 1;
+    d.scheme = scheme;
+    d.cell_size = (gs4_real)h;
+    d.solver_tolerance = (gs4_real)1e-6;
+    d.max_dt = (gs4_real)0.1;
+    for (i = 0; i < 6; i++) d.walls[i] = i / 2 == along ? GS4_WALL_PERIODIC : GS4_WALL_SLIP;
+    d.cells[along] = 4;
+    d.cells[b] = d.cells[c] = 20;
+    down[along] = 1;
+    d.gravity = at(down[0], down[1], down[2]);
+    pipe.along = along;
+    pipe.radius = 1;
+    pipe.centre[along] = 0;
+    pipe.centre[b] = (10 + high) * h;
+    pipe.centre[c] = (10 + wide) * h;
+    for (i = 0; i < 3; i++) low[i] = end[i] = pipe.centre[i];
+    low[along] = -1;
+    end[along] = 5;
+    CHECK_RESULT(NULL, gs4_create(&d, &sim), GS4_OK);
+    body.shape = gs4_sdf(bodies_in_pipe, &pipe, at(-9, -9, -9), at(9, 9, 9));
+    body.contact = GS4_WALL_STICK;
+    CHECK(gs4_add_collider(sim, &body) >= 0);
+    f.material = gs4_add_material(sim, &m);
+    CHECK(gs4_add_particles(
+              sim, gs4_cylinder(at(low[0], low[1], low[2]), at(end[0], end[1], end[2]), 1), &f)
+          > 0);
+    CHECK_RESULT(sim, gs4_advance(sim, (gs4_real)1.2), GS4_OK);
+    v = gs4_particles(sim, GS4_FIELD_VELOCITY);
+    for (i = 0; i < v.count; i++) flow += (double)v.data[i * v.stride + along] / v.count;
+    gs4_destroy(sim);
+    if (test_filter[0])
+        printf("scheme %d, along %d, centre at %g %g: %.4f\n", (int)scheme, along, high, wide,
+               8 * flow);
+    return 8 * flow;
+}
+
+/* Sticky bodies are where they should be to first order, and on average. */
+static void test_partitioned_bodies_pipe(void)
+{
+    int along;
+    for (along = 0; along < 3; along++) {
+        CHECK_CLOSE(bodies_pipe_flow(GS4_SEMI_IMPLICIT, along, 0.3, 0.1), 1, 0.05);
+        CHECK_CLOSE(bodies_pipe_flow(GS4_SEMI_IMPLICIT, along, 0.2, 0.7), 1, 0.05);
+        CHECK_CLOSE(bodies_pipe_flow(GS4_PARTITIONED, along, 0.2, 0.7), 1, 0.1);
+    }
+}
+
 static void run_partitioned_bodies(void)
 {
     RUN_FULL(test_partitioned_bodies_let_go);
@@ -423,6 +501,7 @@ static void run_partitioned_bodies(void)
     RUN_FULL(test_partitioned_bodies_rest);
     RUN_FULL(test_partitioned_bodies_thin);
     RUN_FULL_ONCE(test_partitioned_bodies_slope);
+    RUN_FULL_ONCE(test_partitioned_bodies_pipe);
     RUN_FULL(test_partitioned_bodies_symmetry);
     RUN_FULL(test_partitioned_bodies_bits);
 }

@@ -315,8 +315,9 @@
  * cells bends within 1 % of beam theory between clamps and within 3 % of the exact in waves, one of
  * 12 within .8 % (tests: stokes_sheet).
  *     Sticky colliders are where they should be on average, to first order in h: pipes of 8 to 16
- * cells across carry .90 to 1.15 of the flux of Poiseuille, by where they cut cells, the partitioned
- * scheme's .95 to 1.22 (6 cells: to 1.08 and 1.55); sticky walls of the domain are exact to second.
+ * cells across carry .90 to 1.15 of the flux of Poiseuille, by where they cut cells, those of the
+ * partitioned scheme .95 to 1.22 (6 cells: to 1.08 and 1.55). Sticky walls of the domain are exact
+ * to second order.
  *     On slippery planes liquid slides with g sin within 1 %, from s mu/(rho h^2) = 0.3 on within
  * 2.5 %; shear waves between such, wherever they cut cells, fall within 1 % of the exact. Where
  * s mu/(rho h^2) is far above 1 bodies with a curved surface brake what turns along it, as faces

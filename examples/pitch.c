@@ -6,12 +6,11 @@
  * Pitch of 2.3e8 Pa s in the funnel of Brisbane: a stem of 9.4 by 29 mm under 75 mm of pitch, here
  * in a cylinder of 24 mm (Edgeworth, Dalton & Parnell 1984). The semi-implicit scheme: explicit
  * steps would be 4 ps, here they are up to a week, and milliseconds where crumbs fall. What has
- * left the stem is printed beside the law of Poiseuille. Sticky bodies hold what is inside, on
- * average half a cell behind their surface: the stem is made narrower by that, and so is what it
- * lets through, by some %. There is no surface tension: weight alone thins the drop, and its thread
- * crumbles where it is less than about two cells wide, which is where this ends. A slender thread
- * would break after sqrt(12 mu A/(rho g Q)) = 0.7 years (Wilson 1988), A the section of the stem, Q
- * what flows; those of the experiment last 8 to 13, so theirs are not as simple. */
+ * left the stem is printed beside the law of Poiseuille. There is no surface tension: weight alone
+ * thins the drop, and its thread crumbles where it is less than about two cells wide, which is
+ * where this ends. A slender thread would break after sqrt(12 mu A/(rho g Q)) = 0.7 years (Wilson
+ * 1988), A the section of the stem, Q what flows; those of the experiment last 8 to 13, so theirs
+ * are not as simple. */
 #include "example.h"
 
 enum {
@@ -27,10 +26,10 @@ static const double stem = 0.0047, length = 0.029, head = 0.075, wide = 0.012;
 static const double density = 1100, viscosity = 2.3e8, gravity = 9.81;
 
 /* Inside from the stem's end up, and outside down again: rings, the last before the first. */
-static void make_funnel(double bore)
+static void make_funnel(void)
 {
-    const double top = length + head + 0.006, out = wide + 0.003, lip = bore + 0.0008;
-    const double r[RINGS] = { bore, bore, wide, wide, out, out, stem + 0.003, stem + 0.003, lip };
+    const double top = length + head + 0.006, out = wide + 0.003, lip = stem + 0.0008;
+    const double r[RINGS] = { stem, stem, wide, wide, out, out, stem + 0.003, stem + 0.003, lip };
     const double y[RINGS] = {
         0, length, length, top, top, length + 0.004, length - 0.01, 0.004, 0
     };
@@ -73,7 +72,6 @@ int main(int argc, char **argv)
     gs4_fill fill = { 0 };
     preview_solid things[2] = { { 0 } };
     gs4_sim *sim;
-    double bore;
     e.name = "pitch";
     e.frames = 36; /* 0.72 years */
     e.cells = 28;
@@ -89,12 +87,11 @@ int main(int argc, char **argv)
     desc.cfl = real(0.8);
     for (int i = 0; i < 6; ++i) desc.walls[i] = i == 2 ? GS4_WALL_STICK : GS4_WALL_OPEN;
     sim = example_create(&e, &desc);
-    bore = stem - 0.5 * (double)desc.cell_size;
     liquid.density = real(density);
     liquid.viscosity = real(viscosity);
     liquid.incompressible = 1;
     example_need(sim, gs4_add_material(sim, &liquid));
-    make_funnel(bore);
+    make_funnel();
     funnel.contact = GS4_WALL_STICK;
     funnel.shape = gs4_mesh(vertices, RINGS * AROUND, triangles, 2 * RINGS * AROUND);
     example_need(sim, gs4_add_collider(sim, &funnel));
@@ -104,7 +101,7 @@ int main(int argc, char **argv)
             sim, gs4_cylinder(vec(0, length, 0), vec(0, length + head, 0), real(wide)), &fill));
     fill.jitter = 1; /* rows of what drips would be drawn apart into beads */
     example_need(sim, gs4_add_particles(
-                          sim, gs4_cylinder(vec(0, 0, 0), vec(0, length, 0), real(bore)), &fill));
+                          sim, gs4_cylinder(vec(0, 0, 0), vec(0, length, 0), real(stem)), &fill));
     things[0].kind = PREVIEW_MESH;
     things[0].vertices = vertices;
     things[0].vertex_count = RINGS * AROUND;

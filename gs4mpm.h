@@ -29982,6 +29982,9 @@ GS4_API GS4I_COLD int gs4_estimate(const gs4_sim *sim, gs4_scheme scheme, gs4_in
  * viscous_iterations. Its colliders may slip and separate, too; it has solids, and gs4_stats their
  * elastic_iterations. Backward Euler has no velocity gradients of the step before, so checkpoints
  * of implicit scenes with it that were written before cannot be read.
+ * Sticky colliders of both implicit schemes are where they should be on average: liquid slipped by
+ * up to a cell behind their surface. gs4_advance tries semi-implicit steps down to 2^-22 of one
+ * that was refused, before 2^-7.
  * New: gs4_surface, gs4_surface_free and gs4_write_surface, triangles of the surface. New:
  * gs4_estimate, what a run will take.
  * Coulomb friction holds without a creep. New: poses, gs4_advance_within, gs4_set_gravity,

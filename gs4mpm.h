@@ -299,8 +299,8 @@
  *     p + s K div u~ = -K (J** - 1);   div u~ = 0 where K is infinite
  * mu is that of the stage's grad v_i, and cells have the mean of 1/mu: between layers of Couette
  * flow, 1 : 1000, the stress is within 2 % wherever they meet. Where mu varies 1/mu goes on to
- * sticky walls: steady plug and flux of Herschel-Bulkley channels are within 1.3 % at 16 cells, 0.4
- * % at 32 (tests: yield_semi_implicit); mu follows step by step. No stress acts on a free surface.
+ * sticky walls: steady plug and flux of Herschel-Bulkley channels are within 1.3 % at 16 cells and
+ * 0.4 % at 32 (tests: yield_semi_implicit); mu follows step by step. A free surface has no stress.
  * What strains in cells at surfaces is taken from the nearest inside, so that modes of viscous
  * spheres of 8 cells decay within 5 %. In steps of 100 times the explicit limit Poiseuille flow is
  * within 0.5 % at 8 cells. Viscous heating is that of u~. The solve to 1e-6 takes 9 to 25
@@ -311,7 +311,7 @@
  * on. A step that does not converge is refused.
  *     Thin bodies need both in one solve: of the bending stiffness mu d^3/3 of an incompressible
  * sheet half is due to its pressure. One that solves viscosity first, then pressure, has sheets
- * bend 1.98 times as fast as they should, in short steps as in long ones. Together a sheet of 6
+ * bend 1.98 times as fast as they should once flow is steady, whatever dt. Together a sheet of 6
  * cells bends within 1 % of beam theory between clamps and within 3 % of the exact in waves, one of
  * 12 within .8 % (tests: stokes_sheet).
  *     Sticky colliders are where they should be on average, to first order in h: pipes of 8 to 16

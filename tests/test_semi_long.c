@@ -353,16 +353,16 @@ enum {
 /* A slender viscous sheet without inertia (as Ribe 2003), as a chain of segments that turn and
  * stretch. Height of the nozzle, speed and D = mu d^3/3 are 1, `thick` is d of the nozzle. Moment
  * and tension at a place s, t the tangent there:
- *     M = D dw/ds,  M = M0 - F x (r - r0) + of weight,  N = 4 mu d (stretching) = F.t
+ *     M = D dw/ds,  M = M0 - F x (r - r0),  N = 4 mu d (stretching) = F.t
  * At the nozzle, where r is r0, what is below pulls with F. M0 and F are those that leave the last
  * joint, which lies on the floor, at rest and flat. A joint that meets the floor becomes the last;
  * what was beyond it is gone. */
 typedef struct fold_chain {
-    double thick, weight, out; /* out: of the nozzle, of the next segment */
-    int n;                     /* segments, the last is at the floor */
+    double thick, out; /* out: of the nozzle, of the next segment */
+    int n;             /* segments, the last is at the floor */
     double angle[FOLD_ROOM], size[FOLD_ROOM], x[FOLD_ROOM + 1], y[FOLD_ROOM + 1];
-    /* rates of turning and stretching: times M0, F along x and y, and of weight */
-    double turn[FOLD_ROOM][4], stretch[FOLD_ROOM][4];
+    /* rates of turning and stretching: times M0, F along x and y */
+    double turn[FOLD_ROOM][3], stretch[FOLD_ROOM][3];
 } fold_chain;
 
 static void fold_place(fold_chain *c)
@@ -377,25 +377,21 @@ static void fold_place(fold_chain *c)
 }
 
 /* Rows of the conditions at the floor: turning, velocity along x and y; turn and stretch. */
-static void fold_rows(fold_chain *c, double rows[3][4])
+static void fold_rows(fold_chain *c, double rows[3][3])
 {
     const double unit = 1.0 / FOLD_SEGMENTS;
-    double moments = 0; /* of the weight above, about x = 0 */
     int k, q;
-    memset(rows, 0, 12 * sizeof rows[0][0]);
+    memset(rows, 0, 9 * sizeof rows[0][0]);
     for (k = 0; k <= c->n; k++) {
         /* half of both segments at a joint; D goes by the cube of the thickness, unit over size */
         const double high = k ? pow(c->size[k - 1] / unit, 3) * c->size[k - 1] : 0;
         const double low = k < c->n ? pow(c->size[k] / unit, 3) * c->size[k] : high;
         const double share = k ? (high + low) / 2 : low;
         const double tx = k < c->n ? sin(c->angle[k]) : 0, ty = k < c->n ? -cos(c->angle[k]) : 0;
-        const double M[4] = { 1, c->y[k] - c->y[0], c->x[0] - c->x[k],
-                              c->weight * unit * (moments - k * c->x[k]) };
-        const double F[4] = { 0, tx, ty, ty * c->weight * unit * (k + 0.5) };
-        for (q = 0; q < 4; q++) rows[0][q] += share * M[q];
+        const double M[3] = { 1, c->y[k] - c->y[0], c->x[0] - c->x[k] }, F[3] = { 0, tx, ty };
+        for (q = 0; q < 3; q++) rows[0][q] += share * M[q];
         if (k == c->n) break;
-        moments += (c->x[k] + c->x[k + 1]) / 2;
-        for (q = 0; q < 4; q++) {
+        for (q = 0; q < 3; q++) {
             c->turn[k][q] = rows[0][q];
             c->stretch[k][q] = F[q] * c->size[k] / unit * c->thick * c->thick / 12;
             rows[1][q] += c->size[k] * (tx * c->stretch[k][q] - ty * c->turn[k][q]);
@@ -407,10 +403,13 @@ static void fold_rows(fold_chain *c, double rows[3][4])
 /* Turns and stretches all for a time. */
 static void fold_move(fold_chain *c, double dt)
 {
-    double A[3][4], unknown[4];
+    double rows[3][3], A[3][4], unknown[3];
     int i, j, k, q;
-    fold_rows(c, A);
-    for (i = 0; i < 3; i++) A[i][3] = (i == 2) - A[i][3]; /* the nozzle pushes down by 1 */
+    fold_rows(c, rows);
+    for (i = 0; i < 3; i++) {
+        memcpy(A[i], rows[i], sizeof rows[i]);
+        A[i][3] = i == 2; /* the nozzle pushes down by 1 */
+    }
     for (i = 0; i < 3; i++) {
         int best = i;
         for (j = i; j < 3; j++)
@@ -426,9 +425,8 @@ static void fold_move(fold_chain *c, double dt)
         }
     }
     for (i = 0; i < 3; i++) unknown[i] = A[i][3] / A[i][i];
-    unknown[3] = 1;
     for (k = 0; k < c->n; k++)
-        for (q = 0; q < 4; q++) {
+        for (q = 0; q < 3; q++) {
             c->angle[k] += dt * unknown[q] * c->turn[k][q];
             c->size[k] *= 1 + dt * unknown[q] * c->stretch[k][q];
         }
@@ -507,7 +505,7 @@ static fold_result fold_means(const fold_meter *m, double from)
 #define FOLD_LEVEL 0.4 /* of the nozzle's height, where a sheet is looked at */
 
 /* What theory says, in units of the height and the speed. */
-static fold_result fold_theory(double thick, double weight)
+static fold_result fold_theory(double thick)
 {
     const double dt = 0.125 / FOLD_SEGMENTS;
     fold_chain *c = (fold_chain *)calloc(1, sizeof *c);
@@ -517,7 +515,6 @@ static fold_result fold_theory(double thick, double weight)
     if (!c) exit(3);
     memset(&m, 0, sizeof m);
     c->thick = thick;
-    c->weight = weight;
     for (c->n = 0; c->n < FOLD_SEGMENTS; c->n++) {
         c->angle[c->n] = 0.05 * cos(3.0 * c->n / FOLD_SEGMENTS);
         c->size[c->n] = 1.0 / FOLD_SEGMENTS;
@@ -625,7 +622,7 @@ static void test_semi_folding(void)
     size_t k;
     for (k = 0; k < sizeof rows / sizeof rows[0]; k++) {
         const double height = rows[k].across * rows[k].height;
-        const fold_result law = fold_theory(rows[k].across / (height - 0.5 * rows[k].across), 0);
+        const fold_result law = fold_theory(rows[k].across / (height - 0.5 * rows[k].across));
         double steps;
         const fold_result is = fold_run(rows[k].down, rows[k].across, height, &steps);
         if (test_filter[0])

@@ -305,10 +305,10 @@
  * spheres of 8 cells decay within 5 %. In steps of 100 times the explicit limit Poiseuille flow is
  * within 0.5 % at 8 cells. Viscous heating is that of u~. The solve to 1e-6 takes 9 to 25
  * iterations (viscous_iterations) for any s mu/(rho h^2) in compact bodies, pools and rooms; up to
- * 50 in ropes and folded sheets of 32 cells, 75 in sheets of 64, 40 in porous matter and spray, 90
- * in pools with inclusions 1e6 times stiffer (bench/stokes.c); a coil four cells thick and a
- * hundred times as long, which touches itself nowhere, does not converge from s mu/(rho h^2) = 1e4
- * on. A step that does not converge is refused.
+ * 40 in ropes, coils, folded sheets, porous matter and spray, 90 in pools with inclusions 1e6 times
+ * stiffer (bench/stokes.c); a coil four cells thick and a hundred times as long, whose turns touch
+ * at single cells, does not converge from s mu/(rho h^2) = 1e4 on. A step that does not converge is
+ * refused.
  *     Thin bodies need both in one solve: of the bending stiffness mu d^3/3 of an incompressible
  * sheet half is due to its pressure. One that solves viscosity first, then pressure, has sheets
  * bend 1.98 times as fast as they should once flow is steady, whatever dt. Together a sheet of 6
@@ -6656,7 +6656,7 @@ typedef struct gs4i_stokes_look {
 
 enum {
     GS4I_RIGID_LEVELS = 20,
-    GS4I_RIGID_WIDTH = 32,  /* see gs4i_rigid_fits */
+    GS4I_RIGID_WIDTH = 16,  /* see gs4i_rigid_fits */
     GS4I_RIGID_CHUNK = 128, /* nodes a task */
     GS4I_RIGID_ROOM = 64    /* blocks of a node that are summed at once */
 };
@@ -7513,7 +7513,11 @@ static void gs4i_stokes_apply(gs4i_stokes *s, const double *in, double *out, int
  * NODES. Faces of a block of 2 x 2 x 2 cells that rows join strongly are a node, with a velocity
  * and a spin about the centre of the block; a face of axis d is [e_d; r x e_d] of them. Parts that
  * only come near each other stay apart. Blocks of 2 x 2 x 2 blocks are the next level: a node moves
- * as v = V + W x r there. What mass holds more than strain stays out: the sweeps solve it.
+ * as v = V + W x r there. What mass holds more than strain stays out: the sweeps solve it. Where
+ * three walls one cell thick meet, none of which resists what is across it, they turn about each
+ * other for nothing: what hangs there is a node by itself. On further levels it is not, nor are
+ * hinges, where bodies touch at single edges, kept as such: a coil whose turns touch here and there
+ * converges slowly ("rope" of tests/stokes_cases.h, 64 cells, from mu' = 1e4 on).
  *
  * COARSE MATRIX. Galerkin's, the strain halved on each level (as faces in [[poisson]]), mass not,
  * which is apart. W' have GS4I_RIGID_BITS, so that sums of them are exact in float on the first
@@ -7523,12 +7527,14 @@ static void gs4i_stokes_apply(gs4i_stokes *s, const double *in, double *out, int
  * u, and a face changes its six rows as it moves. Nodes: one forward, one backward, by blocks of
  * six; motions that a node does not have (a face has but one) have no pivot there.
  *
- * CYCLE. W among nodes: thin folded sheets need it. */
+ * CYCLE. W among nodes, as far as the last level, which has a factor: see ENVELOPE. */
 
-#define GS4I_RIGID_STRONG 4e-4   /* K_fg^2 over K_ff K_gg above which faces join; */
-#define GS4I_RIGID_JOINED 1e-4   /* nodes, with traces of their 3 x 3 blocks for velocities */
-#define GS4I_RIGID_PIVOT 1e-6    /* of the diagonal: what less resists is not swept; */
-#define GS4I_RIGID_ROUNDING 1e-8 /* in factors */
+#define GS4I_RIGID_STRONG 4e-4 /* K_fg^2 over K_ff K_gg above which faces join; */
+#define GS4I_RIGID_JOINED 1e-4 /* nodes, with traces of their 3 x 3 blocks for velocities */
+/* Shares of the diagonal below which a pivot is none: rounding of float must not make sweeps gain
+ * energy; a factor never does, and free drops of few cells are but mass there. */
+#define GS4I_RIGID_PIVOT 1e-6
+#define GS4I_RIGID_LEAST 1e-8
 #define GS4I_RIGID_BITS 7
 
 /* [e_d; r x e_d] of a face. */
@@ -7660,13 +7666,57 @@ static void gs4i_rigid_place_plane(int z, void *context)
         }
 }
 
+/* Is a row one of shear with a face that hangs? */
+static int gs4i_rigid_is_slack(const gs4i_stokes_system *y, int32_t row)
+{
+    const gs4i_link *link = y->row_faces[row];
+    const int32_t *hangs = y->rigid.counts;
+    return (link[2] >> 1 || link[3] >> 1)
+           && (hangs[link[0] >> 1] || hangs[link[1] >> 1] || hangs[link[2] >> 1]
+               || hangs[link[3] >> 1]);
+}
+
+/* Where liquid is one cell thick its two faces, f and g, move together, and where there is but one
+ * row of shear with another, that holds neither: both hang, and the row is slack. */
+static int gs4i_rigid_hangs(const gs4i_stokes_system *y, int32_t f, int32_t g)
+{
+    int32_t one = 0;
+    int q;
+    if (!f || !g || y->face_cells[f][0] || y->face_cells[g][1]) return 0;
+    for (q = 2; q < 12; q++) {
+        const int32_t row = (int32_t)(y->face_rows[q < 6 ? f : g][q < 6 ? q : q - 6] >> 1);
+        if (q == 6 || q == 7 || !row || row == one || gs4i_rigid_is_slack(y, row)) continue;
+        if (one) return 0;
+        one = row;
+    }
+    return 1;
+}
+
+/* Into m->counts which faces hang; with them those that would by what is left of rows. */
+static void gs4i_rigid_find_hanging(const gs4i_stokes_system *y)
+{
+    int32_t *hangs = y->rigid.counts, c;
+    int a, any, pass;
+    memset(hangs, 0, (size_t)y->faces * sizeof *hangs);
+    for (any = 1, pass = 0; any && pass < 4; pass++)
+        for (any = 0, c = 1; c < y->cells; c++)
+            for (a = 0; a < 3; a++) {
+                const int32_t f = y->cell_faces[c][2 * a], g = y->cell_faces[c][2 * a + 1];
+                if (hangs[f] || !gs4i_rigid_hangs(y, f, g)) continue;
+                hangs[f] = hangs[g] = 1;
+                any = 1;
+            }
+}
+
 static void gs4i_rigid_join_faces(const gs4i_stokes_system *y)
 {
     const gs4i_rigid *m = &y->rigid;
     double stiffness[4];
     int32_t r;
     int j, k;
-    for (r = 1; r < y->rows; r++)
+    gs4i_rigid_find_hanging(y);
+    for (r = 1; r < y->rows; r++) {
+        if (gs4i_rigid_is_slack(y, r)) continue;
         for (j = 0; j < 4; j++) {
             const gs4i_link *link = y->row_faces[r];
             const int32_t f = (int32_t)(link[j] >> 1);
@@ -7681,6 +7731,7 @@ static void gs4i_rigid_join_faces(const gs4i_stokes_system *y)
                     gs4i_stokes_unite(m->parent, f, g);
             }
         }
+    }
 }
 
 /* Trace of the 3 x 3 block for velocities. */
@@ -7995,10 +8046,13 @@ static int gs4i_rigid_build_level(gs4i_stokes *s, int l, int32_t *root, int32_t 
 
 /* --- setup: the last level -------------------------------------------------------------------- *
  *
- * ENVELOPE. The first level whose factor is cheap is the last, and solved: F F^T = A, in the order
- * of Cuthill & McKee (1969) reversed, with all blocks of a row from its first on. Threads and
- * sheets are narrow in that order, and bend by the fourth power of their length, which sweeps of
- * few blocks at a time do not solve. Blocks are by columns, own ones the inverse of F's. */
+ * ENVELOPE. The first level whose factor is cheap is the last, and solved: F F^T = A + mass, in the
+ * order of Cuthill & McKee (1969) reversed, each row with all blocks from its first on. Threads and
+ * sheets are narrow in that order, and long: bending goes by the fourth power of that, which a few
+ * sweeps on each level do not solve. A coil four cells thick and 350 long ends at the first level,
+ * 7 blocks a row, a folded sheet of 64 cells at the second, 19 blocks; compact bodies go on until
+ * some hundred nodes are left. Blocks are by columns, own ones the inverse of those of F. One
+ * thread does it: at most GS4I_RIGID_WIDTH products of blocks for each block of the matrices. */
 
 /* Breadth first from `start`: `queue` of what it is joined to, nodes with few neighbours first;
  * their number. */
@@ -8044,9 +8098,8 @@ static void gs4i_rigid_order(const gs4i_rigid_level *g, int32_t *seen, int32_t *
     }
 }
 
-/* Is the factor of level l no larger than the matrices of the levels so far, and its work, a
- * product of blocks for each pair within a row, no more than GS4I_RIGID_WIDTH for each of theirs?
- * Into m->block what is where, into m->counts the place of a node. */
+/* Is the factor of level l no larger than the matrices of the levels so far, and its work, the
+ * squares of what rows have, no more than GS4I_RIGID_WIDTH for each block of theirs? Into m->block what is where, into m->counts the place of a node. */
 static int gs4i_rigid_fits(const gs4i_rigid *m, int l, int32_t *blocks)
 {
     const gs4i_rigid_level *g = &m->level[l];
@@ -8114,7 +8167,7 @@ static void gs4i_rigid_eliminate(gs4i_rigid *m, int32_t p)
         for (a = 0; a < 36; a++) row[q][a] = (float)G[a];
     }
     for (a = 0; a < 36; a++) C[a] = (double)row[p][a] + (double)mass[a];
-    for (a = 0; a < 6; a++) least[a] = GS4I_RIGID_ROUNDING * C[7 * a];
+    for (a = 0; a < 6; a++) least[a] = GS4I_RIGID_LEAST * C[7 * a];
     for (k = m->low[p]; k < p; k++) gs4i_rigid_take(C, row[k], row[k]);
     gs4i_rigid_root(C, least, G);
     for (a = 0; a < 36; a++) row[p][a] = (float)G[6 * (a % 6) + a / 6];
@@ -8391,23 +8444,27 @@ static void gs4i_rigid_prolong_nodes(int index, void *context)
 static void gs4i_rigid_substitute(gs4i_rigid *m)
 {
     const gs4i_rigid_level *g = &m->level[m->levels - 1];
-    double t[6];
     int32_t p, q;
     int a, b;
     for (p = 0; p < g->n - 1; p++) {
         float(*row)[36] = m->factor + m->begin[p] - m->low[p];
         double *x = g->x[m->order[p]];
-        memcpy(t, g->b[m->order[p]], sizeof t);
-        for (q = m->low[p]; q < p; q++) gs4i_rigid_subtract(row[q], g->x[m->order[q]], t);
-        for (memset(x, 0, sizeof t), b = 0; b < 6; b++)
-            for (a = b; a < 6; a++) x[a] += (double)row[p][6 * b + a] * t[b];
+        for (a = 0; a < 6; a++) x[a] = g->b[m->order[p]][a];
+        for (q = m->low[p]; q < p; q++) gs4i_rigid_subtract(row[q], g->x[m->order[q]], x);
+        for (a = 5; a >= 0; a--) {
+            double sum = 0;
+            for (b = 0; b <= a; b++) sum += (double)row[p][6 * b + a] * x[b];
+            x[a] = sum;
+        }
     }
     for (p = g->n - 2; p >= 0; p--) {
         float(*row)[36] = m->factor + m->begin[p] - m->low[p];
         double *x = g->x[m->order[p]];
-        memcpy(t, x, sizeof t);
-        for (memset(x, 0, sizeof t), b = 0; b < 6; b++)
-            for (a = b; a < 6; a++) x[b] += (double)row[p][6 * b + a] * t[a];
+        for (b = 0; b < 6; b++) {
+            double sum = 0;
+            for (a = b; a < 6; a++) sum += (double)row[p][6 * b + a] * x[a];
+            x[b] = sum;
+        }
         for (q = m->low[p]; q < p; q++)
             for (b = 0; b < 6; b++)
                 for (a = 0; a < 6; a++) g->x[m->order[q]][b] -= (double)row[q][6 * b + a] * x[a];
@@ -30055,6 +30112,8 @@ GS4_API GS4I_COLD int gs4_estimate(const gs4_sim *sim, gs4_scheme scheme, gs4_in
 #undef GS4I_RIGID_STRONG
 #undef GS4I_RIGID_JOINED
 #undef GS4I_RIGID_PIVOT
+#undef GS4I_RIGID_LEAST
+#undef GS4I_RIGID_BITS
 #undef GS4I_RIGID_RANGE
 #undef GS4I_STOKES_SPRAY
 #undef GS4I_STRIP

@@ -6656,7 +6656,7 @@ typedef struct gs4i_stokes_look {
 
 enum {
     GS4I_RIGID_LEVELS = 20,
-    GS4I_RIGID_WIDTH = 16,  /* see gs4i_rigid_fits */
+    GS4I_RIGID_WIDTH = 14,  /* see gs4i_rigid_fits */
     GS4I_RIGID_CHUNK = 128, /* nodes a task */
     GS4I_RIGID_ROOM = 64    /* blocks of a node that are summed at once */
 };
@@ -8051,8 +8051,8 @@ static int gs4i_rigid_build_level(gs4i_stokes *s, int l, int32_t *root, int32_t 
  * sheets are narrow in that order, and long: bending goes by the fourth power of that, which a few
  * sweeps on each level do not solve. A coil four cells thick and 350 long ends at the first level,
  * 7 blocks a row, a folded sheet of 64 cells at the second, 19 blocks; compact bodies go on until
- * some hundred nodes are left. Blocks are by columns, own ones the inverse of those of F. One
- * thread does it: at most GS4I_RIGID_WIDTH products of blocks for each block of the matrices. */
+ * some hundred nodes are left. Blocks are by columns, own ones the inverse of those of F. It is
+ * done by one thread. */
 
 /* Breadth first from `start`: `queue` of what it is joined to, nodes with few neighbours first;
  * their number. */
@@ -8099,7 +8099,8 @@ static void gs4i_rigid_order(const gs4i_rigid_level *g, int32_t *seen, int32_t *
 }
 
 /* Is the factor of level l no larger than the matrices of the levels so far, and its work, the
- * squares of what rows have, no more than GS4I_RIGID_WIDTH for each block of theirs? Into m->block what is where, into m->counts the place of a node. */
+ * squares of what rows have, no more than GS4I_RIGID_WIDTH for each block of theirs? Into m->block
+ * goes what is where, into m->counts the place of each node. */
 static int gs4i_rigid_fits(const gs4i_rigid *m, int l, int32_t *blocks)
 {
     const gs4i_rigid_level *g = &m->level[l];

@@ -305,10 +305,10 @@
  * spheres of 8 cells decay within 5 %. In steps of 100 times the explicit limit Poiseuille flow is
  * within 0.5 % at 8 cells. Viscous heating is that of u~. The solve to 1e-6 takes 9 to 25
  * iterations (viscous_iterations) for any s mu/(rho h^2) in compact bodies, pools and rooms; up to
- * 50 in ropes and folded sheets of 32 cells, 75 in sheets of 64, 40 in porous matter and spray, 90
- * in pools with inclusions 1e6 times stiffer (bench/stokes.c); a coil four cells thick and a
- * hundred times as long, which touches itself nowhere, does not converge from s mu/(rho h^2) = 1e4
- * on. A step that does not converge is refused.
+ * 40 in ropes, coils, folded sheets, porous matter and spray, 90 in pools with inclusions 1e6 times
+ * stiffer (bench/stokes.c); a coil four cells thick and a hundred times as long, whose turns touch
+ * here and there at single cells, takes 110 at s mu/(rho h^2) = 1e4, and at 1e7 does not converge.
+ * A step that does not converge is refused.
  *     Thin bodies need both in one solve: of the bending stiffness mu d^3/3 of an incompressible
  * sheet half is due to its pressure. One that solves viscosity first, then pressure, has sheets
  * bend 1.98 times as fast as they should once flow is steady, whatever dt. Together a sheet of 6
@@ -6668,7 +6668,7 @@ typedef struct gs4i_stokes_look {
 
 enum {
     GS4I_RIGID_LEVELS = 20,
-    GS4I_RIGID_DENSE = 60,  /* nodes, at most, that are solved by Cholesky */
+    GS4I_RIGID_WIDTH = 14,  /* see gs4i_rigid_fits */
     GS4I_RIGID_CHUNK = 128, /* nodes a task */
     GS4I_RIGID_ROOM = 64    /* blocks of a node that are summed at once */
 };
@@ -6680,7 +6680,7 @@ typedef struct gs4i_rigid_level {
     int32_t *first, *child;           /* its faces, or nodes of the level below */
     int32_t *start, *to, *parent;     /* parent: in the level above, or 0 */
     int32_t (*place)[3];              /* its block */
-    float (*A)[36], (*mass)[36], (*inverse)[36];
+    float (*A)[36], (*mass)[36], (*inverse)[36]; /* A: strain alone; inverse: of both */
     double (*b)[6], (*x)[6];
     gs4i_scratch nodes, edges;
 } gs4i_rigid_level;
@@ -6692,8 +6692,10 @@ typedef struct gs4i_rigid {
     int32_t *parent;         /* of faces: their node, or 0; */
     int8_t (*arm)[4];        /* twice their place from the centre of its block, their axis */
     int32_t *block, *counts; /* while setting up: of faces or nodes; of blocks or nodes */
-    double *factor;          /* of the last level; NULL: it is swept */
-    gs4i_scratch faces, work, square;
+    /* of the last level, see ENVELOPE: node of each place; its first block, and where that is */
+    int32_t *order, *low, *begin;
+    float (*factor)[36]; /* NULL: it is swept */
+    gs4i_scratch faces, work, envelope;
 } gs4i_rigid;
 
 /* See SCHUR COMPLEMENT. */
@@ -7585,19 +7587,30 @@ static void gs4i_stokes_apply(gs4i_stokes *s, const double *in, double *out, int
  * NODES. Faces of a block of 2 x 2 x 2 cells that rows join strongly are a node, with a velocity
  * and a spin about the centre of the block; a face of axis d is [e_d; r x e_d] of them. Parts that
  * only come near each other stay apart. Blocks of 2 x 2 x 2 blocks are the next level: a node moves
- * as v = V + W x r there. What mass holds more than strain stays out: the sweeps solve it.
+ * as v = V + W x r there. What mass holds more than strain stays out: the sweeps solve it. Where
+ * three walls one cell thick meet, none of which resists what is across it, they turn about each
+ * other for nothing: what hangs there is a node by itself. On further levels it is not, nor are
+ * hinges, where bodies touch at single edges, kept as such: a coil whose turns touch here and there
+ * takes 110 iterations at mu s/(rho h^2) = 1e4, and at 1e7 does not converge ("rope" of
+ * tests/stokes_cases.h, 64 cells).
  *
- * COARSE MATRIX. Galerkin's, the strain halved on each level (as faces in [[poisson]]), mass not.
+ * COARSE MATRIX. Galerkin's, the strain halved on each level (as faces in [[poisson]]), mass not,
+ * which is apart. W' have GS4I_RIGID_BITS, so that sums of them are exact in float on the first
+ * levels, and motions as a rigid body cost nothing however large W' is.
  *
  * SMOOTHER. Faces: Gauss-Seidel by colours, two sweeps down, two backward up; W' D u is kept beside
  * u, and a face changes its six rows as it moves. Nodes: one forward, one backward, by blocks of
  * six; motions that a node does not have (a face has but one) have no pivot there.
  *
- * CYCLE. W among nodes: thin folded sheets need it. */
+ * CYCLE. W among nodes, as far as the last level, which has a factor: see ENVELOPE. */
 
 #define GS4I_RIGID_STRONG 4e-4 /* K_fg^2 over K_ff K_gg above which faces join; */
 #define GS4I_RIGID_JOINED 1e-4 /* nodes, with traces of their 3 x 3 blocks for velocities */
-#define GS4I_RIGID_PIVOT 1e-6  /* of the diagonal: below is rounding of float */
+/* Shares of the diagonal below which a pivot is none: rounding of float must not make sweeps gain
+ * energy; a factor never does, and free drops of few cells are but mass there. */
+#define GS4I_RIGID_PIVOT 1e-6
+#define GS4I_RIGID_LEAST 1e-8
+#define GS4I_RIGID_BITS 7
 
 /* [e_d; r x e_d] of a face. */
 typedef struct gs4i_rigid_face {
@@ -7640,54 +7653,38 @@ static void gs4i_rigid_move(double K[36], const double r[3], const double q[3])
     }
 }
 
-/* F F^T = A, lower triangles by rows, in place; rows and columns of pivots that are left out
- * are 0. */
-static void gs4i_rigid_cholesky(double *A, int n)
+/* G with G A G^T = 1, lower triangle by rows, so that A^-1 = G^T G; rows of pivots that are below
+ * `least` are left out. */
+static void gs4i_rigid_root(const double A[36], const double least[6], double G[36])
 {
     int i, j, k;
-    for (i = 0; i < n; i++) {
-        double *row = A + (size_t)i * (size_t)n;
-        const double least = GS4I_RIGID_PIVOT * row[i];
-        for (j = 0; j <= i; j++) {
-            const double *other = A + (size_t)j * (size_t)n;
-            double sum = row[j];
-            for (k = 0; k < j; k++) sum -= row[k] * other[k];
-            if (j < i)
-                row[j] = other[j] > 0 ? sum / other[j] : 0;
-            else
-                row[i] = sum > least ? sqrt(sum) : 0;
+    memset(G, 0, 36 * sizeof *G);
+    for (i = 0; i < 6; i++) {
+        double pivot = A[7 * i], scale;
+        G[7 * i] = 1;
+        for (j = 0; j < i; j++) {
+            double t = 0;
+            for (k = 0; k <= j; k++) t += A[6 * i + k] * G[6 * j + k];
+            pivot -= t * t;
+            for (k = 0; k <= j; k++) G[6 * i + k] -= t * G[6 * j + k];
         }
-    }
-}
-
-/* F F^T y = y */
-static void gs4i_rigid_substitute(const double *F, int n, double *y)
-{
-    int i, j;
-    for (i = 0; i < n; i++) {
-        const double *row = F + (size_t)i * (size_t)n;
-        double sum = y[i];
-        for (j = 0; j < i; j++) sum -= row[j] * y[j];
-        y[i] = row[i] > 0 ? sum / row[i] : 0;
-    }
-    for (i = n - 1; i >= 0; i--) {
-        const double *row = F + (size_t)i * (size_t)n;
-        y[i] = row[i] > 0 ? y[i] / row[i] : 0;
-        for (j = 0; j < i; j++) y[j] -= row[j] * y[i];
+        scale = pivot > least[i] ? 1 / sqrt(pivot) : 0;
+        for (k = 0; k <= i; k++) G[6 * i + k] *= scale;
     }
 }
 
 static void gs4i_rigid_invert(const double A[36], float inverse[36])
 {
-    double F[36], y[6];
-    int i, k;
-    memcpy(F, A, sizeof F);
-    gs4i_rigid_cholesky(F, 6);
-    for (i = 0; i < 6; i++) {
-        for (k = 0; k < 6; k++) y[k] = i == k;
-        gs4i_rigid_substitute(F, 6, y);
-        for (k = 0; k < 6; k++) inverse[6 * i + k] = (float)y[k];
-    }
+    double G[36], least[6];
+    int i, k, r;
+    for (i = 0; i < 6; i++) least[i] = GS4I_RIGID_PIVOT * A[7 * i];
+    gs4i_rigid_root(A, least, G);
+    for (i = 0; i < 6; i++)
+        for (k = 0; k < 6; k++) {
+            double sum = 0;
+            for (r = 0; r < 6; r++) sum += G[6 * r + i] * G[6 * r + k];
+            inverse[6 * i + k] = (float)sum;
+        }
 }
 
 /* --- setup: which faces and nodes join -------------------------------------------------------- */
@@ -7744,13 +7741,57 @@ static void gs4i_rigid_place_plane(int z, void *context)
         }
 }
 
+/* Is a row one of shear with a face that hangs? */
+static int gs4i_rigid_is_slack(const gs4i_stokes_system *y, int32_t row)
+{
+    const gs4i_link *link = y->row_faces[row];
+    const int32_t *hangs = y->rigid.counts;
+    return (link[2] >> 1 || link[3] >> 1)
+           && (hangs[link[0] >> 1] || hangs[link[1] >> 1] || hangs[link[2] >> 1]
+               || hangs[link[3] >> 1]);
+}
+
+/* Where liquid is one cell thick its two faces, f and g, move together, and where there is but one
+ * row of shear with another, that holds neither: both hang, and the row is slack. */
+static int gs4i_rigid_hangs(const gs4i_stokes_system *y, int32_t f, int32_t g)
+{
+    int32_t one = 0;
+    int q;
+    if (!f || !g || y->face_cells[f][0] || y->face_cells[g][1]) return 0;
+    for (q = 2; q < 12; q++) {
+        const int32_t row = (int32_t)(y->face_rows[q < 6 ? f : g][q < 6 ? q : q - 6] >> 1);
+        if (q == 6 || q == 7 || !row || row == one || gs4i_rigid_is_slack(y, row)) continue;
+        if (one) return 0;
+        one = row;
+    }
+    return 1;
+}
+
+/* Into m->counts which faces hang; with them those that would by what is left of rows. */
+static void gs4i_rigid_find_hanging(const gs4i_stokes_system *y)
+{
+    int32_t *hangs = y->rigid.counts, c;
+    int a, any, pass;
+    memset(hangs, 0, (size_t)y->faces * sizeof *hangs);
+    for (any = 1, pass = 0; any && pass < 4; pass++)
+        for (any = 0, c = 1; c < y->cells; c++)
+            for (a = 0; a < 3; a++) {
+                const int32_t f = y->cell_faces[c][2 * a], g = y->cell_faces[c][2 * a + 1];
+                if (hangs[f] || !gs4i_rigid_hangs(y, f, g)) continue;
+                hangs[f] = hangs[g] = 1;
+                any = 1;
+            }
+}
+
 static void gs4i_rigid_join_faces(const gs4i_stokes_system *y)
 {
     const gs4i_rigid *m = &y->rigid;
     double stiffness[4];
     int32_t r;
     int j, k;
-    for (r = 1; r < y->rows; r++)
+    gs4i_rigid_find_hanging(y);
+    for (r = 1; r < y->rows; r++) {
+        if (gs4i_rigid_is_slack(y, r)) continue;
         for (j = 0; j < 4; j++) {
             const gs4i_link *link = y->row_faces[r];
             const int32_t f = (int32_t)(link[j] >> 1);
@@ -7765,13 +7806,13 @@ static void gs4i_rigid_join_faces(const gs4i_stokes_system *y)
                     gs4i_stokes_unite(m->parent, f, g);
             }
         }
+    }
 }
 
-/* Trace of the 3 x 3 block for velocities, of strain alone. */
-static double gs4i_rigid_trace(const float A[36], const float *mass)
+/* Trace of the 3 x 3 block for velocities. */
+static double gs4i_rigid_trace(const float A[36])
 {
-    double sum = ((double)A[0] + (double)A[7]) + (double)A[14];
-    return mass ? sum - (((double)mass[0] + (double)mass[7]) + (double)mass[14]) : sum;
+    return ((double)A[0] + (double)A[7]) + (double)A[14];
 }
 
 /* The same of nodes of a level; is there one that goes on? */
@@ -7782,9 +7823,8 @@ static int gs4i_rigid_join_nodes(gs4i_rigid *m, int l)
     int a;
     for (a = 0; a < 3; a++) up[a] = (g->blocks[a] + 1) / 2;
     for (g->parent[0] = 0, i = 1; i < g->n; i++) {
-        const int32_t own = g->start[i], *p = g->place[i];
-        const int stays =
-            gs4i_rigid_trace(g->A[own], g->mass[i]) > gs4i_rigid_trace(g->mass[i], NULL);
+        const int32_t *p = g->place[i];
+        const int stays = gs4i_rigid_trace(g->A[g->start[i]]) > gs4i_rigid_trace(g->mass[i]);
         g->parent[i] = stays ? i : 0;
         m->block[i] = ((p[2] >> 1) * up[1] + (p[1] >> 1)) * up[0] + (p[0] >> 1);
         any |= stays;
@@ -7792,10 +7832,10 @@ static int gs4i_rigid_join_nodes(gs4i_rigid *m, int l)
     for (i = 1; i < g->n; i++)
         for (e = g->start[i] + 1; g->parent[i] && e < g->start[i + 1]; e++) {
             const int32_t j = g->to[e];
-            const double K = gs4i_rigid_trace(g->A[e], NULL);
+            const double K = gs4i_rigid_trace(g->A[e]);
             if (j > i || !g->parent[j] || m->block[i] != m->block[j]) continue;
-            if (K * K > GS4I_RIGID_JOINED * gs4i_rigid_trace(g->A[g->start[i]], g->mass[i])
-                            * gs4i_rigid_trace(g->A[g->start[j]], g->mass[j]))
+            if (K * K > GS4I_RIGID_JOINED * gs4i_rigid_trace(g->A[g->start[i]])
+                            * gs4i_rigid_trace(g->A[g->start[j]]))
                 gs4i_stokes_unite(g->parent, i, j);
         }
     return any;
@@ -7942,6 +7982,14 @@ GS4I_INLINE double *gs4i_rigid_block(const gs4i_rigid_level *g, gs4i_rigid_sum *
     return t->last >= t->begin && t->last < t->begin + t->count ? t->K[t->last - t->begin] : NULL;
 }
 
+/* Of GS4I_RIGID_BITS. */
+static double gs4i_rigid_round(gs4_real weight)
+{
+    int exponent;
+    const double share = frexp((double)weight, &exponent);
+    return ldexp(floor(ldexp(share, GS4I_RIGID_BITS) + 0.5), exponent - GS4I_RIGID_BITS);
+}
+
 static void gs4i_rigid_add_faces(const gs4i_stokes_system *y, gs4i_rigid_sum *t)
 {
     const gs4i_rigid *m = &y->rigid;
@@ -7956,6 +8004,7 @@ static void gs4i_rigid_add_faces(const gs4i_stokes_system *y, gs4i_rigid_sum *t)
                 (double)y->mass[f] * (v.value[a / 3] * v.value[a % 3]);
         for (q = 0; q < 6; q++) {
             const gs4i_link row = y->face_rows[f][q];
+            const double weight = row ? gs4i_rigid_round(y->weight[row >> 1]) : 0;
             for (k = 0; k < 4; k++) {
                 const gs4i_link other = y->row_faces[row >> 1][k];
                 const int32_t j = m->parent[other >> 1];
@@ -7964,7 +8013,7 @@ static void gs4i_rigid_add_faces(const gs4i_stokes_system *y, gs4i_rigid_sum *t)
                 gs4i_rigid_face w;
                 if (!K) continue;
                 w = gs4i_rigid_of(m->arm[other >> 1]);
-                W = ((q + k) & 1 ? -half : half) * (double)y->weight[row >> 1];
+                W = ((q + k) & 1 ? -half : half) * weight;
                 for (b = 0; b < 3; b++)
                     for (a = 0; a < 3; a++)
                         K[6 * w.entry[b] + v.entry[a]] += W * (v.value[a] * w.value[b]);
@@ -7990,7 +8039,6 @@ static void gs4i_rigid_add_nodes(const gs4i_rigid *m, int l, gs4i_rigid_sum *t)
             double *K = j ? gs4i_rigid_block(g, t, j) : NULL, q[3];
             if (!K) continue;
             for (k = 0; k < 36; k++) v[k] = 0.5 * (double)under->A[e][k];
-            for (k = 0; k < 36 && under->to[e] == i; k++) v[k] -= 0.5 * (double)under->mass[i][k];
             gs4i_rigid_arm(m, l - 1, under->to[e], q);
             gs4i_rigid_move(v, r, q);
             for (k = 0; k < 36; k++) K[k] += v[k];
@@ -8034,13 +8082,14 @@ static void gs4i_rigid_fill_task(int index, void *context)
                 gs4i_rigid_add_faces(y, &t);
             else
                 gs4i_rigid_add_nodes(&y->rigid, l, &t);
-            for (k = 0; k < 36 && t.begin == g->start[i]; k++) {
-                t.K[0][k] += t.mass[k];
-                g->mass[i][k] = (float)t.mass[k];
-            }
-            if (t.begin == g->start[i]) gs4i_rigid_invert(t.K[0], g->inverse[i]);
             for (b = 0; b < t.count; b++)
                 for (k = 0; k < 36; k++) g->A[t.begin + b][k] = (float)t.K[b][k];
+            if (t.begin > g->start[i]) continue;
+            for (k = 0; k < 36; k++) {
+                g->mass[i][k] = (float)t.mass[k];
+                t.K[0][k] += t.mass[k];
+            }
+            gs4i_rigid_invert(t.K[0], g->inverse[i]);
         }
 }
 
@@ -8070,26 +8119,158 @@ static int gs4i_rigid_build_level(gs4i_stokes *s, int l, int32_t *root, int32_t 
     return GS4_OK;
 }
 
-/* Of the last level, if it is small. */
-static int gs4i_rigid_factorize(gs4i_stokes *s)
+/* --- setup: the last level -------------------------------------------------------------------- *
+ *
+ * ENVELOPE. The first level whose factor is cheap is the last, and solved: F F^T = A + mass, in the
+ * order of Cuthill & McKee (1969) reversed, each row with all blocks from its first on. Threads and
+ * sheets are narrow in that order, and long: bending goes by the fourth power of that, which a few
+ * sweeps on each level do not solve. A coil four cells thick and 350 long ends at the first level,
+ * 7 blocks a row, a folded sheet of 64 cells at the second, 19 blocks; compact bodies go on until
+ * some hundred nodes are left. Blocks are by columns, own ones the inverse of those of F. It is
+ * done by one thread. */
+
+/* Breadth first from `start`: `queue` of what it is joined to, nodes with few neighbours first;
+ * their number. */
+static int32_t gs4i_rigid_walk(const gs4i_rigid_level *g, int32_t start, int32_t mark,
+                               int32_t *seen, int32_t *queue)
+{
+    int32_t n = 1, head, from, e, k;
+    queue[0] = start;
+    seen[start] = mark;
+    for (head = 0; head < n; head++)
+        for (from = n, e = g->start[queue[head]]; e < g->start[queue[head] + 1]; e++) {
+            const int32_t j = g->to[e], degree = g->start[j + 1] - g->start[j];
+            if (seen[j] == mark) continue;
+            seen[j] = mark;
+            for (k = n++; k > from; k--) {
+                const int32_t before = queue[k - 1];
+                if (g->start[before + 1] - g->start[before] <= degree) break;
+                queue[k] = before;
+            }
+            queue[k] = j;
+        }
+    return n;
+}
+
+/* order[] of all nodes; each connected part from one of its ends. */
+static void gs4i_rigid_order(const gs4i_rigid_level *g, int32_t *seen, int32_t *order)
+{
+    int32_t i, n, end, done = 0, mark = 0;
+    int q;
+    memset(seen, 0, (size_t)g->n * sizeof *seen);
+    for (i = 1; i < g->n; i++) {
+        if (seen[i]) continue;
+        for (end = i, q = 0; q < 3; q++) {
+            n = gs4i_rigid_walk(g, end, ++mark, seen, order + done);
+            end = order[done + n - 1];
+        }
+        done += n;
+    }
+    for (i = 0; i < done / 2; i++) {
+        const int32_t k = order[i];
+        order[i] = order[done - 1 - i];
+        order[done - 1 - i] = k;
+    }
+}
+
+/* Is the factor of level l no larger than the matrices of the levels so far, and its work, the
+ * squares of what rows have, no more than GS4I_RIGID_WIDTH for each block of theirs? Into m->block
+ * goes what is where, into m->counts the place of each node. */
+static int gs4i_rigid_fits(const gs4i_rigid *m, int l, int32_t *blocks)
+{
+    const gs4i_rigid_level *g = &m->level[l];
+    int32_t *order = m->block, *place = m->counts, p, e;
+    double had = 0, sum = 0, work = 0;
+    int k;
+    for (k = 0; k <= l; k++) had += m->level[k].start[m->level[k].n];
+    gs4i_rigid_order(g, place, order);
+    for (p = 0; p < g->n - 1; p++) place[order[p]] = p;
+    for (p = 0; p < g->n - 1; p++) {
+        int32_t low = p;
+        for (e = g->start[order[p]]; e < g->start[order[p] + 1]; e++)
+            if (place[g->to[e]] < low) low = place[g->to[e]];
+        sum += p - low + 1;
+        work += (double)(p - low + 1) * (p - low + 1);
+        if (sum > had || work > GS4I_RIGID_WIDTH * had) return 0;
+    }
+    *blocks = (int32_t)sum;
+    return 1;
+}
+
+static int gs4i_rigid_reserve_envelope(gs4i_memory *memory, gs4i_rigid *m, size_t n, size_t blocks)
+{
+    char *base = NULL;
+    int laid;
+    for (laid = 0; laid < 2; laid++) {
+        size_t used = 0;
+        m->order = (int32_t *)gs4i_carve(base, &used, n, sizeof(int32_t));
+        m->low = (int32_t *)gs4i_carve(base, &used, n, sizeof(int32_t));
+        m->begin = (int32_t *)gs4i_carve(base, &used, n + 1, sizeof(int32_t));
+        m->factor = (float(*)[36])gs4i_carve(base, &used, blocks, sizeof *m->factor);
+        if (!laid && !gs4i_scratch_reserve(memory, &m->envelope, used, 0)) return GS4_ERROR_MEMORY;
+        base = (char *)m->envelope.data;
+    }
+    memset(m->factor, 0, blocks * sizeof *m->factor);
+    return GS4_OK;
+}
+
+/* C -= X Y^T */
+GS4I_INLINE void gs4i_rigid_take(double C[36], const float X[36], const float Y[36])
+{
+    int a, b, k;
+    for (b = 0; b < 6; b++)
+        for (k = 0; k < 6; k++)
+            for (a = 0; a < 6; a++) C[6 * b + a] -= (double)X[6 * k + a] * (double)Y[6 * k + b];
+}
+
+/* Row p of the factor, of that of A, in place. */
+static void gs4i_rigid_eliminate(gs4i_rigid *m, int32_t p)
+{
+    float(*row)[36] = m->factor + m->begin[p] - m->low[p];
+    const float *mass = m->level[m->levels - 1].mass[m->order[p]];
+    double C[36], G[36], least[6];
+    int32_t q, k;
+    int a, b;
+    for (q = m->low[p]; q < p; q++) {
+        float(*other)[36] = m->factor + m->begin[q] - m->low[q];
+        for (a = 0; a < 36; a++) C[a] = (double)row[q][a];
+        for (k = m->low[p] > m->low[q] ? m->low[p] : m->low[q]; k < q; k++)
+            gs4i_rigid_take(C, row[k], other[k]);
+        memset(G, 0, sizeof G);
+        for (b = 0; b < 6; b++)
+            for (k = 0; k <= b; k++)
+                for (a = 0; a < 6; a++) G[6 * b + a] += C[6 * k + a] * (double)other[q][6 * k + b];
+        for (a = 0; a < 36; a++) row[q][a] = (float)G[a];
+    }
+    for (a = 0; a < 36; a++) C[a] = (double)row[p][a] + (double)mass[a];
+    for (a = 0; a < 6; a++) least[a] = GS4I_RIGID_LEAST * C[7 * a];
+    for (k = m->low[p]; k < p; k++) gs4i_rigid_take(C, row[k], row[k]);
+    gs4i_rigid_root(C, least, G);
+    for (a = 0; a < 36; a++) row[p][a] = (float)G[6 * (a % 6) + a / 6];
+}
+
+/* Of the last level, which fits, with `blocks` of them. */
+static int gs4i_rigid_factorize(gs4i_stokes *s, int32_t blocks)
 {
     gs4i_rigid *m = &s->system.rigid;
     const gs4i_rigid_level *g = &m->level[m->levels - 1];
-    const size_t n = 6 * ((size_t)g->n - 1);
-    int32_t i, e;
-    int k;
-    m->factor = NULL;
-    if (g->n - 1 > GS4I_RIGID_DENSE) return GS4_OK;
-    if (!gs4i_scratch_reserve(s->memory, &m->square, n * n * sizeof(double), 0))
+    const int32_t n = g->n - 1, *place = m->counts;
+    int32_t p, e;
+    if (gs4i_rigid_reserve_envelope(s->memory, m, (size_t)n, (size_t)blocks) != GS4_OK)
         return GS4_ERROR_MEMORY;
-    m->factor = (double *)m->square.data;
-    memset(m->factor, 0, n * n * sizeof(double));
-    for (i = 1; i < g->n; i++)
+    memcpy(m->order, m->block, (size_t)n * sizeof *m->order);
+    for (m->begin[0] = 0, p = 0; p < n; p++) {
+        const int32_t i = m->order[p];
+        m->low[p] = p;
         for (e = g->start[i]; e < g->start[i + 1]; e++)
-            for (k = 0; k < 36; k++)
-                m->factor[(6 * (size_t)(i - 1) + (size_t)(k % 6)) * n + 6 * (size_t)(g->to[e] - 1)
-                          + (size_t)(k / 6)] = (double)g->A[e][k];
-    gs4i_rigid_cholesky(m->factor, (int)n);
+            if (place[g->to[e]] < m->low[p]) m->low[p] = place[g->to[e]];
+        m->begin[p + 1] = m->begin[p] + p - m->low[p] + 1;
+        for (e = g->start[i]; e < g->start[i + 1]; e++)
+            if (place[g->to[e]] <= p)
+                memcpy(m->factor[m->begin[p] - m->low[p] + place[g->to[e]]], g->A[e],
+                       sizeof g->A[e]);
+        gs4i_rigid_eliminate(m, p);
+    }
     return GS4_OK;
 }
 
@@ -8124,8 +8305,10 @@ static int gs4i_rigid_setup(gs4i_stokes *s)
     gs4i_stokes_system *y = &s->system;
     gs4i_rigid *m = &y->rigid;
     int32_t *blocks = m->level[0].blocks, *root, n = y->faces, f;
-    int l, a, any = 0;
+    int32_t size = 0;
+    int l, a, fits = 0, any = 0;
     m->levels = 0;
+    m->factor = NULL;
     gs4i_rigid_count_blocks(s, blocks);
     if (y->rows == 1) return GS4_OK;
     if (gs4i_rigid_reserve(s, (size_t)blocks[0] * (size_t)blocks[1] * (size_t)blocks[2]) != GS4_OK)
@@ -8139,12 +8322,13 @@ static int gs4i_rigid_setup(gs4i_stokes *s)
         if (gs4i_rigid_build_level(s, l, root, n) != GS4_OK) return GS4_ERROR_MEMORY;
         root = g->parent;
         n = g->n;
-        any = n - 1 > GS4I_RIGID_DENSE && l + 1 < GS4I_RIGID_LEVELS
+        fits = gs4i_rigid_fits(m, l, &size);
+        any = !fits && l + 1 < GS4I_RIGID_LEVELS
               && (g->blocks[0] > 1 || g->blocks[1] > 1 || g->blocks[2] > 1)
               && gs4i_rigid_join_nodes(m, l);
         for (a = 0; any && a < 3; a++) g[1].blocks[a] = (g->blocks[a] + 1) / 2;
     }
-    return m->levels ? gs4i_rigid_factorize(s) : GS4_OK;
+    return fits ? gs4i_rigid_factorize(s, size) : GS4_OK;
 }
 
 /* --- the cycle -------------------------------------------------------------------------------- */
@@ -8224,18 +8408,21 @@ static void gs4i_rigid_prolong_faces(int index, void *context)
     }
 }
 
-/* b - A x of node i. */
+/* r -= A x */
+GS4I_INLINE void gs4i_rigid_subtract(const float A[36], const double x[6], double r[6])
+{
+    int c, k;
+    for (c = 0; c < 6; c++)
+        for (k = 0; k < 6; k++) r[k] -= (double)A[6 * c + k] * x[c];
+}
+
+/* b - (A + mass) x of node i. */
 GS4I_INLINE void gs4i_rigid_node_residual(const gs4i_rigid_level *g, int32_t i, double r[6])
 {
     int32_t e;
-    int c, k;
     memcpy(r, g->b[i], 6 * sizeof *r);
-    for (e = g->start[i]; e < g->start[i + 1]; e++) {
-        const float *A = g->A[e];
-        const double *x = g->x[g->to[e]];
-        for (c = 0; c < 6; c++)
-            for (k = 0; k < 6; k++) r[k] -= (double)A[6 * c + k] * x[c];
-    }
+    gs4i_rigid_subtract(g->mass[i], g->x[i], r);
+    for (e = g->start[i]; e < g->start[i + 1]; e++) gs4i_rigid_subtract(g->A[e], g->x[g->to[e]], r);
 }
 
 GS4I_INLINE void gs4i_rigid_relax(const gs4i_rigid_level *g, int32_t i)
@@ -8329,15 +8516,35 @@ static void gs4i_rigid_prolong_nodes(int index, void *context)
     }
 }
 
-static void gs4i_rigid_solve_dense(gs4i_rigid *m)
+/* x of the last level, exactly: F F^T x = b. */
+static void gs4i_rigid_substitute(gs4i_rigid *m)
 {
     const gs4i_rigid_level *g = &m->level[m->levels - 1];
-    const int n = 6 * (g->n - 1);
-    double y[6 * GS4I_RIGID_DENSE];
-    int i;
-    for (i = 0; i < n; i++) y[i] = g->b[1 + i / 6][i % 6];
-    gs4i_rigid_substitute(m->factor, n, y);
-    for (i = 0; i < n; i++) g->x[1 + i / 6][i % 6] = y[i];
+    int32_t p, q;
+    int a, b;
+    for (p = 0; p < g->n - 1; p++) {
+        float(*row)[36] = m->factor + m->begin[p] - m->low[p];
+        double *x = g->x[m->order[p]];
+        for (a = 0; a < 6; a++) x[a] = g->b[m->order[p]][a];
+        for (q = m->low[p]; q < p; q++) gs4i_rigid_subtract(row[q], g->x[m->order[q]], x);
+        for (a = 5; a >= 0; a--) {
+            double sum = 0;
+            for (b = 0; b <= a; b++) sum += (double)row[p][6 * b + a] * x[b];
+            x[a] = sum;
+        }
+    }
+    for (p = g->n - 2; p >= 0; p--) {
+        float(*row)[36] = m->factor + m->begin[p] - m->low[p];
+        double *x = g->x[m->order[p]];
+        for (b = 0; b < 6; b++) {
+            double sum = 0;
+            for (a = b; a < 6; a++) sum += (double)row[p][6 * b + a] * x[a];
+            x[b] = sum;
+        }
+        for (q = m->low[p]; q < p; q++)
+            for (b = 0; b < 6; b++)
+                for (a = 0; a < 6; a++) g->x[m->order[q]][b] -= (double)row[q][6 * b + a] * x[a];
+    }
 }
 
 /* x of level l improved; W where the next level is much smaller, else levels add up. */
@@ -8349,7 +8556,7 @@ static void gs4i_rigid_visit(gs4i_stokes *s, int l)
     gs4i_rigid_task t;
     int q;
     if (last && m->factor) {
-        gs4i_rigid_solve_dense(m);
+        gs4i_rigid_substitute(m);
         return;
     }
     for (q = 0; q < (last ? 4 : 1); q++) gs4i_rigid_sweep_nodes(s, l, 0);
@@ -8855,7 +9062,7 @@ static void gs4i_stokes_free(gs4i_stokes *s)
     gs4i_release(s->memory, &y->vectors);
     gs4i_release(s->memory, &y->rigid.faces);
     gs4i_release(s->memory, &y->rigid.work);
-    gs4i_release(s->memory, &y->rigid.square);
+    gs4i_release(s->memory, &y->rigid.envelope);
     for (k = 0; k < GS4I_RIGID_LEVELS; k++) {
         gs4i_release(s->memory, &y->rigid.level[k].nodes);
         gs4i_release(s->memory, &y->rigid.level[k].edges);
@@ -29987,6 +30194,8 @@ GS4_API GS4I_COLD int gs4_estimate(const gs4_sim *sim, gs4_scheme scheme, gs4_in
 #undef GS4I_RIGID_STRONG
 #undef GS4I_RIGID_JOINED
 #undef GS4I_RIGID_PIVOT
+#undef GS4I_RIGID_LEAST
+#undef GS4I_RIGID_BITS
 #undef GS4I_RIGID_RANGE
 #undef GS4I_STOKES_SPRAY
 #undef GS4I_STRIP

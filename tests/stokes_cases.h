@@ -10,10 +10,10 @@
          at[1] < gs4i_box_length(box, place, 1); at[1]++)                 \
         for (at[0] = 0; at[0] < gs4i_box_length(box, place, 0); at[0]++, i++)
 
-static const char *const stokes_names[] = { "blob",   "rope",  "sheet",  "pool",
-                                            "closed", "rooms", "porous", "spray" };
+static const char *const stokes_names[] = { "blob",  "rope",   "sheet", "pool", "closed",
+                                            "rooms", "porous", "spray", "coil" };
 enum {
-    STOKES_CASES = 8
+    STOKES_CASES = 9
 };
 
 typedef struct stokes_case {
@@ -43,11 +43,12 @@ static int stokes_in_sheet(double x, double y, double z, double n)
            && fabs(x - fold) < 1.5 * sqrt(1 + slope * slope);
 }
 
-/* A coiled rope, four cells across, that hangs above its coil on a floor. */
-static int stokes_in_rope(double x, double y, double z, double n)
+/* A coiled rope, four cells across, that hangs above its coil on a floor; turns, `pitch` apart,
+ * touch here and there at 5, nowhere at 6. */
+static int stokes_in_rope(double x, double y, double z, double n, double pitch)
 {
     const double dx = x - 0.5 * n, dz = z - 0.5 * n, r = sqrt(dx * dx + dz * dz);
-    const double turn = atan2(dz, dx) / 6.28318530718, pitch = 5;
+    const double turn = atan2(dz, dx) / 6.28318530718;
     const double level = y - pitch * turn - pitch * floor((y - pitch * turn) / pitch) - 0.5 * pitch;
     if (y < 0.4 * n) return (r - 0.2 * n) * (r - 0.2 * n) + level * level < 4.2;
     return pow(dx - 0.2 * n, 2) + dz * dz < 4.2 && y < 0.95 * n;
@@ -57,7 +58,8 @@ static int stokes_kind_at(const char *name, int n, double x, double y, double z)
 {
     const double dx = x - 0.5 * n, dy = y - 0.5 * n, dz = z - 0.5 * n;
     if (strcmp(name, "blob") == 0) return dx * dx + dy * dy + dz * dz < 0.0961 * n * n;
-    if (strcmp(name, "rope") == 0) return stokes_in_rope(x, y, z, n);
+    if (strcmp(name, "rope") == 0) return stokes_in_rope(x, y, z, n, 5);
+    if (strcmp(name, "coil") == 0) return stokes_in_rope(x, y, z, n, 6);
     if (strcmp(name, "sheet") == 0) return stokes_in_sheet(x, y, z, n);
     if (strcmp(name, "pool") == 0) {
         if (dx * dx + dz * dz < 0.0144 * n * n && y < 0.7 * n) return GS4_CELL_SOLID;

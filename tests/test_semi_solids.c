@@ -278,8 +278,7 @@ static void semi_solids_turn(const gs4_material *m, int a, double jitter, int st
     f.jitter = (gs4_real)jitter;
     turn[a] = 10;
     f.angular_velocity = at(turn[0], turn[1], turn[2]);
-    count =
-        gs4_add_particles(sim, gs4_box(at(0.08, 0.08, 0.08), at(0.16, 0.16, 0.16)), &f);
+    count = gs4_add_particles(sim, gs4_box(at(0.08, 0.08, 0.08), at(0.16, 0.16, 0.16)), &f);
     CHECK(count == 4096);
     scene_by_id(sim, GS4_FIELD_POSITION, first);
     out[0] = out[1] = 1;

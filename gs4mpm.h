@@ -23822,6 +23822,14 @@ static int gs4i_prepare_emitters(gs4_sim *sim, double dt)
     return GS4_OK;
 }
 
+/* Squared speed of elastic waves of what is at rest, for the limit of the step; of the
+ * semi-implicit scheme only tension counts. */
+static gs4_real gs4i_waves_of_phase(const gs4_sim *sim, const gs4i_material_constants *m)
+{
+    if (sim->desc.scheme == GS4_SEMI_IMPLICIT) return 0;
+    return gs4i_max(2 * m->modulus, GS4I_SOLID_WAVES * m->shear_modulus) * m->lone * m->inv_density;
+}
+
 /* What is new counts for the next limit. */
 static void gs4i_note_emission(gs4_sim *sim, const gs4i_material_constants *m)
 {
@@ -23829,9 +23837,7 @@ static void gs4i_note_emission(gs4_sim *sim, const gs4i_material_constants *m)
     r->max_sound = gs4i_max(r->max_sound, m->sound_speed * GS4I_SQRT(m->lone));
     r->max_viscosity = gs4i_max(r->max_viscosity, m->viscosity * m->inv_density);
     r->min_viscosity = gs4i_min(r->min_viscosity, m->local * m->viscosity * m->inv_density);
-    r->max_stiffness =
-        gs4i_max(r->max_stiffness, gs4i_max(2 * m->modulus, GS4I_SOLID_WAVES * m->shear_modulus)
-                                       * m->lone * m->inv_density);
+    r->max_stiffness = gs4i_max(r->max_stiffness, gs4i_waves_of_phase(sim, m));
     if (m->varies) sim->limits_stale = 1;
 }
 
@@ -23967,9 +23973,8 @@ static gs4i_report gs4i_with_both_phases(const gs4_sim *sim, gs4i_report r)
         gs4_real mu;
         if (!l->is.can_melt) continue;
         mu = l->local * gs4i_viscosity_of(l, l->melting, none, 0);
-        r.max_stiffness = gs4i_max(r.max_stiffness,
-                                   gs4i_max(GS4I_SOLID_WAVES * solid->shear_modulus, 2 * l->modulus)
-                                       * l->lone * l->inv_density);
+        r.max_stiffness = gs4i_max(r.max_stiffness, gs4i_waves_of_phase(sim, solid));
+        r.max_stiffness = gs4i_max(r.max_stiffness, gs4i_waves_of_phase(sim, l));
         if (mu < GS4I_HUGE) r.max_viscosity = gs4i_max(r.max_viscosity, mu * l->inv_density);
     }
     return r;

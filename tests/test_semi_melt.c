@@ -201,8 +201,51 @@ static void test_semi_melt_block(void)
     }
 }
 
+/* Elasticity of what melts limits no step, frozen or molten, whether it is there or an emitter gives
+ * it: with moduli of 1 Pa and of 1e9 Pa the largest stable step, and what limits it, are the same. */
+static void test_semi_melt_limit(void)
+{
+    int stiff, emits;
+    for (emits = 0; emits < 2; emits++) {
+        double dt[2];
+        for (stiff = 0; stiff < 2; stiff++) {
+            gs4_sim_desc d = semi_cube(16);
+            gs4_material m = partitioned_liquid(1);
+            gs4_fill f = scene_fill(at(0, 0, 0));
+            gs4_emitter e;
+            gs4_sim *sim;
+            d.gravity = at(0, -10, 0);
+            CHECK_RESULT(NULL, gs4_create(&d, &sim), GS4_OK);
+            m.liquid = GS4_OLDROYD_B;
+            m.local_fraction = (gs4_real)0.5;
+            m.relaxation_time = (gs4_real)(stiff ? 0.5e-9 : 0.5);
+            m.solid = GS4_NEO_HOOKEAN;
+            m.shear_modulus = (gs4_real)(stiff ? 1e9 : 1);
+            m.heat_capacity = 1000;
+            m.can_melt = 1;
+            m.melting_temperature = 50;
+            f.material = gs4_add_material(sim, &m);
+            f.temperature = stiff ? 20 : 100;
+            f.velocity = at(0, -1, 0);
+            memset(&e, 0, sizeof e);
+            e.shape = gs4_box(at(0.25, 0.5, 0.25), at(0.75, 0.75, 0.75));
+            e.fill = f;
+            if (emits)
+                CHECK(gs4_add_emitter(sim, &e) >= 0);
+            else
+                CHECK(gs4_add_particles(sim, e.shape, &f) > 0);
+            CHECK_RESULT(sim, gs4_step(sim, (gs4_real)1e-3), GS4_OK);
+            CHECK(strcmp(gs4_limit_name(sim), "elasticity") != 0);
+            dt[stiff] = (double)gs4_stable_dt(sim);
+            gs4_destroy(sim);
+        }
+        CHECK_CLOSE(dt[1] / dt[0], 1, 0.01);
+    }
+}
+
 static void run_semi_melt(void)
 {
+    RUN_ONCE(test_semi_melt_limit);
     RUN_FULL(test_semi_melt_channel);
     RUN_FULL_ONCE(test_semi_melt_block);
 }

@@ -124,9 +124,9 @@ static void test_semi_melt_channel(void)
     }
 }
 
-/* A block on a sticky floor, held by a sticky wall at its back, 1e6 times softer at the front, where
- * it is hot: that slumps while heat goes on into the rest. Heat is what it was, temperatures stay
- * within those given, volume is kept, and what stays cold creeps by at most rho g H/mu H t; the
+/* A block on a sticky floor, held by a sticky wall at its back, 1e6 times softer at the front,
+ * where it is hot: that slumps while heat goes on into the rest. Heat is what it was, temperatures
+ * stay within those given, volume is kept, and what stays cold creeps by at most rho g H/mu H t; the
  * correction of volume, which knows no viscosity, moves it by a share of what flows. */
 static void test_semi_melt_block(void)
 {
@@ -201,8 +201,8 @@ static void test_semi_melt_block(void)
     }
 }
 
-/* Elasticity of what melts limits no step, frozen or molten, whether it is there or an emitter gives
- * it: with moduli of 1 Pa and of 1e9 Pa the largest stable step, and what limits it, are the same. */
+/* Elasticity of what melts limits no step, frozen or molten, whether it is there or an emitter
+ * gives it: with moduli of 1 Pa and of 1e9 Pa the largest stable step is the same. */
 static void test_semi_melt_limit(void)
 {
     int stiff, emits;

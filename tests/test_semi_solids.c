@@ -303,9 +303,9 @@ static void semi_solids_turn(const gs4_material *m, int a, double jitter, int st
     }
 }
 
-/* Rigid motion costs no energy, however stiff it is: elastic waves go 16 and 160 cells a step. Where
- * faces beyond its edges went on from one face without a slope they resisted the turn, and it lost
- * 25 % within half a radian. */
+/* Rigid motion costs no energy, however stiff it is: elastic waves go 16 and 160 cells a step.
+ * Where faces beyond its edges went on from one face without a slope they resisted the turn, and it
+ * lost 25 % within half a radian. */
 static void test_semi_solids_turn(void)
 {
     int n;

@@ -2,6 +2,7 @@
  *     cc -O3 -march=native examples/letters.c -Iexamples -I. -lm -lpthread -o letters
  *     ./letters                           the explicit scheme: K ten times G, or 256 kPa
  *     ./letters --row 2 --cells 60        the partitioned one: bulk moduli K from G to 1e6 G
+ *     ./letters --row 3 --cells 60        the semi-implicit one: G 500 times as large, up to 75 MPa
  *
  * After figure 9 of "Augmented MPM" (2014), softer: shear moduli G from 20 to 150 kPa. Blue and
  * green are elastic; red, yellow and orange yield at 4 to 10 % of strain and keep the shape that
@@ -80,7 +81,7 @@ int main(int argc, char **argv)
     e.frames = 72;
     e.cells = 110;
     e.frame_time = 1.0 / 90;
-    e.rows = 2;
+    e.rows = 3;
     example_options(&e, argc, argv);
 
     desc.cell_size = real(width / e.cells);
@@ -91,6 +92,7 @@ int main(int argc, char **argv)
     desc.gravity = vec(0, -9.81, 0);
     for (int i = 0; i < 6; ++i) desc.walls[i] = i == 2 ? GS4_WALL_SEPARATE : GS4_WALL_OPEN;
     if (e.row == 2) desc.scheme = GS4_PARTITIONED;
+    if (e.row == 3) desc.scheme = GS4_SEMI_IMPLICIT;
     sim = example_create(&e, &desc);
 
     for (int i = 0; i < LETTERS; ++i) {
@@ -104,9 +106,11 @@ int main(int argc, char **argv)
         l->middle[1] = place[i][1];
         m.density = 1000;
         m.solid = yields[i] > 0 ? GS4_FIXED_COROTATED : GS4_NEO_HOOKEAN;
-        m.shear_modulus = real(stiff[i]);
+        m.shear_modulus = real((e.row == 3 ? 500 : 1) * stiff[i]);
         m.yield_compression = m.yield_stretch = real(yields[i]);
-        m.bulk_modulus = real(e.row == 2 ? bulk[i] * stiff[i] : fmax(256e3, 10 * stiff[i]));
+        m.bulk_modulus = real(e.row == 1   ? fmax(256e3, 10 * stiff[i])
+                              : e.row == 2 ? bulk[i] * stiff[i]
+                                           : 10 * (double)m.shear_modulus);
         m.viscosity = 3; /* a little damping */
         fill.material = example_need(sim, gs4_add_material(sim, &m));
         fill.velocity = vec(0, -0.8, 0);

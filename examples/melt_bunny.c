@@ -1,6 +1,7 @@
 /* melt_bunny.c - a chocolate bunny melts in a hot pan.
  *     cc -O3 -march=native examples/melt_bunny.c -Iexamples -I. -lm -lpthread -o melt_bunny
  *     ./melt_bunny --row 1      the melt has no viscosity; --row 2: 39.2 Pa s; pictures in out/
+ *     ./melt_bunny --row 2 --scheme semi-implicit
  *
  * After figure 14 of the GS4 paper (viscosities: table 4, bunny melting 1 and 2). The pan has
  * 120 degrees and holds the bunny by its feet; chocolate melts at 34. In row 1 what melts runs
@@ -30,6 +31,7 @@ int main(int argc, char **argv)
     e.cells = 40;
     e.rows = 2;
     e.frame_time = 0.1;
+    e.takes_scheme = 1;
     example_options(&e, argc, argv);
 
     desc.cell_size = real(pan / e.cells);

@@ -37,6 +37,7 @@
 #include "test_semi_long.c"
 #include "test_semi_viscoelastic.c"
 #include "test_semi_solids.c"
+#include "test_semi_melt.c"
 #include "test_mesh.c"
 #include "test_estimate.c"
 #include "test_reference.c"
@@ -136,6 +137,7 @@ int main(int count, char **values)
     run_semi_long();
     run_semi_viscoelastic();
     run_semi_solids();
+    run_semi_melt();
     run_mesh();
     run_estimate();
     RUN_ONCE(test_reference);

@@ -692,7 +692,8 @@ static void test_semi_levelling_limit(void)
  * from t g H^3/(nu R0^2) = .3 on within 5 % (shared/reference, lubrication), with --slow over two
  * decades. A quarter of it, between two slippery walls. To 3 it takes 41 to 44 steps; with what
  * kernels saw of falling faces around it took 548 at 8 cells, with what faces remember and
- * particles do not see 90 to 117. */
+ * particles do not see 90 to 117. To 30 it takes 111; where single particles fell from its front in
+ * steps of their fall it took 746. */
 static void test_semi_current(void)
 {
     const double g = 10, nu = 1e4, height = 0.5, unit = nu / (g * height * height * height);
@@ -736,7 +737,7 @@ static void test_semi_current(void)
                 printf("axis %d: %.4f of the law at %g in %d steps\n", a, front / law, T,
                        (int)gs4_get_stats(sim).steps);
             CHECK_BETWEEN(front / law, 0.95, 1.05);
-            CHECK(gs4_get_stats(sim).steps < (k < 3 ? 60 : 700));
+            CHECK(gs4_get_stats(sim).steps < (k < 3 ? 60 : 150));
         }
         gs4_destroy(sim);
     }

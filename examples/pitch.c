@@ -1,15 +1,15 @@
 /* pitch.c - the pitch drop experiment: a drop forms below a funnel, hangs and thins.
  *     cc -O3 -march=native examples/pitch.c -Iexamples -I. -lm -lpthread -o pitch
- *     ./pitch                             a minute; pictures in out/
- *     ./pitch --frames 47                 its thread tears, it falls: many minutes
+ *     ./pitch                             two minutes; pictures in out/
+ *     ./pitch --frames 50                 on to where its thread tears: many minutes
  *
  * Pitch of 2.3e8 Pa s in the funnel of Brisbane: a stem of 9.4 by 29 mm under 75 mm of pitch, here
  * in a cylinder of 24 mm (Edgeworth, Dalton & Parnell 1984). The semi-implicit scheme: explicit
- * steps would be 8 ps, here they are up to a week, and milliseconds while the drop falls. What has
+ * steps would be 4 ps, here they are up to a week, and milliseconds where crumbs fall. What has
  * left the stem is printed beside the law of Poiseuille. There is no surface tension: weight alone
- * thins the drop, and its thread tears where it is about a cell wide. A slender thread would break
- * after sqrt(12 mu A/(rho g Q)) = 0.7 years (Wilson 1988), A the section of the stem, Q what flows;
- * those of the experiment last 8 to 13, so theirs are not as simple. */
+ * thins the drop, and its thread crumbles where it is less than about two cells wide. A slender
+ * thread would break after sqrt(12 mu A/(rho g Q)) = 0.7 years (Wilson 1988), A the section of the
+ * stem, Q what flows; those of the experiment last 8 to 13, so theirs are not as simple. */
 #include "example.h"
 
 enum {
@@ -72,9 +72,9 @@ int main(int argc, char **argv)
     preview_solid things[2] = { { 0 } };
     gs4_sim *sim;
     e.name = "pitch";
-    e.frames = 46;
-    e.cells = 20;
-    e.frame_time = 0.0203 * year; /* it falls three days after the last */
+    e.frames = 44; /* 0.88 years */
+    e.cells = 28;
+    e.frame_time = 0.02 * year;
     example_options(&e, argc, argv);
 
     desc.scheme = GS4_SEMI_IMPLICIT;

@@ -8207,7 +8207,7 @@ static int gs4i_rigid_fits(const gs4i_rigid *m, int l, int32_t *blocks)
             if (place[g->to[e]] < low) low = place[g->to[e]];
         sum += p - low + 1;
         work += (double)(p - low + 1) * (p - low + 1);
-        if (sum > had || work > GS4I_RIGID_WIDTH * had) return 0;
+        if (sum > had || work > (double)GS4I_RIGID_WIDTH * had) return 0;
     }
     *blocks = (int32_t)sum;
     return 1;

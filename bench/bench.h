@@ -1,4 +1,5 @@
-/* What the benches share: a clock, the machine, min and median. Include after gs4mpm.h. */
+/* What the benches share: a clock, what must not fail, the machine, the median. Include after
+ * gs4mpm.h. */
 #ifndef BENCH_H
 #define BENCH_H
 #include <stdio.h>
@@ -13,6 +14,13 @@ static double bench_now(void *user)
     (void)user;
     timespec_get(&t, TIME_UTC);
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static void bench_need(const gs4_sim *sim, int result)
+{
+    if (result >= 0) return;
+    fprintf(stderr, "%s\n", gs4_last_error(sim));
+    exit(1);
 }
 
 /* Machine and compiler as comment lines of a CSV file. */

@@ -34,13 +34,6 @@ static double now(void *user)
     return (double)clock() / CLOCKS_PER_SEC;
 }
 
-static void need(const gs4_sim *sim, int result)
-{
-    if (result >= 0) return;
-    fprintf(stderr, "%s\n", gs4_last_error(sim));
-    exit(1);
-}
-
 /* A box of 1 x 1 x 0.5 m, with walls of one kind. */
 static gs4_sim *box_of(int cells, const mode *m, gs4_wall wall)
 {
@@ -56,7 +49,7 @@ static gs4_sim *box_of(int cells, const mode *m, gs4_wall wall)
     d.scheme = m->scheme;
     d.integrator = m->integrator;
     d.now = now;
-    need(NULL, gs4_create(&d, &sim));
+    bench_need(NULL, gs4_create(&d, &sim));
     return sim;
 }
 
@@ -68,7 +61,7 @@ static int add_liquid(gs4_sim *sim, double viscosity, double relaxation)
         m.local_fraction = (gs4_real)0.5;
         m.relaxation_time = (gs4_real)relaxation;
     }
-    need(sim, gs4_add_material(sim, &m));
+    bench_need(sim, gs4_add_material(sim, &m));
     return 0;
 }
 
@@ -78,7 +71,7 @@ static double dam(int cells, const mode *m, gs4_sim **sim)
     gs4_fill f = scene_fill(at(0, 0, 0));
     *sim = box_of(cells, m, GS4_WALL_SLIP);
     add_liquid(*sim, 1e-3, 0);
-    need(*sim, gs4_add_particles(*sim, gs4_box(at(0, 0, 0), at(0.25, 0.5, 0.5)), &f));
+    bench_need(*sim, gs4_add_particles(*sim, gs4_box(at(0, 0, 0), at(0.25, 0.5, 0.5)), &f));
     return 0.6;
 }
 
@@ -91,7 +84,7 @@ static double pour(int cells, const mode *m, gs4_sim **sim)
     memset(&e, 0, sizeof e);
     e.shape = gs4_cylinder(at(0.5, 0.75, 0.25), at(0.5, 0.85, 0.25), (gs4_real)0.08);
     e.fill.velocity = at(0, -1, 0);
-    need(*sim, gs4_add_emitter(*sim, &e));
+    bench_need(*sim, gs4_add_emitter(*sim, &e));
     return 1;
 }
 
@@ -101,7 +94,7 @@ static double honey(int cells, const mode *m, gs4_sim **sim)
     gs4_fill f = scene_fill(at(0, 0, 0));
     *sim = box_of(cells, m, GS4_WALL_STICK);
     add_liquid(*sim, 200, 0);
-    need(*sim, gs4_add_particles(*sim, gs4_sphere(at(0.5, 0.3, 0.25), (gs4_real)0.18), &f));
+    bench_need(*sim, gs4_add_particles(*sim, gs4_sphere(at(0.5, 0.3, 0.25), (gs4_real)0.18), &f));
     return 0.3;
 }
 
@@ -111,7 +104,7 @@ static double elastic(int cells, const mode *m, gs4_sim **sim)
     gs4_fill f = scene_fill(at(0, 0, 0));
     *sim = box_of(cells, m, GS4_WALL_STICK);
     add_liquid(*sim, 20, 0.1);
-    need(*sim, gs4_add_particles(*sim, gs4_sphere(at(0.5, 0.3, 0.25), (gs4_real)0.18), &f));
+    bench_need(*sim, gs4_add_particles(*sim, gs4_sphere(at(0.5, 0.3, 0.25), (gs4_real)0.18), &f));
     return 0.4;
 }
 
@@ -123,8 +116,8 @@ static double ball(int cells, const mode *m, gs4_sim **sim)
     *sim = box_of(cells, m, GS4_WALL_SEPARATE);
     rubber.solid = GS4_NEO_HOOKEAN;
     rubber.shear_modulus = (gs4_real)2e4;
-    need(*sim, gs4_add_material(*sim, &rubber));
-    need(*sim, gs4_add_particles(*sim, gs4_sphere(at(0.5, 0.4, 0.25), (gs4_real)0.18), &f));
+    bench_need(*sim, gs4_add_material(*sim, &rubber));
+    bench_need(*sim, gs4_add_particles(*sim, gs4_sphere(at(0.5, 0.4, 0.25), (gs4_real)0.18), &f));
     return 0.4;
 }
 
@@ -142,8 +135,8 @@ static double wax(int cells, const mode *m, gs4_sim **sim)
     w.solid = GS4_NEO_HOOKEAN;
     w.shear_modulus = (gs4_real)1e4;
     f.temperature = 80;
-    need(*sim, gs4_add_material(*sim, &w));
-    need(*sim, gs4_add_particles(*sim, gs4_sphere(at(0.5, 0.2, 0.25), (gs4_real)0.18), &f));
+    bench_need(*sim, gs4_add_material(*sim, &w));
+    bench_need(*sim, gs4_add_particles(*sim, gs4_sphere(at(0.5, 0.2, 0.25), (gs4_real)0.18), &f));
     return 0.4;
 }
 
@@ -166,7 +159,7 @@ static void run(const scene *s, const mode *m, int cells, double worst[3][2])
     const double duration = s->make(cells, m, &sim);
     double start = now(NULL), asked, took, ratio[3];
     int i;
-    need(sim, gs4_estimate(sim, m->scheme, m->integrator, duration, &c));
+    bench_need(sim, gs4_estimate(sim, m->scheme, m->integrator, duration, &c));
     asked = now(NULL) - start;
     start = now(NULL);
     if (gs4_advance(sim, (gs4_real)duration) < 0) {

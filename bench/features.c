@@ -51,13 +51,6 @@ static const char *const names[FEATURES] = { "Newtonian, explicit, GS4",
                                              "the same with stress",
                                              "the same with a solid" };
 
-static void need(const gs4_sim *sim, int result)
-{
-    if (result >= 0) return;
-    fprintf(stderr, "%s\n", gs4_last_error(sim));
-    exit(1);
-}
-
 static gs4_sim_desc describe(feature what, int cells)
 {
     gs4_sim_desc d = scene_cube(cells);
@@ -107,13 +100,13 @@ static gs4_sim *scene(feature what, int cells, int side)
     gs4_fill f = scene_fill(at(0, 0, 0));
     gs4_sim *sim;
     int i;
-    need(NULL, gs4_create(&d, &sim));
-    need(sim, gs4_add_material(sim, &m));
+    bench_need(NULL, gs4_create(&d, &sim));
+    bench_need(sim, gs4_add_material(sim, &m));
     f.spacing = d.cell_size / (gs4_real)side;
     f.jitter = (gs4_real)0.2;
     if (m.heat_capacity > 0) f.temperature = 60;
-    need(sim, gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1, 0.5, 1)), &f));
-    for (i = 0; i < 3; i++) need(sim, gs4_step(sim, (gs4_real)0.3 * gs4_stable_dt(sim)));
+    bench_need(sim, gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1, 0.5, 1)), &f));
+    for (i = 0; i < 3; i++) bench_need(sim, gs4_step(sim, (gs4_real)0.3 * gs4_stable_dt(sim)));
     return sim;
 }
 
@@ -153,7 +146,7 @@ int main(int argc, char **argv)
             const int particles = gs4_get_stats(sims[i]).particles;
             const double start = bench_now(NULL);
             for (k = 0; k < steps; k++)
-                need(sims[i], gs4_step(sims[i], (gs4_real)0.5 * gs4_stable_dt(sims[i])));
+                bench_need(sims[i], gs4_step(sims[i], (gs4_real)0.5 * gs4_stable_dt(sims[i])));
             times[i][round] = (bench_now(NULL) - start) / steps / particles * 1e9;
             ratios[i][round] = times[i][round] / times[0][round];
         }

@@ -481,8 +481,8 @@ static void sticky_bodies(gs4_sim *sim, sticky_flow *k)
     CHECK(gs4_add_collider(sim, &body) >= 0);
 }
 
-/* Flux, or angular momentum, over that of the law at the same particles: (R^2 - r^2)/(4 nu), half
- * of that over 2 nu in a slit, and (1/r - r)/3. */
+/* Flux, or angular momentum, over that of the law at the same particles: u = (1 - r^2)/4 in a pipe,
+ * (1 - r^2)/2 in a slit, and (1/r - r)/3 around the cylinder. */
 static double sticky_measure(const sticky_flow *k, gs4_sim *sim)
 {
     const gs4_view x = gs4_particles(sim, GS4_FIELD_POSITION),

@@ -378,11 +378,11 @@
  * (0, 0) itself is 1.3 % low; order in time 1.9 to 2.1 in x, v and F; what cannot follow, far above
  * w dt = 1, is damped as the member says. Beams are as in the partitioned scheme, cantilevers of 4
  * cells within 9 % of beam theory, of 6 within 5 %. Stiff solids stop up to 1.3 cells before walls,
- * as far as kernels reach. A cube of 8 cells that turns by 0.05 a step loses 0.04 % of its energy in
- * a quarter of a turn where its waves go 16 cells a step and K is infinite, else up to 0.7 %, and
- * gains 0.1 % at most between (tests: semi_solids_turn). What is stiff and less than two cells thick
- * may need smaller steps, or does not converge. The correction of volume leaves solids alone: F
- * says where they are.
+ * as far as kernels reach. A cube of 8 cells that turns by 0.05 a step loses 0.04 % of its energy
+ * in a quarter of a turn where its waves go 16 cells a step and K is infinite, else up to 0.7 %,
+ * and gains 0.1 % at most between (tests: semi_solids_turn). What is stiff and less than two cells
+ * thick may need smaller steps, or does not converge. The correction of volume leaves solids
+ * alone: F says where they are.
  *
  * Symplectic Euler, the fast tier: one affine scatter with stress and one gather (MLS-MPM, APIC),
  * first order.

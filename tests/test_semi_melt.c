@@ -126,8 +126,8 @@ static void test_semi_melt_channel(void)
 
 /* A block on a sticky floor, held by a sticky wall at its back, 1e6 times softer at the front,
  * where it is hot: that slumps while heat goes on into the rest. Heat is what it was, temperatures
- * stay within those given, volume is kept, and what stays cold creeps by at most rho g H/mu H t; the
- * correction of volume, which knows no viscosity, moves it by a share of what flows. */
+ * stay within those given, volume is kept, and what stays cold creeps by at most rho g H/mu H t;
+ * the correction of volume, which knows no viscosity, moves it by a share of what flows. */
 static void test_semi_melt_block(void)
 {
     const double h = 1.0 / 24, H = 0.5, front = 0.35, back = 0.2, g = 10, end = 1, soft = 500;

@@ -19306,7 +19306,7 @@ static void gs4i_fit_diagonal(gs4i_fit *fit)
 
 /* Of the folded forces, so much may be left over: momentum is conserved within it. About 12
  * iterations, beside bodies that let go up to 300. */
-#define GS4I_FIT_TOLERANCE (sizeof(gs4_real) == 8 ? 1e-12 : 1e-8)
+#define GS4I_FIT_TOLERANCE (sizeof(gs4_real) == 8 ? 1e-12 : 1e-10)
 #define GS4I_FIT_ITERATIONS 1000
 
 /* Vectors for all that has a number, and numbers below 0 before them. */

@@ -303,10 +303,10 @@ static void semi_solids_turn(const gs4_material *m, int a, double jitter, int st
     }
 }
 
-/* Rigid motion costs hardly any energy, however stiff it is: 0.04 % in a quarter of a turn where
- * elastic waves go 16 cells a step, 0.7 % where they go 160 or K is finite and particles jitter.
- * Where faces beyond its edges went on from one face without a slope they resisted the turn, and it
- * lost 25 % within half a radian. */
+/* Rigid motion costs hardly any energy, however stiff it is: elastic waves go 16 and 160 cells a
+ * step. Where faces beyond its edges went on from one face without a slope they resisted the turn,
+ * and it lost 25 % within half a radian; where those of three layers did alone, 0.5 % at 1e8 Pa.
+ * Finite K, of which acc is not split, costs 0.6 % a quarter turn, by the step, whatever G. */
 static void test_semi_solids_turn(void)
 {
     int n;
@@ -323,7 +323,7 @@ static void test_semi_solids_turn(void)
             printf("axis %d, G %g, K %g, jitter %g: energy %.5f to %.5f, moved %.5f cells\n", a,
                    (double)m.shear_modulus, (double)m.bulk_modulus, n % 2 * 0.3, out[0], out[1],
                    out[2]);
-        CHECK_BETWEEN(out[0], n == 0 || n == 2 ? 0.998 : 0.99, 1);
+        CHECK_BETWEEN(out[0], m.incompressible ? 0.998 : 0.993, 1);
         CHECK_BETWEEN(out[1], 1, 1.002);
         CHECK_BETWEEN(out[2], 0, 0.01);
     }

@@ -6632,12 +6632,21 @@ static int gs4i_elliptic_solve(gs4i_elliptic *e, const gs4_sim_desc *desc)
  * from cell to cell, and may be 1e6 times the least; only where that does not converge, as around
  * sharp stiff inclusions, 30 times.
  *
+ * FILL. A law stands for the stress of particles; what preconditions it must not resist less. A
+ * plate one cell thick has no edge but those at its surfaces, without a row, so nothing would hold
+ * it against bending: eigenvalues of the product with the preconditioner were up to 1200, and it did
+ * not converge. So with a law a row counts what is filled of its cells; cells of air that material
+ * reaches have rows, too, with the faces beyond, which have next to no mass: what is least of their
+ * energy is left, as the cycle eliminates them. Eigenvalues are .02 to 7 then, but for two of 25.
+ * What only reaches a wall is not held by it: cells of air have no rows with what is given.
+ *
  * Larionov, Batty & Bridson 2017. */
 
 /* What a face is. */
 enum {
     GS4I_STOKES_NONE = 0, /* between cells of air, or beyond the box */
     GS4I_STOKES_UNKNOWN,
+    GS4I_STOKES_BEYOND, /* moves, but is no unknown: see FILL */
     GS4I_STOKES_GIVEN,
     GS4I_STOKES_ODD, /* within a wall: 2 u - partner */
     GS4I_STOKES_EVEN /* within a wall: its partner */
@@ -6651,13 +6660,19 @@ enum {
  * between outweighs all around. */
 #define GS4I_STOKES_AT_SURFACE GS4I_C(0.1)
 
+/* See FILL: what less of a cell is filled has no rows; and what faces beyond have of the mean mass,
+ * so little that they follow. */
+#define GS4I_STOKES_LEAST_FILL GS4I_C(0.1)
+#define GS4I_STOKES_BEYOND_MASS 1e-4
+
 enum {
     GS4I_STOKES_COLOURS = 48, /* see gs4i_stokes_colour */
     GS4I_STOKES_CHUNK = 2048, /* numbers a task; sums have its order */
     GS4I_STOKES_RESTART = 30,
     GS4I_STOKES_CYCLES = 50, /* at most, chosen */
-    /* what is counted in planes: faces by colour, cells, rows */
+    /* what is counted in planes: faces by colour, cells of liquid and of air, rows */
     GS4I_STOKES_CELLS = GS4I_STOKES_COLOURS,
+    GS4I_STOKES_WET,
     GS4I_STOKES_ROWS,
     GS4I_STOKES_COUNTS
 };
@@ -6719,10 +6734,12 @@ typedef struct gs4i_schur {
 } gs4i_schur;
 
 typedef struct gs4i_stokes_system {
-    double h, softest, mass_unit;            /* softest: least mu'; T */
+    double h, softest, mass_unit, mass_mean; /* softest: least mu'; T; mean of M' */
     int32_t faces, rows, cells, all;         /* with nobody; faces and cells together */
+    int32_t wet;                             /* cells of air that have rows, with nobody */
     int32_t colour[GS4I_STOKES_COLOURS + 1]; /* first face of each */
-    int32_t *number[4], *counts;             /* of faces of each axis, and of cells, in the box */
+    int32_t *number[4], *counts;             /* of faces of each axis, and of cells, in the box;
+                                              * of cells of air that have rows below 0 */
     double *sums;                            /* per plane or task, added in order */
     gs4i_stokes_look *look;
     /* per face: M'; share in B; its links, signs + - + - + -: rows of the cells
@@ -6765,6 +6782,7 @@ typedef struct gs4i_stokes {
     const gs4_real *mass[3];   /* M, of unknown faces: above 0 */
     const gs4_real *open[3];   /* share of unknown and given faces in B; NULL: 1 */
     const gs4_real *viscosity; /* mu of liquid cells, 0 or above */
+    const gs4_real *fill;      /* with a law: how full cells are, four numbers apart; NULL: 1 */
     const gs4_real *edge[3];   /* what a row of an edge along e counts; NULL: n/4 */
     const gs4_real *gap[3];    /* cells from a face to the surface that gives those behind it, below
                              * 0 there; NULL: what is given is so at its face */
@@ -6827,8 +6845,19 @@ typedef struct gs4i_stokes_row {
     size_t face[4], cell[4];
     int coefficient[4]; /* signs included */
     gs4_real cut[2];    /* 1/t of each pair; 0: no surface lies between its faces */
-    int liquid, cells;  /* n; a bit for each of its cells that is liquid */
+    gs4_real fill;      /* n */
+    int cells;          /* a bit for each of its cells that is liquid */
 } gs4i_stokes_row;
+
+/* How much of a cell has rows: of what is liquid 1, see FILL. */
+static gs4_real gs4i_stokes_fill(const gs4i_stokes *s, size_t cell)
+{
+    const int kind = s->kind[cell];
+    gs4_real fill = 0;
+    if (!s->fill) return kind == GS4_CELL_LIQUID;
+    if (kind != GS4_CELL_SOLID) fill = gs4i_min(s->fill[4 * cell], 1);
+    return kind == GS4_CELL_LIQUID || fill >= GS4I_STOKES_LEAST_FILL ? fill : GS4I_C(0);
+}
 
 /* 1/t where a surface lies between two faces of an axis, one given and one unknown; else 0. Of true
  * distances t is from 0.1 to 1.1; those that are none may not go beyond. */
@@ -6853,29 +6882,30 @@ static int gs4i_stokes_edge_cells(const gs4i_stokes *s, int e, const int at[3],
 {
     const int a = (e + 1) % 3, b = (e + 2) % 3;
     int k, air = 0;
-    row->liquid = row->cells = 0;
+    row->fill = 0;
+    row->cells = 0;
     for (k = 0; k < 4; k++) {
-        int p[3];
+        gs4_real fill = 0;
+        int p[3], is_air = 1;
         memcpy(p, at, sizeof p);
         p[a] -= k >> 1;
-        if (!gs4i_stokes_entry(s, GS4I_AT_CELL, p, b, -(k & 1), &row->cell[k])) {
-            air |= 1 << k;
-            continue;
+        if (gs4i_stokes_entry(s, GS4I_AT_CELL, p, b, -(k & 1), &row->cell[k])) {
+            fill = gs4i_stokes_fill(s, row->cell[k]);
+            is_air = !(fill > 0) && s->kind[row->cell[k]] == GS4_CELL_AIR;
         }
-        if (s->kind[row->cell[k]] == GS4_CELL_AIR) air |= 1 << k;
-        if (s->kind[row->cell[k]] != GS4_CELL_LIQUID) continue;
-        row->cells |= 1 << k;
-        row->liquid++;
+        row->fill += fill;
+        row->cells |= (fill > 0) << k;
+        air |= is_air << k;
     }
     /* 0 and 3 are across the edge from each other, so are 1 and 2 */
-    return row->liquid && !(row->cells == 9 && air == 6) && !(row->cells == 6 && air == 9);
+    return row->cells && !(row->cells == 9 && air == 6) && !(row->cells == 6 && air == 9);
 }
 
 /* The row of an edge along e; 0 if it has none. */
 static int gs4i_stokes_edge(const gs4i_stokes *s, int e, const int at[3], gs4i_stokes_row *row)
 {
     const int a = (e + 1) % 3, b = (e + 2) % 3;
-    int k, what[4];
+    int k, what[4], beyond = 0, held = 0;
     if (!gs4i_stokes_edge_cells(s, e, at, row)) return 0;
     for (k = 0; k < 4; k++) {
         row->axis[k] = k < 2 ? a : b;
@@ -6883,8 +6913,11 @@ static int gs4i_stokes_edge(const gs4i_stokes *s, int e, const int at[3], gs4i_s
             return 0;
         what[k] = s->face[row->axis[k]][row->face[k]];
         if (what[k] == GS4I_STOKES_NONE) return 0;
+        beyond |= what[k] == GS4I_STOKES_BEYOND;
+        held |= what[k] >= GS4I_STOKES_GIVEN;
         row->coefficient[k] = k & 1 ? -1 : 1;
     }
+    if (beyond && held) return 0;
     for (k = 0; k < 4; k += 2) {
         const int here = what[k] >= GS4I_STOKES_ODD, there = what[k + 1] >= GS4I_STOKES_ODD;
         const int mirror = here ? what[k] : what[k + 1];
@@ -6894,7 +6927,7 @@ static int gs4i_stokes_edge(const gs4i_stokes *s, int e, const int at[3], gs4i_s
     }
     for (k = 0; k < 2; k++)
         row->cut[k] = gs4i_stokes_cut(s, row->axis[2 * k], row->face[2 * k], row->face[2 * k + 1]);
-    return row->liquid;
+    return 1;
 }
 
 /* What 1/t, or 0 for none, makes of a rate. */
@@ -6924,7 +6957,7 @@ static void gs4i_stokes_pairs(const gs4i_stokes *s, const gs4i_stokes_row *row, 
 static gs4_real gs4i_stokes_edge_weight(const gs4i_stokes *s, int e, size_t entry,
                                         const gs4i_stokes_row *row)
 {
-    const gs4_real quarters = GS4I_C(0.25) * GS4I_C(row->liquid),
+    const gs4_real quarters = GS4I_C(0.25) * row->fill,
                    weight = s->edge[e] ? s->edge[e][entry] : quarters;
     const int by_b = row->cut[0] > 0, by_a = row->cut[1] > 0,
               behind_b = s->face[row->axis[0]][row->face[0]] == GS4I_STOKES_GIVEN ? 0 : 1,
@@ -6944,10 +6977,15 @@ static gs4_real gs4i_stokes_edge_weight(const gs4i_stokes *s, int e, size_t entr
 static int gs4i_stokes_normal(const gs4i_stokes *s, int a, const int at[3], size_t face[2])
 {
     size_t cell;
-    return gs4i_stokes_entry(s, GS4I_AT_CELL, at, a, 0, &cell) && s->kind[cell] == GS4_CELL_LIQUID
-           && gs4i_stokes_entry(s, 1 << a, at, a, 1, &face[0])
-           && gs4i_stokes_entry(s, 1 << a, at, a, 0, &face[1])
-           && s->face[a][face[0]] != GS4I_STOKES_NONE && s->face[a][face[1]] != GS4I_STOKES_NONE;
+    int k, held = 0;
+    if (!gs4i_stokes_entry(s, GS4I_AT_CELL, at, a, 0, &cell) || !(gs4i_stokes_fill(s, cell) > 0))
+        return 0;
+    for (k = 0; k < 2; k++) {
+        if (!gs4i_stokes_entry(s, 1 << a, at, a, 1 - k, &face[k])) return 0;
+        if (s->face[a][face[k]] == GS4I_STOKES_NONE) return 0;
+        held |= s->face[a][face[k]] >= GS4I_STOKES_GIVEN;
+    }
+    return s->kind[cell] == GS4_CELL_LIQUID || !held;
 }
 
 /* Rates of strain of s->u: of each liquid cell du_a/da in normal[a]; of each edge along e, across a
@@ -7073,22 +7111,26 @@ static void gs4i_stokes_number_plane(int z, void *context)
     size_t i;
     for (c = 0; c < 3; c++)
         GS4I_STOKES_PLANE(s, 1 << c, z, at, i) {
+            const int is_beyond = s->face[c][i] == GS4I_STOKES_BEYOND;
             int32_t n;
             y->number[c][i] = 0;
-            if (s->face[c][i] != GS4I_STOKES_UNKNOWN) continue;
+            if (s->face[c][i] != GS4I_STOKES_UNKNOWN && !is_beyond) continue;
             n = count[gs4i_stokes_colour(s, c, at)]++;
             if (!t->filling) continue;
             y->number[c][i] = n;
-            y->mass[n] = GS4I_C((double)s->mass[c][i] / y->mass_unit);
-            y->share[n] = s->open[c] ? s->open[c][i] : 1;
+            y->mass[n] = GS4I_C(is_beyond ? GS4I_STOKES_BEYOND_MASS * y->mass_mean
+                                          : (double)s->mass[c][i] / y->mass_unit);
+            y->share[n] = is_beyond ? GS4I_C(0) : s->open[c] ? s->open[c][i] : GS4I_C(1);
         }
     GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i) {
+        const int is_liquid = s->kind[i] == GS4_CELL_LIQUID;
         int32_t n;
         y->number[3][i] = 0;
-        if (s->kind[i] != GS4_CELL_LIQUID) continue;
-        n = count[GS4I_STOKES_CELLS]++;
+        if (!is_liquid && !(gs4i_stokes_fill(s, i) > 0)) continue;
+        n = count[is_liquid ? GS4I_STOKES_CELLS : GS4I_STOKES_WET]++;
         if (!t->filling) continue;
-        y->number[3][i] = n;
+        y->number[3][i] = is_liquid ? n : -n;
+        if (!is_liquid) continue;
         y->compliance[n] =
             s->compliance ? GS4I_C((double)s->compliance[i] * y->mass_unit * y->h * y->h) : 0;
     }
@@ -7113,12 +7155,19 @@ static double gs4i_stokes_cut_viscosity(const gs4i_stokes *s, const int at[3], s
         faces += f[q] > 0;
         mass += f[q] ? (double)y->mass[f[q]] : 0;
         neighbours += gs4i_stokes_entry(s, GS4I_AT_CELL, at, q / 2, 2 * (q & 1) - 1, &i)
-                      && s->kind[i] == GS4_CELL_LIQUID;
+                      && gs4i_stokes_fill(s, i) > 0;
     }
     mass /= faces ? faces : 1;
     most = neighbours > 0 ? fmax(1e6 * mass, gs4i_stokes_contrast(s) * y->softest)
                           : GS4I_STOKES_SPRAY * mass;
     return mu < most ? mu : most;
+}
+
+/* Number of a cell that has pressure, or 0. */
+static int32_t gs4i_stokes_pressure_number(const gs4i_stokes_system *y, size_t cell)
+{
+    const int32_t n = y->number[3][cell];
+    return n > 0 ? n : 0;
 }
 
 /* Faces of cells, and cells of faces. */
@@ -7130,18 +7179,21 @@ static void gs4i_stokes_join_plane(int z, void *context)
     size_t i, to;
     GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i) {
         const int32_t n = y->number[3][i];
+        int32_t f[6];
         if (!n) continue;
         for (q = 0; q < 6; q++)
-            y->cell_faces[n][q] =
+            f[q] =
                 gs4i_stokes_entry(s, 1 << q / 2, at, q / 2, q & 1, &to) ? y->number[q / 2][to] : 0;
-        y->viscosity[n] = GS4I_C(gs4i_stokes_cut_viscosity(s, at, i, y->cell_faces[n]));
+        y->viscosity[n] = GS4I_C(gs4i_stokes_cut_viscosity(s, at, i, f));
+        if (n > 0) memcpy(y->cell_faces[n], f, sizeof f);
     }
     for (c = 0; c < 3; c++)
         GS4I_STOKES_PLANE(s, 1 << c, z, at, i) {
             const int32_t n = y->number[c][i];
             for (q = 0; q < 2 && n; q++)
-                y->face_cells[n][q] =
-                    gs4i_stokes_entry(s, GS4I_AT_CELL, at, c, q - 1, &to) ? y->number[3][to] : 0;
+                y->face_cells[n][q] = gs4i_stokes_entry(s, GS4I_AT_CELL, at, c, q - 1, &to)
+                                          ? gs4i_stokes_pressure_number(y, to)
+                                          : 0;
         }
 }
 
@@ -7164,7 +7216,7 @@ static double gs4i_stokes_fluidity(const gs4i_stokes *s, int e, const int at[3],
     p[a] -= k >> 1;
     p[b] -= k & 1;
     if (!gs4i_stokes_entry(s, GS4I_AT_CELL, p, by_b ? b : a, behind ? -1 : 1, &next)
-        || s->kind[next] != GS4_CELL_LIQUID)
+        || !y->number[3][next])
         return here;
     return here + 4.0 / 11 * fmax(-here, here - 1 / (double)y->viscosity[y->number[3][next]]);
 }
@@ -7183,12 +7235,12 @@ static int gs4i_stokes_find_row(const gs4i_stokes *s, int q, const int at[3], gs
     gs4i_stokes_row row;
     size_t cell;
     double sum = 0;
-    int k, unknowns = 0;
+    int k, unknowns = 0, liquid = 0;
     t->count = q < 3 ? 2 : 4;
     if (q < 3) {
         if (!gs4i_stokes_normal(s, q, at, t->face)) return 0;
         gs4i_stokes_entry(s, GS4I_AT_CELL, at, q, 0, &cell);
-        t->weight = 2 * (double)y->viscosity[y->number[3][cell]]
+        t->weight = 2 * (double)gs4i_stokes_fill(s, cell) * (double)y->viscosity[y->number[3][cell]]
                     * (double)gs4i_stokes_times(gs4i_stokes_cut(s, q, t->face[0], t->face[1]));
         for (k = 0; k < 2; k++) {
             t->axis[k] = q;
@@ -7200,10 +7252,12 @@ static int gs4i_stokes_find_row(const gs4i_stokes *s, int q, const int at[3], gs
             t->axis[k] = row.axis[k];
             t->face[k] = row.face[k];
             t->coefficient[k] = row.coefficient[k];
-            if (row.cells >> k & 1) sum += gs4i_stokes_fluidity(s, q - 3, at, &row, k);
+            if (!(row.cells >> k & 1)) continue;
+            sum += gs4i_stokes_fluidity(s, q - 3, at, &row, k);
+            liquid++;
         }
         gs4i_stokes_entry(s, 7 ^ 1 << (q - 3), at, q - 3, 0, &cell);
-        t->weight = (double)gs4i_stokes_edge_weight(s, q - 3, cell, &row) * (row.liquid / sum)
+        t->weight = (double)gs4i_stokes_edge_weight(s, q - 3, cell, &row) * (liquid / sum)
                     * (double)gs4i_stokes_times(gs4i_max(row.cut[0], row.cut[1]));
     }
     for (k = 0; k < t->count; k++)
@@ -7359,8 +7413,9 @@ static void gs4i_stokes_look_plane(int z, void *context)
             look->faces++;
         }
     GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i) {
+        if (gs4i_stokes_fill(s, i) > 0)
+            gs4i_stokes_check(look, s->viscosity[i], 0, "viscosity[] holds ", at_least_0);
         if (s->kind[i] != GS4_CELL_LIQUID) continue;
-        gs4i_stokes_check(look, s->viscosity[i], 0, "viscosity[] holds ", at_least_0);
         look->softest = gs4i_min(look->softest, s->viscosity[i]);
         if (s->compliance)
             gs4i_stokes_check(look, s->compliance[i], 0, "compliance[] holds ", at_least_0);
@@ -7390,6 +7445,7 @@ static int gs4i_stokes_choose_unit(gs4i_stokes *s)
     frexp(fmax(mass, softest), &exponent);
     y->mass_unit = ldexp(1, exponent);
     y->softest = softest / y->mass_unit;
+    y->mass_mean = mass / y->mass_unit;
     return GS4_OK;
 }
 
@@ -7426,7 +7482,8 @@ static int gs4i_stokes_reserve_maps(gs4i_stokes *s)
 static int gs4i_stokes_reserve_numbered(gs4i_stokes *s)
 {
     gs4i_stokes_system *y = &s->system;
-    const size_t f = (size_t)y->faces, p = (size_t)y->cells, real = sizeof(gs4_real);
+    const size_t f = (size_t)y->faces, p = (size_t)y->cells, air = (size_t)y->wet - 1,
+                 real = sizeof(gs4_real);
     char *base = NULL;
     int laid;
     for (laid = 0; laid < 2; laid++) {
@@ -7436,13 +7493,14 @@ static int gs4i_stokes_reserve_numbered(gs4i_stokes *s)
         y->face_rows = (gs4i_link(*)[6])gs4i_carve(base, &used, f, sizeof *y->face_rows);
         y->face_cells = (int32_t(*)[2])gs4i_carve(base, &used, f, sizeof *y->face_cells);
         y->compliance = (gs4_real *)gs4i_carve(base, &used, p, real);
-        y->viscosity = (gs4_real *)gs4i_carve(base, &used, p, real);
+        y->viscosity = (gs4_real *)gs4i_carve(base, &used, p + air, real);
         y->cell_faces = (int32_t(*)[6])gs4i_carve(base, &used, p, sizeof *y->cell_faces);
         y->pocket = (int32_t *)gs4i_carve(base, &used, p, 4);
         if (!laid && !gs4i_scratch_reserve(s->memory, &y->numbered, used, 0))
             return GS4_ERROR_MEMORY;
         base = (char *)y->numbered.data;
         if (laid) memset(base, 0, used);
+        if (laid) y->viscosity += air;
     }
     return GS4_OK;
 }
@@ -8678,7 +8736,7 @@ static void gs4i_schur_pose_plane(int z, void *context)
                    : share * share * (m->by_commutator ? (gs4_real)y->inverse[f] : 1 / y->mass[f]);
         }
     GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i) {
-        const int32_t n = y->number[3][i];
+        const int32_t n = gs4i_stokes_pressure_number(y, i);
         const size_t to = gs4i_schur_entry(s, at, -1);
         m->kind[to] = s->kind[i];
         m->diagonal[to] = n ? y->compliance[n] / gs4i_schur_d(y, n) : 0;
@@ -8768,7 +8826,7 @@ static void gs4i_schur_load_plane(int z, void *context)
     GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i) {
         const int x = at[0] - s->first[0], y = at[1] - s->first[1], k = z - s->first[2];
         m->level[0].r[(x + y + k) & 1][gs4i_row_of(&m->level[0], y, k) + (size_t)(x / 2)] =
-            t->in[s->system.number[3][i]] * m->diagonal_unit;
+            t->in[gs4i_stokes_pressure_number(&s->system, i)] * m->diagonal_unit;
     }
 }
 
@@ -8781,7 +8839,7 @@ static void gs4i_schur_store_plane(int z, void *context)
     size_t i;
     GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i) {
         const int x = at[0] - s->first[0], y = at[1] - s->first[1], k = z - s->first[2];
-        const int32_t n = s->system.number[3][i];
+        const int32_t n = gs4i_stokes_pressure_number(&s->system, i);
         const double v = (double)m->level[0]
                              .z[(x + y + k) & 1][gs4i_row_of(&m->level[0], y, k) + (size_t)(x / 2)];
         if (n) t->out[n] = t->adds ? t->out[n] + v : v;
@@ -9054,6 +9112,7 @@ static int gs4i_stokes_setup(gs4i_stokes *s)
     }
     y->colour[k] = y->faces;
     y->cells = gs4i_stokes_sum_counts(s, GS4I_STOKES_CELLS, 1);
+    y->wet = gs4i_stokes_sum_counts(s, GS4I_STOKES_WET, 1);
     y->all = y->faces + y->cells;
     if (gs4i_stokes_reserve_numbered(s) != GS4_OK) return GS4_ERROR_MEMORY;
     gs4i_stokes_run(s, gs4i_stokes_number_plane, 1);
@@ -9117,11 +9176,13 @@ static void gs4i_stokes_load_plane(int z, void *context)
         GS4I_STOKES_PLANE(s, 1 << c, z, at, i) {
             const int32_t f = y->number[c][i];
             if (!f) continue;
+            y->b[f] = y->x[f] = 0;
+            if (s->face[c][i] == GS4I_STOKES_BEYOND) continue;
             y->b[f] = (double)s->rhs[c][i] / y->mass_unit;
             y->x[f] = (double)s->u[c][i];
         }
     GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i) {
-        const int32_t n = y->number[3][i];
+        const int32_t n = gs4i_stokes_pressure_number(y, i);
         if (!n) continue;
         b[n] = (double)s->rhs_p[i] * y->h + gs4i_stokes_inflow(s, at);
         p[n] = (double)s->p[i] / (y->mass_unit * y->h);
@@ -9137,9 +9198,9 @@ static void gs4i_stokes_store_plane(int z, void *context)
     size_t i;
     for (c = 0; c < 3; c++)
         GS4I_STOKES_PLANE(s, 1 << c, z, at, i)
-            if (y->number[c][i]) s->u[c][i] = GS4I_C(y->x[y->number[c][i]]);
+            if (s->face[c][i] == GS4I_STOKES_UNKNOWN) s->u[c][i] = GS4I_C(y->x[y->number[c][i]]);
     GS4I_STOKES_PLANE(s, GS4I_AT_CELL, z, at, i)
-        if (y->number[3][i]) s->p[i] = GS4I_C(p[y->number[3][i]] * (y->mass_unit * y->h));
+        if (y->number[3][i] > 0) s->p[i] = GS4I_C(p[y->number[3][i]] * (y->mass_unit * y->h));
 }
 
 /* r = b' - A' v; its size. */
@@ -12445,11 +12506,12 @@ GS4I_INLINE void gs4i_stress(gs4i_response *r, gs4i_gradient L, const gs4i_wide 
     if (r->p->deformation_reals) gs4i_add_solid(r, L, J, sigma);
 }
 
-/* What a solve for the velocity of the stage has as viscosity, and what it knows before, Pa. What
+/* What a solve for the velocity of the stage has as viscosity: of the law, of what is elastic in
+ * liquids, and of solids; and what it knows before, Pa. What
  * the viscosity has not of the stiffness, G0 (c_max - 1), is seen, as far as it lasts over a
  * step. */
 static void gs4i_stress_to_solve(gs4i_response *r, gs4i_gradient L, const gs4i_wide *J,
-                                 gs4i_symmetric q, gs4i_wide *mu, gs4i_lanes solid)
+                                 gs4i_symmetric q, gs4i_wide *mu, gs4i_lanes eta, gs4i_lanes solid)
 {
     gs4i_elastic e;
     gs4i_elastic_count count;
@@ -12460,12 +12522,13 @@ static void gs4i_stress_to_solve(gs4i_response *r, gs4i_gradient L, const gs4i_w
     gs4i_liquid_stress(&r->constants, J, L, q, mu);
     gs4i_see_liquids(&r->seen, &r->constants, J, mu);
     gs4i_see_thinnest(&r->seen, &r->constants, mu);
+    memset(eta, 0, sizeof(gs4i_lanes));
     memset(solid, 0, sizeof(gs4i_lanes));
     if (r->p->deformation_reals) gs4i_tangent_of_solid(r, L, J, solid);
     if (!r->p->elastic_reals || r->report->bad) return;
     k = gs4i_begin_solved(r, L, G, &e, &count);
     gs4i_known_stress(&k, &e, L, q, stage, &count);
-    GS4I_BATCH_LOOP(b) mu[b] += k.eta[b];
+    GS4I_BATCH_LOOP(b) eta[b] = k.eta[b];
     gs4i_see_elastic(G, stage, stiffness);
     GS4I_BATCH_LOOP(b) stiffness[b] = (GS4I_C(0.5) * stiffness[b] - G[b]) * k.left[b];
     gs4i_see_elastic_count(r, &count);
@@ -14504,7 +14567,7 @@ typedef struct gs4i_fit {
 
 /* Of a particle, Pa s: its viscosity; and with what strain gives to elastic stress in a step. */
 typedef struct gs4i_tangent {
-    gs4_real viscosity, all;
+    gs4_real viscosity, liquid, solid;
 } gs4i_tangent;
 
 typedef struct gs4i_staggered {
@@ -21519,13 +21582,14 @@ static void gs4i_scatter_known_stress(gs4i_stress_tiles *t, const gs4i_stencils 
 }
 
 static void gs4i_keep_tangents(gs4i_staggered *f, size_t i, int n, const gs4i_wide *viscosity,
-                               const gs4i_wide *elastic)
+                               const gs4i_wide *eta, const gs4i_wide *solid)
 {
     gs4i_tangent *to = (gs4i_tangent *)f->tangent.data + i;
     int b;
     for (b = 0; b < n; b++) {
         to[b].viscosity = GS4I_NTH_CONST(viscosity, b);
-        to[b].all = to[b].viscosity + GS4I_NTH_CONST(elastic, b);
+        to[b].liquid = to[b].viscosity + GS4I_NTH_CONST(eta, b);
+        to[b].solid = GS4I_NTH_CONST(solid, b);
     }
 }
 
@@ -21557,7 +21621,7 @@ static void gs4i_scatter_viscosity(int index, void *context)
         gs4i_gathered slope;
         gs4i_gradient L;
         gs4i_symmetric sigma;
-        gs4i_lanes J, mu, stiffness, volume, give;
+        gs4i_lanes J, mu, eta, solid, volume, give;
         int b;
         gs4i_stage_faces(sim, &frame, i, n, &q, s);
         gs4i_gather_slopes(velocity, s, n, &slope);
@@ -21566,14 +21630,14 @@ static void gs4i_scatter_viscosity(int index, void *context)
         GS4I_BATCH_LOOP(b) J[b] = q.v[3][b] + integrator->before * q.a[3][b];
         gs4i_turn_to_batch(&r, i, n);
         if (heat) gs4i_load_batch_heat(&r);
-        gs4i_stress_to_solve(&r, L, J, sigma, mu, stiffness);
+        gs4i_stress_to_solve(&r, L, J, sigma, mu, eta, solid);
         gs4i_check_liquids(r.report, J, mu, p.id + i, n);
-        if (f->is_fitted) gs4i_keep_tangents(f, i, n, mu, stiffness);
+        if (f->is_fitted) gs4i_keep_tangents(f, i, n, mu, eta, solid);
         GS4I_BATCH_LOOP(b) {
             const gs4i_wide inv_density = r.constants.inv_density[b],
                             at_least = least / inv_density;
             gs4i_wide counts;
-            counts = mu[b] + stiffness[b];
+            counts = mu[b] + eta[b] + solid[b];
             GS4I_WIDE_MAX(counts, counts, at_least);
             volume[b] = q.x[3][b] * inv_density * J[b];
             give[b] = volume[b] / counts;
@@ -21675,6 +21739,12 @@ static uint8_t gs4i_role_of_face(const gs4_sim *sim, int c, const int at[3], siz
         if (!gs4i_wall_holds(sim, side, 1 << c, at)) return GS4I_STOKES_NONE;
         return gs4i_wall_parity(sim, c, side) < 0 ? GS4I_STOKES_ODD : GS4I_STOKES_EVEN;
     }
+    for (a = -1; a < 1 && f->stokes.fill; a++) {
+        size_t cell;
+        if (gs4i_stokes_entry(&f->stokes, GS4I_AT_CELL, at, c, a, &cell)
+            && gs4i_stokes_fill(&f->stokes, cell) > 0)
+            return GS4I_STOKES_BEYOND;
+    }
     return GS4I_STOKES_NONE;
 }
 
@@ -21734,6 +21804,7 @@ static void gs4i_describe_stokes(gs4_sim *sim)
     k->h = sim->grid.h;
     k->kind = f->kind;
     k->viscosity = f->viscosity;
+    k->fill = f->is_fitted ? f->cell + GS4I_CELL_FILL : NULL;
     k->compliance = f->compressible ? f->diagonal : NULL;
     k->rhs_p = f->rhs;
     k->p = f->pressure;
@@ -21788,7 +21859,7 @@ static void gs4i_count_strain_edges(int z, void *context)
         GS4I_STOKES_PLANE(k, 7 ^ 1 << e, z, at, i) {
             f->has_row[e][i] = gs4i_stokes_edge(k, e, at, &row) != 0;
             gs4i_stokes_edge_cells(k, e, at, &row);
-            f->edge[e][i] = GS4I_C(0.25) * GS4I_C(row.liquid);
+            f->edge[e][i] = GS4I_C(0.25) * row.fill;
         }
 }
 
@@ -21872,7 +21943,7 @@ static void gs4i_cut_known_stress(int z, void *context)
             if (!gs4i_stokes_edge_cells(k, e, at, &row)) continue;
             for (n = 0; n < 4; n++)
                 if (row.cells >> n & 1) sum += 1 / gs4i_open_share_of_cell(f, row.cell[n]);
-            f->shear[e][i] *= GS4I_C(row.liquid) / sum;
+            f->shear[e][i] *= row.fill / sum;
         }
 }
 
@@ -21921,18 +21992,26 @@ static void gs4i_stress_of_trial(gs4i_response *r, const gs4i_tangent *t, gs4i_g
     if (r->p->deformation_reals) gs4i_add_solid(r, L, J, sigma);
 }
 
-/* Its tangent, as if all were isotropic. */
+/* Its tangent, as if all were isotropic: of solids, whose stress has no trace, without that of L.
+ * That of liquids has, and a tangent that leaves it out is too soft by half where L has one. */
 static void gs4i_change_of_stress(const gs4i_tangent *t, int n, gs4i_gradient L,
                                   gs4i_symmetric sigma)
 {
-    gs4i_lanes all;
+    gs4i_lanes liquid, solid;
     int b, a, c;
-    memset(all, 0, sizeof all);
-    for (b = 0; b < n; b++) GS4I_NTH(all, b) = t[b].all;
-    gs4i_take_trace(L);
+    memset(liquid, 0, sizeof liquid);
+    memset(solid, 0, sizeof solid);
+    for (b = 0; b < n; b++) {
+        GS4I_NTH(liquid, b) = t[b].liquid;
+        GS4I_NTH(solid, b) = t[b].solid;
+    }
     for (a = 0; a < 3; a++)
         for (c = a; c < 3; c++)
-            GS4I_BATCH_LOOP(b) sigma[gs4i_place[a][c]][b] = all[b] * (L[a][c][b] + L[c][a][b]);
+            GS4I_BATCH_LOOP(b)
+                sigma[gs4i_place[a][c]][b] = (liquid[b] + solid[b]) * (L[a][c][b] + L[c][a][b]);
+    for (a = 0; a < 3; a++)
+        GS4I_BATCH_LOOP(b)
+            sigma[a][b] -= GS4I_C(2.0 / 3) * solid[b] * (L[0][0][b] + L[1][1][b] + L[2][2][b]);
 }
 
 /* Forces of stress in `trial`, or how they change, to faces. */
@@ -22005,7 +22084,7 @@ static void gs4i_set_trial(int z, void *context)
     for (c = 0; c < 3; c++)
         GS4I_STOKES_PLANE(&f->stokes, 1 << c, z, at, i) {
             const int32_t n = f->stokes.system.number[c][i];
-            if (n) f->trial[c][i] = pass->trial[n];
+            if (f->role[c][i] == GS4I_STOKES_UNKNOWN) f->trial[c][i] = pass->trial[n];
         }
 }
 
@@ -22027,7 +22106,10 @@ static void gs4i_take_forces(int z, void *context)
     for (c = 0; c < 3; c++)
         GS4I_STOKES_PLANE(&f->stokes, 1 << c, z, at, i) {
             const int32_t n = f->stokes.system.number[c][i];
-            if (n) pass->out[n] += unit * (double)f->force[c][i];
+            if (f->role[c][i] == GS4I_STOKES_UNKNOWN)
+                pass->out[n] += unit * (double)f->force[c][i];
+            else if (n)
+                pass->out[n] = 0;
         }
 }
 
@@ -22039,7 +22121,7 @@ static double gs4i_size_of_forces(const gs4i_staggered *f)
     for (c = 0; c < 3; c++)
         for (z = 0; z <= f->box.size[2]; z++)
             GS4I_STOKES_PLANE(&f->stokes, 1 << c, z, at, i)
-                if (f->stokes.system.number[c][i])
+                if (f->role[c][i] == GS4I_STOKES_UNKNOWN)
                     sum += (double)f->force[c][i] * (double)f->force[c][i];
     return sqrt(sum);
 }
@@ -22097,7 +22179,8 @@ static double gs4i_rounding_of_stress(const gs4_sim *sim)
     double sum = 0;
     int i;
     for (i = 0; i < p->count; i++) {
-        const double G = (double)(t[i].all - t[i].viscosity) / (double)sim->integrator.s,
+        const double G = (double)(t[i].liquid - t[i].viscosity + t[i].solid)
+                         / (double)sim->integrator.s,
                      V = (double)(p->position[4 * (size_t)i + 3]
                                   * gs4i_constants_of(sim, (size_t)i)->inv_density);
         sum += V * G * (V * G);
@@ -22132,8 +22215,8 @@ static int gs4i_solve_stage(gs4_sim *sim)
     pass.sim = sim;
     pass.what = GS4I_FACE_STAGE;
     if (!f->contact) GS4I_TRY(gs4i_check_stage_inflow(sim));
-    gs4i_parallel_for(&sim->tasks, f->box.size[2] + 1, gs4i_pose_faces, &pass);
     gs4i_describe_stokes(sim);
+    gs4i_parallel_for(&sim->tasks, f->box.size[2] + 1, gs4i_pose_faces, &pass);
     gs4i_weigh_edges(sim);
     if (gs4i_has_known_stress(sim) && f->open[0])
         gs4i_parallel_for(&sim->tasks, f->box.size[2] + 1, gs4i_cut_known_stress, f);

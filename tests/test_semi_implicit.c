@@ -134,11 +134,11 @@ static void semi_edges_expect(const gs4i_staggered *f, int e, double *expected, 
             int ring = 0, count = 0, copy = 0;
             for (a = 0; a < 3; a++) copy |= box->periodic[a] && at[a] == box->size[a];
             gs4i_stokes_edge_cells(&f->stokes, e, at, &row);
-            if (copy || !row.liquid) continue;
+            if (copy || !row.cells) continue;
             for (; ring < 4 && !count; ring++) count = semi_edges_take(f, e, at, ring, 0, expected);
             if (!count) continue;
             rings[ring - 1]++;
-            semi_edges_take(f, e, at, ring - 1, 0.25 * row.liquid / count, expected);
+            semi_edges_take(f, e, at, ring - 1, 0.25 * (double)row.fill / count, expected);
         }
 }
 

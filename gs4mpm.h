@@ -14510,6 +14510,7 @@ typedef struct gs4i_tangent {
 typedef struct gs4i_staggered {
     gs4i_box box;
     int from[3], to[3];            /* the domain, in cells of the box */
+    int low[3], high[3];           /* where faces go on: the same, and beyond an open wall */
     int first[3], end[3];          /* what is solved for: without copies behind periodic walls */
     gs4_real *given[3], *taken[3]; /* quads */
     gs4_real *seen[3];             /* v_i */
@@ -18094,7 +18095,7 @@ static int gs4i_has_stress(const gs4_sim *sim)
 
 /* The box around all blocks with nodes; along a periodic axis all of the domain, and a block of
  * copies on each side. */
-static void gs4i_fit_staggered(gs4i_staggered *f, const gs4i_grid *g)
+static void gs4i_fit_staggered(gs4i_staggered *f, const gs4i_grid *g, const gs4_wall walls[6])
 {
     gs4i_box *box = &f->box;
     int s, a, high[3];
@@ -18117,6 +18118,8 @@ static void gs4i_fit_staggered(gs4i_staggered *f, const gs4i_grid *g)
         f->to[a] = high[a] > g->cells[a] ? g->cells[a] - box->low[a] : box->size[a];
         f->first[a] = g->periodic[a] ? f->from[a] : 0;
         f->end[a] = g->periodic[a] ? f->to[a] : box->size[a];
+        f->low[a] = walls[2 * a] == GS4_WALL_OPEN ? 0 : f->from[a];
+        f->high[a] = walls[2 * a + 1] == GS4_WALL_OPEN ? box->size[a] : f->to[a];
     }
 }
 
@@ -18274,7 +18277,7 @@ static int gs4i_begin_staggered(gs4_sim *sim)
             (size_t)((elastic ? 22 : 13) + (bodies && !f->is_fitted ? 3 : 0)) * sizeof(gs4_real) + 6
             + (f->is_fitted ? 3 * sizeof(double) : 0);
     if (stress && (!f->is_implicit || f->is_fitted)) bytes += 3 * sizeof(gs4_real);
-    gs4i_fit_staggered(f, &sim->grid);
+    gs4i_fit_staggered(f, &sim->grid, sim->desc.walls);
     if (f->is_fitted || gs4i_box_is_periodic(&f->box))
         bytes += 6 * sizeof(double) + sizeof(size_t) + 2 * sizeof(gs4_real) + 1;
     if (gs4i_box_reserve(&sim->memory, &f->box, bytes) != GS4_OK)
@@ -19174,7 +19177,7 @@ static int gs4i_is_earlier(const gs4i_staggered *f, int c, const int from[3], in
     uint8_t known;
     memcpy(to, from, 3 * sizeof *to);
     to[a] = gs4i_around(f, a, from[a] + steps);
-    if (to[a] < f->from[a] || to[a] > f->to[a] - (a != c)) return 0;
+    if (to[a] < f->low[a] || to[a] > f->high[a] - (a != c)) return 0;
     known = f->known[c][gs4i_box_index(&f->box, 1 << c, to[0], to[1], to[2])];
     return known && known < layer;
 }
@@ -19238,8 +19241,8 @@ GS4I_INLINE void gs4i_extrapolate_face(const gs4i_staggered_pass *pass, int c, c
     gs4_real two[4] = { 0, 0, 0, 0 }, one[4] = { 0, 0, 0, 0 };
     int twos = 0, ones = 0, side, k;
     for (side = 0; side < 6; side++) {
-        const int a = side / 2, last = f->to[a] - (a != c);
-        const int room = f->box.periodic[a] ? 2 : side & 1 ? last - at[a] : at[a] - f->from[a];
+        const int a = side / 2, last = f->high[a] - (a != c);
+        const int room = f->box.periodic[a] ? 2 : side & 1 ? last - at[a] : at[a] - f->low[a];
         const ptrdiff_t d = side & 1 ? step[a] : -step[a], n1 = (ptrdiff_t)i + d, n2 = n1 + d;
         if (room < 1 || !known[n1] || known[n1] >= pass->layer) continue;
         for (k = 0; k < pass->numbers; k++) one[k] += u[4 * n1 + k];
@@ -19285,12 +19288,12 @@ static void gs4i_extrapolate_row(const gs4i_staggered_pass *pass, int c, int y, 
     const ptrdiff_t nx = gs4i_box_length(&f->box, 1 << c, 0),
                     step[3] = { 1, nx, nx * gs4i_box_length(&f->box, 1 << c, 1) };
     const size_t row = gs4i_box_index(&f->box, 1 << c, 0, y, z);
-    const int end = f->to[0] + (c == 0);
+    const int end = f->high[0] + (c == 0);
     uint8_t beside[GS4I_FACE_RUN];
     int at[3], first;
     at[1] = y;
     at[2] = z;
-    for (first = f->from[0]; first < end; first += GS4I_FACE_RUN) {
+    for (first = f->low[0]; first < end; first += GS4I_FACE_RUN) {
         gs4i_find_beside_known(f, c, first, y, z, beside);
         for (at[0] = first; at[0] < end && at[0] < first + GS4I_FACE_RUN; at[0]++)
             if (beside[at[0] - first] && !f->known[c][row + (size_t)at[0]])
@@ -19304,8 +19307,8 @@ static void gs4i_extrapolate_layer(int z, void *context)
     const gs4i_staggered *f = &pass->sim->staggered;
     int c, y;
     for (c = 0; c < 3; c++)
-        for (y = f->from[1]; y < f->to[1] + (c == 1); y++)
-            if (z >= f->from[2] && z < f->to[2] + (c == 2)) gs4i_extrapolate_row(pass, c, y, z);
+        for (y = f->low[1]; y < f->high[1] + (c == 1); y++)
+            if (z >= f->low[2] && z < f->high[2] + (c == 2)) gs4i_extrapolate_row(pass, c, y, z);
 }
 
 /* The first `numbers` from the known faces to those around and behind the walls. */

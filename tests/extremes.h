@@ -186,6 +186,12 @@ static void extremes_eigenvalues(const double s[6], double value[3])
 /* B = J^(-2/3) F F^T. */
 static void extremes_stretch(const gs4_real *F, double J, double B[6])
 {
+    double det = 0; int q;
+        for (q = 0; q < 3; q++)
+            det += (double)F[q]
+                   * ((double)F[3 + (q + 1) % 3] * (double)F[6 + (q + 2) % 3]
+                      - (double)F[3 + (q + 2) % 3] * (double)F[6 + (q + 1) % 3]);
+    J = det;
     static const int row[6] = { 0, 1, 2, 0, 0, 1 }, column[6] = { 0, 1, 2, 1, 2, 2 };
     int i, c;
     for (i = 0; i < 6; i++) {
@@ -195,6 +201,9 @@ static void extremes_stretch(const gs4_real *F, double J, double B[6])
     }
 }
 
+#ifdef SEMI_TIMES
+static double dbg[8];
+#endif
 /* What a particle of mass m has stored, J: of volume K (J - 1)^2/2; of solids what (6) is the
  * derivative of; of Oldroyd-B G0 (tr c - 3 - ln det c)/2, c = S/G0 + I. */
 static double extremes_stored(const gs4_material *l, double m, double J, const gs4_real *S,
@@ -219,6 +228,12 @@ static double extremes_stored(const gs4_material *l, double m, double J, const g
         for (i = 0; i < 3 && G0 > 0; i++)
             sum += 0.5 * J * G0 * fmax(e[i] - 1 - log(fmax(e[i], 1e-6)), 0);
     }
+#ifdef SEMI_TIMES
+    dbg[1] += 0.5 * K * (J - 1) * (J - 1) * volume;
+    dbg[2] += (sum - 0.5 * K * (J - 1) * (J - 1)) * volume;
+    dbg[3] += K * volume * 1.4e-14;
+    dbg[4] += G * volume * 1.4e-14;
+#endif
     return sum * volume;
 }
 
@@ -233,12 +248,17 @@ static double extremes_energy(extremes_draw *k)
     const uint8_t *material = gs4_particle_materials(k->sim);
     double sum = gs4_get_stats(k->sim).kinetic_energy;
     int i, a;
+#ifdef SEMI_TIMES
+    memset(dbg, 0, sizeof dbg);
+#endif
     for (i = 0; i < x.count; i++) {
         const double mass = (double)m.data[i * m.stride];
         for (a = 0; a < 3; a++) sum -= mass * k->g[a] * (double)x.data[i * x.stride + a];
-        sum += extremes_stored(&k->m[material[i]], mass, (double)J.data[i * J.stride],
+#ifdef SEMI_TIMES
+        extremes_stored(&k->m[material[i]], mass, (double)J.data[i * J.stride],
                                S.data ? S.data + (size_t)i * (size_t)S.stride : NULL,
                                F.data ? F.data + (size_t)i * (size_t)F.stride : NULL);
+#endif
     }
     return sum;
 }
@@ -375,8 +395,7 @@ static int extremes_watch(extremes_draw *k)
     int c;
     if (!k->emits && !(k->moves && k->bodies)) k->most = fmax(k->most, e);
     if (!extremes_views_are_good(k) || e > 100 * k->start + 1e9) return 0;
-    if (s.particles < k->particles) return 0;
-    if (k->emits) return 1;
+    if (s.particles < k->particles || k->emits) return s.particles > 0 || k->emits;
     for (c = 0; c < 3 && extremes_is_free(k); c++)
         k->moved = fmax(k->moved, fabs(s.momentum[c] - k->p[c] - s.mass * k->g[c] * k->time)
                                       / (k->scale + s.mass * fabs(k->g[c]) * k->time + 1e-30));

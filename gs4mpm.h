@@ -10881,10 +10881,13 @@ static void gs4i_correct_elastic(const gs4i_elastic_constants *l, gs4i_elastic *
  *
  *     L = L' + weight (L~ - L'),   age = dt/z - dt/(exp(z) - 1)                               (VE1)
  *
- * so it is of second order for z -> 0, age = dt/2, and S = 2 mu D~ where z is large and alpha_f 1.
- * The stage is S~ = S + alpha_f (S_n+1 - S), as everywhere in (4). At rest dS~/dD~ is
+ * so it is of second order for z -> 0, age = dt/2. The stage goes on from S likewise, over
+ * alpha_f dt, with L of (2 alpha_f - 1) age before it: that is S~ = S + alpha_f (S_n+1 - S), as
+ * everywhere in (4), for z -> 0, and S~ = 2 mu D~ where z is large. By that sum S of the last step,
+ * which has relaxed long before the stage, would pull at it: with rho_inf = 1 such a liquid beside
+ * a thin one came to 1e6 times its energy in a step. At rest dS~/dD~ is
  *
- *     2 eta = 2 alpha_f weight G0 dt (1 - exp(-z))/z                                          (VE2)
+ *     2 eta = 2 weight G0 alpha_f dt (1 - exp(-alpha_f z))/(alpha_f z)                        (VE2)
  *
  * which the solve has as viscosity; what is left, q = S~(L*) - 2 eta D*, is known before it, with
  * L* of what particles gave. For small stress q does not depend on L*. That of S~ on D~ as a
@@ -10894,23 +10897,31 @@ typedef struct gs4i_solved_elastic {
     const gs4i_elastic_constants *constants;
     const gs4i_wide *G;
     const gs4i_integrator *integrator;
+    double share;                 /* of the step: alpha_f to its stage, or 1 */
     gs4i_lanes weight, eta, left; /* (VE1), (VE2); share of S that is left of its growth */
     int n;
 } gs4i_solved_elastic;
+
+/* (1 - exp(-z))/z. */
+static double gs4i_left_of_growth(double z)
+{
+    return z > 1e-3 ? -expm1(-z) / z : 1 - z * (0.5 - z / 6);
+}
 
 static void gs4i_weigh_stage(gs4i_solved_elastic *k, const gs4i_elastic *e)
 {
     const gs4i_elastic_constants *l = k->constants;
     const gs4i_integrator *r = k->integrator;
-    const double dt = (double)r->dt, ratio = (double)r->affine_ratio,
-                 past = ratio > 0 ? (1 - (double)r->alpha_f) / ratio : 0;
+    const double dt = (double)r->dt, ratio = (double)r->affine_ratio, ahead = (double)r->alpha_f,
+                 past = ratio > 0 ? (1 - ahead) / ratio : 0,
+                 aged = k->share < 1 ? 2 * ahead - 1 : 1; /* by how much of the age */
     int n, i;
     memset(k->weight, 0, sizeof k->weight);
     memset(k->eta, 0, sizeof k->eta);
     memset(k->left, 0, sizeof k->left);
     for (n = 0; n < k->n; n++) {
         const double G = (double)GS4I_NTH_CONST(k->G, n);
-        double z = (double)GS4I_NTH_CONST(l->inv_lambda, n) * dt, part = 1, age = 0.5, weight = 1;
+        double z = (double)GS4I_NTH_CONST(l->inv_lambda, n) * dt, age, weight = 1;
         if (!(G > (double)GS4I_TINY)) continue;
         if (GS4I_NTH_CONST(l->stretch, n) > 0) {
             double trace3 = 0, squares = 0, f1, stiff;
@@ -10923,27 +10934,22 @@ static void gs4i_weigh_stage(gs4i_solved_elastic *k, const gs4i_elastic *e)
                          (double)GS4I_NTH_CONST(l->alpha, n), trace3, squares, &f1, &stiff);
             z *= fmax(1 + f1, 0);
         }
-        if (z > 1e-3) {
-            part = -expm1(-z) / z;
-            age = 1 / z - 1 / expm1(z);
-        } else { /* series */
-            part = 1 - z * (0.5 - z / 6);
-            age = 0.5 - z / 12;
-        }
-        if (ratio > 0) weight = (1 - age + past) / ((double)r->alpha_f + past);
+        age = z > 1e-3 ? 1 / z - 1 / expm1(z) : 0.5 - z / 12;
+        if (ratio > 0) weight = (k->share - aged * age + past) / (ahead + past);
         GS4I_NTH(k->weight, n) = GS4I_C(weight);
-        GS4I_NTH(k->left, n) = GS4I_C(part);
-        GS4I_NTH(k->eta, n) = GS4I_C((double)r->alpha_f * weight * G * dt * part);
+        GS4I_NTH(k->left, n) = GS4I_C(gs4i_left_of_growth(z));
+        GS4I_NTH(k->eta, n) =
+            GS4I_C(k->share * weight * G * dt * gs4i_left_of_growth(k->share * z));
     }
 }
 
-/* S of particle n after the step, from that before, in units of G0: UCM and Oldroyd-B as S, which
+/* S of particle n after its share of the step, from that before, in units of G0: UCM and Oldroyd-B as S, which
  * may be far below c. */
 static void gs4i_follow_one(const gs4i_solved_elastic *k, const gs4i_elastic *e, double L[3][3],
                             int n, double S[6], gs4i_elastic_count *count)
 {
     const gs4i_elastic_constants *l = k->constants;
-    const double G = (double)GS4I_NTH_CONST(k->G, n), dt = (double)k->integrator->dt;
+    const double G = (double)GS4I_NTH_CONST(k->G, n), dt = k->share * (double)k->integrator->dt;
     double c[6], A[3][3], H[6];
     gs4i_split p;
     int i;
@@ -10992,7 +10998,7 @@ static void gs4i_mean_gradient(const gs4i_solved_elastic *k, const gs4i_elastic 
             mean[i][j] = last[i][j] + weight * ((double)GS4I_NTH(L[i][j], n) - last[i][j]);
 }
 
-/* S (Pa) at the end of a step whose stage has the gradient L. */
+/* S (Pa) at the end of the share of a step whose stage has the gradient L. */
 static void gs4i_follow_flow(const gs4i_solved_elastic *k, const gs4i_elastic *e, gs4i_gradient L,
                              gs4i_symmetric after, gs4i_elastic_count *count)
 {
@@ -11025,10 +11031,7 @@ static void gs4i_known_stress(const gs4i_solved_elastic *k, const gs4i_elastic *
     gs4i_follow_flow(k, e, L, stage, count);
     gs4i_strain_rate(L, D);
     for (c = 0; c < 6; c++)
-        GS4I_BATCH_LOOP(b) {
-            stage[c][b] = e->s[c][b] + k->integrator->alpha_f * (stage[c][b] - e->s[c][b]);
-            q[c][b] = stage[c][b] - 2 * k->eta[b] * D[c][b];
-        }
+        GS4I_BATCH_LOOP(b) q[c][b] = stage[c][b] - 2 * k->eta[b] * D[c][b];
 }
 
 /* Density times the squared speed of elastic waves of each particle, Pa: 2 G0 c_max at most. The
@@ -12353,8 +12356,9 @@ static void gs4i_see_elastic_count(gs4i_response *r, const gs4i_elastic_count *c
     r->report->substeps += (uint64_t)count->substeps;
 }
 
-static gs4i_solved_elastic gs4i_begin_solved(gs4i_response *r, gs4i_gradient L, gs4i_lanes G,
-                                             gs4i_elastic *e, gs4i_elastic_count *count)
+static gs4i_solved_elastic gs4i_begin_solved(gs4i_response *r, gs4i_gradient L, double share,
+                                             gs4i_lanes G, gs4i_elastic *e,
+                                             gs4i_elastic_count *count)
 {
     gs4i_solved_elastic k;
     memset(count, 0, sizeof *count);
@@ -12364,6 +12368,7 @@ static gs4i_solved_elastic gs4i_begin_solved(gs4i_response *r, gs4i_gradient L, 
     k.constants = &r->elastic;
     k.G = G;
     k.integrator = r->integrator;
+    k.share = share;
     k.n = r->n;
     gs4i_weigh_stage(&k, e);
     return k;
@@ -12379,7 +12384,8 @@ static void gs4i_add_elastic(gs4i_response *r, gs4i_gradient L, gs4i_symmetric s
     int b, c;
     if (r->report->bad) return; /* refused anyway: a particle that fails takes some 50 ms */
     if (r->in_solve && r->integrator) {
-        const gs4i_solved_elastic k = gs4i_begin_solved(r, L, G, &e, &count);
+        const gs4i_solved_elastic k =
+            gs4i_begin_solved(r, L, (double)r->integrator->alpha_f, G, &e, &count);
         gs4i_symmetric known;
         gs4i_known_stress(&k, &e, L, known, s, &count);
     } else {
@@ -12463,7 +12469,7 @@ static void gs4i_stress_to_solve(gs4i_response *r, gs4i_gradient L, const gs4i_w
     memset(solid, 0, sizeof(gs4i_lanes));
     if (r->p->deformation_reals) gs4i_tangent_of_solid(r, L, J, solid);
     if (!r->p->elastic_reals || r->report->bad) return;
-    k = gs4i_begin_solved(r, L, G, &e, &count);
+    k = gs4i_begin_solved(r, L, (double)r->integrator->alpha_f, G, &e, &count);
     gs4i_known_stress(&k, &e, L, q, stage, &count);
     GS4I_BATCH_LOOP(b) mu[b] += k.eta[b];
     gs4i_see_elastic(G, stage, stiffness);
@@ -12511,7 +12517,7 @@ static void gs4i_advance_solved(gs4i_response *r, gs4i_gradient L, int commit)
     gs4i_symmetric after;
     gs4i_lanes G;
     int i, b;
-    k = gs4i_begin_solved(r, L, G, &e, &count);
+    k = gs4i_begin_solved(r, L, 1, G, &e, &count);
     gs4i_follow_flow(&k, &e, L, after, &count);
     gs4i_see_elastic_count(r, &count);
     if (!commit) return;
@@ -21499,13 +21505,16 @@ static void gs4i_take_trace(gs4i_gradient L)
     }
 }
 
-/* What a block gives: V/mu and V q to cells, V q and V to edges. */
+/* What a block gives: V/mu and V q/mu to cells and to edges. Where materials meet, layers across a
+ * cell have one stress, 2 mu D + q each: their mean strain gives it the mean of 1/mu for mu, and
+ * for q its mean weighed by 1/mu. Weighed by volume q of a stiff one would pull at cells that have
+ * the viscosity of a thin one to bear it. */
 typedef struct gs4i_stress_tiles {
-    gs4i_number_tile resistance, normal[3], shear[3], volume[3];
+    gs4i_number_tile resistance, normal[3], shear[3], weight[3];
 } gs4i_stress_tiles;
 
 static void gs4i_scatter_known_stress(gs4i_stress_tiles *t, const gs4i_stencils s[4], int n,
-                                      const gs4i_wide *volume, gs4i_symmetric q)
+                                      const gs4i_wide *give, gs4i_symmetric q)
 {
     gs4i_stencils edge;
     int b, e;
@@ -21513,10 +21522,10 @@ static void gs4i_scatter_known_stress(gs4i_stress_tiles *t, const gs4i_stencils 
         const int across = gs4i_place[(e + 1) % 3][(e + 2) % 3];
         gs4i_edge_stencil(s, e, &edge);
         for (b = 0; b < n; b++) {
-            const gs4_real V = GS4I_NTH_CONST(volume, b);
-            gs4i_scatter_single(t->normal[e], &s[0], b, V * GS4I_NTH(q[e], b));
-            gs4i_scatter_single(t->shear[e], &edge, b, V * GS4I_NTH(q[across], b));
-            gs4i_scatter_single(t->volume[e], &edge, b, V);
+            const gs4_real g = GS4I_NTH_CONST(give, b);
+            gs4i_scatter_single(t->normal[e], &s[0], b, g * GS4I_NTH(q[e], b));
+            gs4i_scatter_single(t->shear[e], &edge, b, g * GS4I_NTH(q[across], b));
+            gs4i_scatter_single(t->weight[e], &edge, b, g);
         }
     }
 }
@@ -21582,13 +21591,13 @@ static void gs4i_scatter_viscosity(int index, void *context)
             give[b] = volume[b] / counts;
         }
         for (b = 0; b < n; b++) gs4i_scatter_single(tiles.resistance, &s[0], b, GS4I_NTH(give, b));
-        if (known) gs4i_scatter_known_stress(&tiles, s, n, volume, sigma);
+        if (known) gs4i_scatter_known_stress(&tiles, s, n, give, sigma);
     }
     gs4i_add_face_tile(sim, o, GS4I_AT_CELL, 1, tiles.resistance, f->viscosity);
     for (c = 0; c < 3 && known; c++) {
         gs4i_add_face_tile(sim, o, GS4I_AT_CELL, 1, tiles.normal[c], f->normal[c]);
         gs4i_add_face_tile(sim, o, 7 ^ 1 << c, 1, tiles.shear[c], f->shear[c]);
-        gs4i_add_face_tile(sim, o, 7 ^ 1 << c, 1, tiles.volume[c], f->turn[c]);
+        gs4i_add_face_tile(sim, o, 7 ^ 1 << c, 1, tiles.weight[c], f->turn[c]);
     }
     gs4i_report_liquids(r.report, &r.seen);
 }
@@ -21626,10 +21635,10 @@ static void gs4i_find_viscosities(int z, void *context)
     size_t i;
     if (z < f->box.size[2])
         GS4I_BOX_PLANE(&f->box, GS4I_AT_CELL, z, at, i) {
-            const gs4_real V = f->cell[4 * i + GS4I_CELL_FILL];
-            f->viscosity[i] = f->viscosity[i] > 0 ? V / f->viscosity[i] : GS4I_C(0);
+            const gs4_real V = f->cell[4 * i + GS4I_CELL_FILL], resistance = f->viscosity[i];
+            f->viscosity[i] = resistance > 0 ? V / resistance : GS4I_C(0);
             f->viscosity[i] *= gs4i_open_share_of_cell(f, i);
-            for (a = 0; a < 3 && elastic; a++) f->normal[a][i] /= gs4i_max(V, GS4I_TINY);
+            for (a = 0; a < 3 && elastic; a++) f->normal[a][i] /= gs4i_max(resistance, GS4I_TINY);
         }
     for (a = 0; a < 3 && elastic; a++)
         if (z < gs4i_box_length(&f->box, 7 ^ 1 << a, 2))

@@ -12451,11 +12451,11 @@ GS4I_INLINE void gs4i_stress(gs4i_response *r, gs4i_gradient L, const gs4i_wide 
     if (r->p->deformation_reals) gs4i_add_solid(r, L, J, sigma);
 }
 
-/* What a solve for the velocity of the stage has as viscosity, and what it knows before, Pa. What
- * the viscosity has not of the stiffness, G0 (c_max - 1), is seen, as far as it lasts over a
- * step. */
+/* What a solve for the velocity of the stage has as viscosity, mu + eta + that of solids, and what
+ * it knows before, Pa. What the viscosity has not of the stiffness, G0 (c_max - 1), is seen, as far
+ * as it lasts over a step. */
 static void gs4i_stress_to_solve(gs4i_response *r, gs4i_gradient L, const gs4i_wide *J,
-                                 gs4i_symmetric q, gs4i_wide *mu, gs4i_lanes solid)
+                                 gs4i_symmetric q, gs4i_wide *mu, gs4i_lanes eta, gs4i_lanes solid)
 {
     gs4i_elastic e;
     gs4i_elastic_count count;
@@ -12466,12 +12466,13 @@ static void gs4i_stress_to_solve(gs4i_response *r, gs4i_gradient L, const gs4i_w
     gs4i_liquid_stress(&r->constants, J, L, q, mu);
     gs4i_see_liquids(&r->seen, &r->constants, J, mu);
     gs4i_see_thinnest(&r->seen, &r->constants, mu);
+    memset(eta, 0, sizeof(gs4i_lanes));
     memset(solid, 0, sizeof(gs4i_lanes));
     if (r->p->deformation_reals) gs4i_tangent_of_solid(r, L, J, solid);
     if (!r->p->elastic_reals || r->report->bad) return;
     k = gs4i_begin_solved(r, L, (double)r->integrator->alpha_f, G, &e, &count);
     gs4i_known_stress(&k, &e, L, q, stage, &count);
-    GS4I_BATCH_LOOP(b) mu[b] += k.eta[b];
+    memcpy(eta, k.eta, sizeof k.eta);
     gs4i_see_elastic(G, stage, stiffness);
     GS4I_BATCH_LOOP(b) stiffness[b] = (GS4I_C(0.5) * stiffness[b] - G[b]) * k.left[b];
     gs4i_see_elastic_count(r, &count);
@@ -14508,9 +14509,9 @@ typedef struct gs4i_fit {
     int result; /* of solves within that of pressure */
 } gs4i_fit;
 
-/* Of a particle, Pa s: its viscosity; and with what strain gives to elastic stress in a step. */
+/* Of a particle, Pa s: its viscosity; with (VE2); and with what strain gives to stress of solids. */
 typedef struct gs4i_tangent {
-    gs4_real viscosity, all;
+    gs4_real viscosity, liquid, all;
 } gs4i_tangent;
 
 typedef struct gs4i_staggered {
@@ -21531,13 +21532,14 @@ static void gs4i_scatter_known_stress(gs4i_stress_tiles *t, const gs4i_stencils 
 }
 
 static void gs4i_keep_tangents(gs4i_staggered *f, size_t i, int n, const gs4i_wide *viscosity,
-                               const gs4i_wide *elastic)
+                               const gs4i_wide *eta, const gs4i_wide *solid)
 {
     gs4i_tangent *to = (gs4i_tangent *)f->tangent.data + i;
     int b;
     for (b = 0; b < n; b++) {
         to[b].viscosity = GS4I_NTH_CONST(viscosity, b);
-        to[b].all = to[b].viscosity + GS4I_NTH_CONST(elastic, b);
+        to[b].liquid = to[b].viscosity + GS4I_NTH_CONST(eta, b);
+        to[b].all = to[b].liquid + GS4I_NTH_CONST(solid, b);
     }
 }
 
@@ -21569,7 +21571,7 @@ static void gs4i_scatter_viscosity(int index, void *context)
         gs4i_gathered slope;
         gs4i_gradient L;
         gs4i_symmetric sigma;
-        gs4i_lanes J, mu, stiffness, volume, give;
+        gs4i_lanes J, mu, eta, solid, volume, give;
         int b;
         gs4i_stage_faces(sim, &frame, i, n, &q, s);
         gs4i_gather_slopes(velocity, s, n, &slope);
@@ -21578,17 +21580,18 @@ static void gs4i_scatter_viscosity(int index, void *context)
         GS4I_BATCH_LOOP(b) J[b] = q.v[3][b] + integrator->before * q.a[3][b];
         gs4i_turn_to_batch(&r, i, n);
         if (heat) gs4i_load_batch_heat(&r);
-        gs4i_stress_to_solve(&r, L, J, sigma, mu, stiffness);
+        gs4i_stress_to_solve(&r, L, J, sigma, mu, eta, solid);
+        if (f->is_fitted) gs4i_keep_tangents(f, i, n, mu, eta, solid);
+        GS4I_BATCH_LOOP(b) mu[b] += eta[b];
         gs4i_check_liquids(r.report, J, mu, p.id + i, n);
-        if (f->is_fitted) gs4i_keep_tangents(f, i, n, mu, stiffness);
         GS4I_BATCH_LOOP(b) {
             const gs4i_wide inv_density = r.constants.inv_density[b],
                             at_least = least / inv_density;
             gs4i_wide counts;
-            counts = mu[b] + stiffness[b];
+            counts = mu[b] + solid[b];
             GS4I_WIDE_MAX(counts, counts, at_least);
             volume[b] = q.x[3][b] * inv_density * J[b];
-            give[b] = volume[b] / counts;
+            give[b] = f->is_fitted ? volume[b] * counts : volume[b] / counts;
         }
         for (b = 0; b < n; b++) gs4i_scatter_single(tiles.resistance, &s[0], b, GS4I_NTH(give, b));
         if (known) gs4i_scatter_known_stress(&tiles, s, n, give, sigma);
@@ -21637,6 +21640,7 @@ static void gs4i_find_viscosities(int z, void *context)
         GS4I_BOX_PLANE(&f->box, GS4I_AT_CELL, z, at, i) {
             const gs4_real V = f->cell[4 * i + GS4I_CELL_FILL], resistance = f->viscosity[i];
             f->viscosity[i] = resistance > 0 ? V / resistance : GS4I_C(0);
+            if (f->is_fitted && V > 0) f->viscosity[i] = resistance / V;
             f->viscosity[i] *= gs4i_open_share_of_cell(f, i);
             for (a = 0; a < 3 && elastic; a++) f->normal[a][i] /= gs4i_max(resistance, GS4I_TINY);
         }
@@ -21933,18 +21937,26 @@ static void gs4i_stress_of_trial(gs4i_response *r, const gs4i_tangent *t, gs4i_g
     if (r->p->deformation_reals) gs4i_add_solid(r, L, J, sigma);
 }
 
-/* Its tangent, as if all were isotropic. */
+/* Its tangent, as if all were isotropic: that of solids is of their deviator, as their stress is.
+ * What is viscous is exact, trace and all. */
 static void gs4i_change_of_stress(const gs4i_tangent *t, int n, gs4i_gradient L,
                                   gs4i_symmetric sigma)
 {
-    gs4i_lanes all;
+    gs4i_lanes all, solid;
     int b, a, c;
     memset(all, 0, sizeof all);
-    for (b = 0; b < n; b++) GS4I_NTH(all, b) = t[b].all;
-    gs4i_take_trace(L);
+    memset(solid, 0, sizeof solid);
+    for (b = 0; b < n; b++) {
+        GS4I_NTH(all, b) = t[b].all;
+        GS4I_NTH(solid, b) = t[b].all - t[b].liquid;
+    }
     for (a = 0; a < 3; a++)
         for (c = a; c < 3; c++)
             GS4I_BATCH_LOOP(b) sigma[gs4i_place[a][c]][b] = all[b] * (L[a][c][b] + L[c][a][b]);
+    GS4I_BATCH_LOOP(b) {
+        const gs4i_wide mean = solid[b] * (L[0][0][b] + L[1][1][b] + L[2][2][b]) * GS4I_C(2.0 / 3);
+        for (a = 0; a < 3; a++) sigma[a][b] -= mean;
+    }
 }
 
 /* Forces of stress in `trial`, or how they change, to faces. */
@@ -22109,7 +22121,7 @@ static double gs4i_rounding_of_stress(const gs4_sim *sim)
     double sum = 0;
     int i;
     for (i = 0; i < p->count; i++) {
-        const double G = (double)(t[i].all - t[i].viscosity) / (double)sim->integrator.s,
+        const double G = (double)(t[i].all - t[i].liquid) / (double)sim->integrator.s,
                      V = (double)(p->position[4 * (size_t)i + 3]
                                   * gs4i_constants_of(sim, (size_t)i)->inv_density);
         sum += V * G * (V * G);

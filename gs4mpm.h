@@ -9192,7 +9192,8 @@ static gs4i_outcome gs4i_stokes_iterate(gs4i_stokes *s, double goal, double *nor
         *norm = after;
         y->x = y->z;
         y->z = t;
-        if (after > 0.9 * before && s->iterations < s->limit) return GS4I_STAGNATED;
+        if (after > (s->law ? 0.98 : 0.9) * before && s->iterations < s->limit)
+            return GS4I_STAGNATED;
     }
     return GS4I_CONVERGED;
 }
@@ -11398,8 +11399,7 @@ static void gs4i_stage_solid(const gs4i_solid_constants *l, gs4i_deformation *e,
     for (i = 0; i < 3; i++)
         for (j = 0; j < 3; j++)
             GS4I_BATCH_LOOP(b)
-                Y[i][j][b] = integrator->prediction.ahead * e->rate[i][j][b]
-                             + integrator->s * (L[i][j][b] - e->rate[i][j][b]);
+                Y[i][j][b] = integrator->before * e->rate[i][j][b] + integrator->s * L[i][j][b];
     if (gs4i_is_small_step(Y, squared)) {
         gs4i_deform(Y, e->F, e->F);
         return;

@@ -12,7 +12,7 @@ typedef struct extremes_draw {
     double g[3], h, speed; /* gravity; cell size; the fastest that is thrown in, cells a second */
     int materials, kind, bodies, moves, emits, particles;
     double swing;            /* of dt */
-    double start, most;      /* J that were put in, with what gravity may give; had at most */
+    double start, most, stored; /* J that were put in, with what gravity may give; had at most */
     double mass, p[3], scale; /* at the start; of momentum */
     double time, moved;      /* how far momentum is off */
 } extremes_draw;
@@ -183,84 +183,85 @@ static void extremes_eigenvalues(const double s[6], double value[3])
     for (i = 0; i < 3; i++) value[i] = a[i][i];
 }
 
-/* B = J^(-2/3) F F^T. */
-static void extremes_stretch(const gs4_real *F, double J, double B[6])
+static double extremes_determinant(const gs4_real *F)
 {
-    double det = 0; int q;
-        for (q = 0; q < 3; q++)
-            det += (double)F[q]
-                   * ((double)F[3 + (q + 1) % 3] * (double)F[6 + (q + 2) % 3]
-                      - (double)F[3 + (q + 2) % 3] * (double)F[6 + (q + 1) % 3]);
-    J = det;
-    static const int row[6] = { 0, 1, 2, 0, 0, 1 }, column[6] = { 0, 1, 2, 1, 2, 2 };
-    int i, c;
-    for (i = 0; i < 6; i++) {
-        B[i] = 0;
-        for (c = 0; c < 3; c++)
-            B[i] += (double)F[3 * row[i] + c] * (double)F[3 * column[i] + c] / cbrt(J * J);
-    }
+    double det = 0;
+    int c;
+    for (c = 0; c < 3; c++)
+        det += (double)F[c]
+               * ((double)F[3 + (c + 1) % 3] * (double)F[6 + (c + 2) % 3]
+                  - (double)F[3 + (c + 2) % 3] * (double)F[6 + (c + 1) % 3]);
+    return det;
 }
 
-#ifdef SEMI_TIMES
-static double dbg[8];
-#endif
-/* What a particle of mass m has stored, J: of volume K (J - 1)^2/2; of solids what (6) is the
- * derivative of; of Oldroyd-B G0 (tr c - 3 - ln det c)/2, c = S/G0 + I. */
-static double extremes_stored(const gs4_material *l, double m, double J, const gs4_real *S,
-                              const gs4_real *F)
+/* Eigenvalues of B = (det F)^(-2/3) F F^T: with J in its place rounding of F would be energy. */
+static void extremes_stretch(const gs4_real *F, double e[3])
 {
-    const double volume = m / (double)l->density, K = (double)l->bulk_modulus,
-                 G = (double)l->shear_modulus;
-    double sum = 0.5 * K * (J - 1) * (J - 1), e[3], b[6];
+    static const int row[6] = { 0, 1, 2, 0, 0, 1 }, column[6] = { 0, 1, 2, 1, 2, 2 };
+    double B[6];
+    int i, c;
+    for (i = 0; i < 6; i++)
+        for (B[i] = 0, c = 0; c < 3; c++)
+            B[i] += (double)F[3 * row[i] + c] * (double)F[3 * column[i] + c];
+    extremes_eigenvalues(B, e);
+    for (i = 0; i < 3; i++) e[i] /= pow(extremes_determinant(F), 2.0 / 3);
+}
+
+/* Eigenvalues of c = S/G0 + I, and G0; 0 where it has none. */
+static double extremes_conformation(const gs4_material *l, const gs4_real *S, double e[3])
+{
+    const double mu = (1 - (double)l->local_fraction) * (double)l->viscosity;
+    double c[6];
+    int i;
+    if (l->liquid == GS4_NEWTONIAN || !(mu > 0)) return 0;
+    for (i = 0; i < 6; i++) c[i] = (double)S[i] * (double)l->relaxation_time / mu + (i < 3);
+    extremes_eigenvalues(c, e);
+    return mu / (double)l->relaxation_time;
+}
+
+/* What a particle has stored: of solids what (6) is the derivative of, of Oldroyd-B
+ * G0 (tr c - 3 - ln det c)/2. That of volume is left out: what particles of a cell differ by in J
+ * no pressure sees. */
+static double extremes_stored(const gs4_material *l, const gs4_real *S, const gs4_real *F)
+{
+    const double G = (double)l->shear_modulus;
+    double sum = 0, e[3], G0;
     int i;
     if (F && l->solid) {
-        extremes_stretch(F, J, b);
-        extremes_eigenvalues(b, e);
+        extremes_stretch(F, e);
         for (i = 0; i < 3; i++)
             sum += l->solid == GS4_NEO_HOOKEAN ? 0.5 * G * (e[i] - 1)
                                                : G * pow(sqrt(fmax(e[i], 0)) - 1, 2);
+        /* strain of so much is rounding */
+        sum = fmax(sum - G * pow(64 * (sizeof(gs4_real) == 8 ? 1.1e-16 : 6e-8), 2), 0);
     }
-    if (S && l->liquid == GS4_OLDROYD_B) {
-        const double G0 =
-            (1 - (double)l->local_fraction) * (double)l->viscosity / (double)l->relaxation_time;
-        for (i = 0; i < 6 && G0 > 0; i++) b[i] = (double)S[i] / G0 + (i < 3);
-        if (G0 > 0) extremes_eigenvalues(b, e);
-        for (i = 0; i < 3 && G0 > 0; i++)
-            sum += 0.5 * J * G0 * fmax(e[i] - 1 - log(fmax(e[i], 1e-6)), 0);
-    }
-#ifdef SEMI_TIMES
-    dbg[1] += 0.5 * K * (J - 1) * (J - 1) * volume;
-    dbg[2] += (sum - 0.5 * K * (J - 1) * (J - 1)) * volume;
-    dbg[3] += K * volume * 1.4e-14;
-    dbg[4] += G * volume * 1.4e-14;
-#endif
-    return sum * volume;
+    if (!S || l->liquid != GS4_OLDROYD_B) return sum;
+    G0 = extremes_conformation(l, S, e);
+    for (i = 0; i < 3 && G0 > 0; i++)
+        sum += 0.5 * G0 * fmax(e[i] - 1 - log(fmax(e[i], 1e-6)), 0);
+    return sum;
 }
 
-/* Kinetic energy, of gravity, and what is stored, none at first. */
+/* Kinetic energy, and of gravity, and what is stored, none at first. */
 static double extremes_energy(extremes_draw *k)
 {
     const gs4_view x = gs4_particles(k->sim, GS4_FIELD_POSITION),
                    m = gs4_particles(k->sim, GS4_FIELD_MASS),
-                   J = gs4_particles(k->sim, GS4_FIELD_VOLUME_RATIO),
                    S = gs4_particles(k->sim, GS4_FIELD_STRESS),
                    F = gs4_particles(k->sim, GS4_FIELD_DEFORMATION);
     const uint8_t *material = gs4_particle_materials(k->sim);
     double sum = gs4_get_stats(k->sim).kinetic_energy;
     int i, a;
-#ifdef SEMI_TIMES
-    memset(dbg, 0, sizeof dbg);
-#endif
+    k->stored = 0;
     for (i = 0; i < x.count; i++) {
-        const double mass = (double)m.data[i * m.stride];
-        for (a = 0; a < 3; a++) sum -= mass * k->g[a] * (double)x.data[i * x.stride + a];
-#ifdef SEMI_TIMES
-        extremes_stored(&k->m[material[i]], mass, (double)J.data[i * J.stride],
-                               S.data ? S.data + (size_t)i * (size_t)S.stride : NULL,
-                               F.data ? F.data + (size_t)i * (size_t)F.stride : NULL);
-#endif
+        const gs4_material *l = &k->m[material[i]];
+        for (a = 0; a < 3; a++)
+            sum -= (double)m.data[i * m.stride] * k->g[a] * (double)x.data[i * x.stride + a];
+        k->stored += (double)m.data[i * m.stride] / (double)l->density
+                     * extremes_stored(l, S.data ? S.data + (size_t)i * (size_t)S.stride : NULL,
+                                       F.data ? F.data + (size_t)i * (size_t)F.stride : NULL);
     }
-    return sum;
+    return sum + k->stored;
 }
 
 static int extremes_is_free(const extremes_draw *k)
@@ -293,25 +294,14 @@ static int extremes_views_are_good(const extremes_draw *k)
                 good &= fabs((double)v.data[i * v.stride + c]) < 1e30;
     }
     for (i = 0; i < J.count; i++) good &= (double)J.data[i * J.stride] > 0;
-    for (i = 0; i < F.count; i++) {
-        const gs4_real *f = F.data + (size_t)i * (size_t)F.stride;
-        double det = 0;
-        for (c = 0; c < 3; c++)
-            det += (double)f[c]
-                   * ((double)f[3 + (c + 1) % 3] * (double)f[6 + (c + 2) % 3]
-                      - (double)f[3 + (c + 2) % 3] * (double)f[6 + (c + 1) % 3]);
-        good &= det > 0;
-    }
+    for (i = 0; i < F.count; i++)
+        good &= extremes_determinant(F.data + (size_t)i * (size_t)F.stride) > 0;
     for (i = 0; i < S.count; i++) {
-        const gs4_material *l = &k->m[material[i]];
-        const double mu = (1 - (double)l->local_fraction) * (double)l->viscosity;
-        double b[6], e[3], most;
-        if (l->liquid == GS4_NEWTONIAN || !(mu > 0)) continue;
-        for (c = 0; c < 6; c++)
-            b[c] = (double)S.data[i * S.stride + c] * (double)l->relaxation_time / mu + (c < 3);
-        extremes_eigenvalues(b, e);
-        most = fmax(1, fmax(fabs(e[0]), fmax(fabs(e[1]), fabs(e[2]))));
-        good &= fmin(e[0], fmin(e[1], e[2])) > -1e-5 * most;
+        double e[3];
+        const gs4_real *one = S.data + (size_t)i * (size_t)S.stride;
+        if (extremes_conformation(&k->m[material[i]], one, e) > 0)
+            good &= fmin(e[0], fmin(e[1], e[2]))
+                    > -1e-5 * fmax(1, fmax(e[0], fmax(e[1], e[2])));
     }
     return good;
 }
@@ -355,12 +345,12 @@ static int extremes_reason(const gs4_sim *sim)
     return n;
 }
 
-/* A step, or a shorter one where it is refused, by a half each time; then nothing has changed. 0
- * where so many are refused. */
+/* A step, or a shorter one where it is refused, by a half, later by an eighth; then nothing has
+ * changed. 0 where so many are refused. */
 static int extremes_step(extremes_draw *k, double dt, int most, extremes_sum *sum)
 {
     int tries, result = GS4_OK;
-    for (tries = 0; tries < most; tries++, dt /= 2) {
+    for (tries = 0; tries < most; tries++, dt /= tries < 4 ? 2 : 8) {
         const uint64_t hash = gs4_state_hash(k->sim);
         result = gs4_step(k->sim, (gs4_real)dt);
         if (result == GS4_OK) break;

@@ -165,10 +165,6 @@ static void semi_extremes_run(uint32_t seed, int steps, extremes_sum *sum)
         (void)before;
 #endif
         c = extremes_watch(&k);
-#ifdef SEMI_TIMES
-        { gs4_stats s = gs4_get_stats(k.sim); double e=extremes_energy(&k);
-        printf("E %u %d start %.4g now %.4g kin %.3g vol %.3g elastic %.3g (round %.2g %.2g) J %.6g..%.6g vmax %.3g dt %.3g limit %.3g n %d\n", seed, i, k.start, e, s.kinetic_energy, dbg[1], dbg[2], dbg[3], dbg[4], s.min_volume_ratio, s.max_volume_ratio, s.max_speed/k.h, s.dt, (double)gs4_stable_dt(k.sim), s.particles);}
-#endif
         if (!c) break;
     }
     how = i == steps || (!gs4_get_stats(k.sim).particles && !k.emits);

@@ -11,10 +11,10 @@ typedef struct extremes_draw {
     gs4_sim *sim;
     double g[3], h, speed; /* gravity; cell size; the fastest that is thrown in, cells a second */
     int materials, kind, bodies, moves, emits, particles;
-    double swing;            /* of dt */
+    double swing;               /* of dt */
     double start, most, stored; /* J that were put in, with what gravity may give; had at most */
-    double mass, p[3], scale; /* at the start; of momentum */
-    double time, moved;      /* how far momentum is off */
+    double mass, p[3], scale;   /* at the start; of momentum */
+    double time, moved;         /* how far momentum is off */
 } extremes_draw;
 
 enum {
@@ -237,8 +237,7 @@ static double extremes_stored(const gs4_material *l, const gs4_real *S, const gs
     }
     if (!S || l->liquid != GS4_OLDROYD_B) return sum;
     G0 = extremes_conformation(l, S, e);
-    for (i = 0; i < 3 && G0 > 0; i++)
-        sum += 0.5 * G0 * fmax(e[i] - 1 - log(fmax(e[i], 1e-6)), 0);
+    for (i = 0; i < 3 && G0 > 0; i++) sum += 0.5 * G0 * fmax(e[i] - 1 - log(fmax(e[i], 1e-6)), 0);
     return sum;
 }
 
@@ -300,8 +299,7 @@ static int extremes_views_are_good(const extremes_draw *k)
         double e[3];
         const gs4_real *one = S.data + (size_t)i * (size_t)S.stride;
         if (extremes_conformation(&k->m[material[i]], one, e) > 0)
-            good &= fmin(e[0], fmin(e[1], e[2]))
-                    > -1e-5 * fmax(1, fmax(e[0], fmax(e[1], e[2])));
+            good &= fmin(e[0], fmin(e[1], e[2])) > -1e-5 * fmax(1, fmax(e[0], fmax(e[1], e[2])));
     }
     return good;
 }
@@ -319,7 +317,7 @@ static void extremes_print(const extremes_draw *k, uint32_t seed, const char *wh
     for (n = 0; n < k->materials; n++) {
         const gs4_material *l = &k->m[n];
         printf("; %s density %.1e mu %.1e K %.1e",
-               l->solid ? (l->solid == 1 ? "neo-Hookean" : "corotated")
+               l->solid    ? (l->solid == 1 ? "neo-Hookean" : "corotated")
                : l->liquid ? (l->liquid == 1 ? "Oldroyd-B" : "Pom-Pom")
                            : "liquid",
                (double)l->density, (double)l->viscosity, (double)l->bulk_modulus);
@@ -333,9 +331,12 @@ static void extremes_print(const extremes_draw *k, uint32_t seed, const char *wh
 }
 
 static const char *const extremes_reasons[EXTREMES_REASONS] = {
-    "volume ratios",  "more than two cells", "non-local stress", "stretched, sheared",
-    "has a viscosity", "rose during",        "beyond the domain", "converge",
-    "largest stable", "",                    "no step",           "energy"
+    "volume ratios",     "more than two cells",
+    "non-local stress",  "stretched, sheared",
+    "has a viscosity",   "rose during",
+    "beyond the domain", "converge",
+    "largest stable",    "",
+    "no step",           "energy"
 };
 
 static int extremes_reason(const gs4_sim *sim)

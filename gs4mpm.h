@@ -9192,8 +9192,7 @@ static gs4i_outcome gs4i_stokes_iterate(gs4i_stokes *s, double goal, double *nor
         *norm = after;
         y->x = y->z;
         y->z = t;
-        if (after > (s->law ? 0.98 : 0.9) * before && s->iterations < s->limit)
-            return GS4I_STAGNATED;
+        if (after > 0.9 * before && s->iterations < s->limit) return GS4I_STAGNATED;
     }
     return GS4I_CONVERGED;
 }

@@ -11,6 +11,8 @@ typedef struct extremes_draw {
     gs4_sim *sim;
     double g[3], h, speed; /* gravity; cell size; the fastest that is thrown in, cells a second */
     int materials, kind, bodies, moves, emits, particles;
+    int worst;                  /* iterations of a step */
+    int rounds;                 /* beside rounding its energy says nothing */
     double swing;               /* of dt */
     double start, most, stored; /* J that were put in, with what gravity may give; had at most */
     double mass, p[3], scale;   /* at the start; of momentum */
@@ -384,8 +386,8 @@ static int extremes_watch(extremes_draw *k)
     const gs4_stats s = gs4_get_stats(k->sim);
     const double e = extremes_energy(k);
     int c;
-    if (!k->emits && !(k->moves && k->bodies)) k->most = fmax(k->most, e);
-    if (!extremes_views_are_good(k) || e > 100 * k->start + 1e9) return 0;
+    if (!k->emits && !k->rounds && !(k->moves && k->bodies)) k->most = fmax(k->most, e);
+    if (!extremes_views_are_good(k) || k->most > 100 * k->start + 1e9) return 0;
     if (s.particles < k->particles || k->emits) return s.particles > 0 || k->emits;
     for (c = 0; c < 3 && extremes_is_free(k); c++)
         k->moved = fmax(k->moved, fabs(s.momentum[c] - k->p[c] - s.mass * k->g[c] * k->time)

@@ -10943,8 +10943,8 @@ static void gs4i_weigh_stage(gs4i_solved_elastic *k, const gs4i_elastic *e)
     }
 }
 
-/* S of particle n after its share of the step, from that before, in units of G0: UCM and Oldroyd-B as S, which
- * may be far below c. */
+/* S of particle n after its share of the step, from that before, in units of G0: UCM and Oldroyd-B
+ * as S, which may be far below c. */
 static void gs4i_follow_one(const gs4i_solved_elastic *k, const gs4i_elastic *e, double L[3][3],
                             int n, double S[6], gs4i_elastic_count *count)
 {
@@ -14508,7 +14508,7 @@ typedef struct gs4i_fit {
     int result; /* of solves within that of pressure */
 } gs4i_fit;
 
-/* Of a particle, Pa s: its viscosity; with (VE2); and with what strain gives to stress of solids. */
+/* Of a particle, Pa s: its viscosity; with (VE2); with what strain gives to stress of solids. */
 typedef struct gs4i_tangent {
     gs4_real viscosity, liquid, all;
 } gs4i_tangent;

@@ -1,7 +1,7 @@
 /* The semi-implicit scheme at its extremes: draws over everything it has at once, and what is exact
  * there. */
 
-/* --- what draws found -------------------------------------------------------------------------- */
+/* --- what draws found ------------------------------------------------------------------------- */
 
 /* Kinetic energy, that of gravity and what is stored, of a scene that is all of k. */
 static double semi_extremes_energy(gs4_sim *sim, const gs4_material *m, int materials)

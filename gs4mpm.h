@@ -360,8 +360,9 @@
  * with z = f dt/lambda_b, and q what is known of S before. The conformation goes over the step with
  * L = L' + w (L~ - L'), L' of the last stage, exactly for UCM and Oldroyd-B, by the split for
  * Pom-Pom, so it stays positive definite at any dt; w is such that L is that of the mean age of
- * what a step gives to S. With (0, 0) and backward Euler S goes to 2 mu_p D~ where dt is far above
- * lambda_b. Order in time 1.9 to 2.1 in x, v and S; shear waves at 32 cells a wave within 1 % in
+ * what a step gives to S. Stress of the stage goes on from S over alpha_f dt likewise, so it is
+ * 2 mu_p D~ where dt is far above lambda_b, whatever the member; mixed cells weigh what is known of
+ * it by 1/mu, as they do mu. Order in time 1.9 to 2.1 in x, v and S; shear waves at 32 cells a wave within 1 % in
  * steps ten times those of the explicit scheme. L~ is by the solve's own differences; at sticky
  * walls of the domain L and q go on straight (at sticky colliders the nearest of L is taken: to
  * first order). Poiseuille flow of Oldroyd-B and UCM in steps of 100 times the explicit limit has
@@ -383,6 +384,9 @@
  * finite K it loses 0.6 % a quarter turn, 0.3 % in half the step. What is stiff and less than two
  * cells thick may need smaller steps, or does not converge. The correction of volume leaves solids
  * alone: F says where they are.
+ *     What nothing in a step can strain, a drop of large mu or G that lands with speed, is thrown
+ * back at about half of it with (0, 0), as rates remember its impact; viscous ones not with backward
+ * Euler.
  *
  * Symplectic Euler, the fast tier: one affine scatter with stress and one gather (MLS-MPM, APIC),
  * first order.
@@ -30497,4 +30501,8 @@ GS4_API GS4I_COLD int gs4_estimate(const gs4_sim *sim, gs4_scheme scheme, gs4_in
  * Partitioned: what flies past dry walls does not feel them, falls in uneven steps are exact, the
  * limit of viscosity is that of the member. gs4_set_viscosity starts the integrator anew, as
  * gs4_set_gravity does: one step of the semi-implicit scheme decayed with the viscosity before.
+ * Implicit schemes: solids that reach an open wall do not fall there by themselves; a step that
+ * starts rates anew strains solids by what it says. Semi-implicit: elastic liquids that relax
+ * within a step gain no energy beside thin ones, whatever the member; liquids in scenes with solids
+ * have their viscosity once, and solves beside stiff solids converge.
  * gs4_estimate. */

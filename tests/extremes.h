@@ -1,6 +1,6 @@
 /* Draws over everything at once, for the implicit schemes: fixed seeds, powers of ten evenly. A
- * step is taken, or refused with a code and a sentence and then the state stays; energy is never above
- * what was put in, nothing is lost, numbers stay finite. After test_stability.c. */
+ * step is taken, or refused with a code and a sentence and then the state stays; energy is never
+ * above what was put in, nothing is lost, numbers stay finite. After test_stability.c. */
 #ifndef EXTREMES_H
 #define EXTREMES_H
 

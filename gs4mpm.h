@@ -362,8 +362,8 @@
  * Pom-Pom, so it stays positive definite at any dt; w is such that L is that of the mean age of
  * what a step gives to S. Stress of the stage goes on from S over alpha_f dt likewise, so it is
  * 2 mu_p D~ where dt is far above lambda_b, whatever the member; mixed cells weigh what is known of
- * it by 1/mu, as they do mu. Order in time 1.9 to 2.1 in x, v and S; shear waves at 32 cells a wave within 1 % in
- * steps ten times those of the explicit scheme. L~ is by the solve's own differences; at sticky
+ * it by 1/mu, as they do mu. Order in time 1.9 to 2.1 in x, v and S; shear waves at 32 cells a wave
+ * within 1 % in steps ten times those of the explicit scheme. L~ is by the solve's own differences; at sticky
  * walls of the domain L and q go on straight (at sticky colliders the nearest of L is taken: to
  * first order). Poiseuille flow of Oldroyd-B and UCM in steps of 100 times the explicit limit has
  * the error of Newton's liquid within 20 % of it, stress within .5 %. All work of S heats at once.
@@ -385,8 +385,8 @@
  * cells thick may need smaller steps, or does not converge. The correction of volume leaves solids
  * alone: F says where they are.
  *     What nothing in a step can strain, a drop of large mu or G that lands with speed, is thrown
- * back at about half of it with (0, 0), as rates remember its impact; viscous ones not with backward
- * Euler.
+ * back at about half of it with (0, 0), as rates remember its impact; viscous ones not with
+ * backward Euler.
  *
  * Symplectic Euler, the fast tier: one affine scatter with stress and one gather (MLS-MPM, APIC),
  * first order.

@@ -363,8 +363,9 @@
  * what a step gives to S. Stress of the stage goes on from S over alpha_f dt likewise, so it is
  * 2 mu_p D~ where dt is far above lambda_b, whatever the member; mixed cells weigh what is known of
  * it by 1/mu, as they do mu. Order in time 1.9 to 2.1 in x, v and S; shear waves at 32 cells a wave
- * within 1 % in steps ten times those of the explicit scheme. L~ is by the solve's own differences; at sticky
- * walls of the domain L and q go on straight (at sticky colliders the nearest of L is taken: to
+ * within 1 % in steps ten times those of the explicit scheme. L~ is by the solve's own differences;
+ * at sticky walls of the domain L and q go on straight (at sticky colliders the nearest of L is
+ * taken: to
  * first order). Poiseuille flow of Oldroyd-B and UCM in steps of 100 times the explicit limit has
  * the error of Newton's liquid within 20 % of it, stress within .5 %. All work of S heats at once.
  *

@@ -360,10 +360,12 @@
  * with z = f dt/lambda_b, and q what is known of S before. The conformation goes over the step with
  * L = L' + w (L~ - L'), L' of the last stage, exactly for UCM and Oldroyd-B, by the split for
  * Pom-Pom, so it stays positive definite at any dt; w is such that L is that of the mean age of
- * what a step gives to S. With (0, 0) and backward Euler S goes to 2 mu_p D~ where dt is far above
- * lambda_b. Order in time 1.9 to 2.1 in x, v and S; shear waves at 32 cells a wave within 1 % in
- * steps ten times those of the explicit scheme. L~ is by the solve's own differences; at sticky
- * walls of the domain L and q go on straight (at sticky colliders the nearest of L is taken: to
+ * what a step gives to S. Stress of the stage goes on from S over alpha_f dt likewise, so it is
+ * 2 mu_p D~ where dt is far above lambda_b, whatever the member; mixed cells weigh what is known of
+ * it by 1/mu, as they do mu. Order in time 1.9 to 2.1 in x, v and S; shear waves at 32 cells a wave
+ * within 1 % in steps ten times those of the explicit scheme. L~ is by the solve's own differences;
+ * at sticky walls of the domain L and q go on straight (at sticky colliders the nearest of L is
+ * taken: to
  * first order). Poiseuille flow of Oldroyd-B and UCM in steps of 100 times the explicit limit has
  * the error of Newton's liquid within 20 % of it, stress within .5 %. All work of S heats at once.
  *
@@ -383,6 +385,9 @@
  * finite K it loses 0.6 % a quarter turn, 0.3 % in half the step. What is stiff and less than two
  * cells thick may need smaller steps, or does not converge. The correction of volume leaves solids
  * alone: F says where they are.
+ *     What nothing in a step can strain, a drop of large mu or G that lands with speed, is thrown
+ * back at about half of it with (0, 0), as rates remember its impact; viscous ones not with
+ * backward Euler.
  *
  * Symplectic Euler, the fast tier: one affine scatter with stress and one gather (MLS-MPM, APIC),
  * first order.
@@ -10942,10 +10947,13 @@ static void gs4i_correct_elastic(const gs4i_elastic_constants *l, gs4i_elastic *
  *
  *     L = L' + weight (L~ - L'),   age = dt/z - dt/(exp(z) - 1)                               (VE1)
  *
- * so it is of second order for z -> 0, age = dt/2, and S = 2 mu D~ where z is large and alpha_f 1.
- * The stage is S~ = S + alpha_f (S_n+1 - S), as everywhere in (4). At rest dS~/dD~ is
+ * so it is of second order for z -> 0, age = dt/2. The stage goes on from S likewise, over
+ * alpha_f dt, with L of (2 alpha_f - 1) age before it: that is S~ = S + alpha_f (S_n+1 - S), as
+ * everywhere in (4), for z -> 0, and S~ = 2 mu D~ where z is large. By that sum S of the last step,
+ * which has relaxed long before the stage, would pull at it: with rho_inf = 1 such a liquid beside
+ * a thin one came to 1e6 times its energy in a step. At rest dS~/dD~ is
  *
- *     2 eta = 2 alpha_f weight G0 dt (1 - exp(-z))/z                                          (VE2)
+ *     2 eta = 2 weight G0 alpha_f dt (1 - exp(-alpha_f z))/(alpha_f z)                        (VE2)
  *
  * which the solve has as viscosity; what is left, q = S~(L*) - 2 eta D*, is known before it, with
  * L* of what particles gave. For small stress q does not depend on L*. That of S~ on D~ as a
@@ -10955,23 +10963,31 @@ typedef struct gs4i_solved_elastic {
     const gs4i_elastic_constants *constants;
     const gs4i_wide *G;
     const gs4i_integrator *integrator;
+    double share;                 /* of the step: alpha_f to its stage, or 1 */
     gs4i_lanes weight, eta, left; /* (VE1), (VE2); share of S that is left of its growth */
     int n;
 } gs4i_solved_elastic;
+
+/* (1 - exp(-z))/z. */
+static double gs4i_left_of_growth(double z)
+{
+    return z > 1e-3 ? -expm1(-z) / z : 1 - z * (0.5 - z / 6);
+}
 
 static void gs4i_weigh_stage(gs4i_solved_elastic *k, const gs4i_elastic *e)
 {
     const gs4i_elastic_constants *l = k->constants;
     const gs4i_integrator *r = k->integrator;
-    const double dt = (double)r->dt, ratio = (double)r->affine_ratio,
-                 past = ratio > 0 ? (1 - (double)r->alpha_f) / ratio : 0;
+    const double dt = (double)r->dt, ratio = (double)r->affine_ratio, ahead = (double)r->alpha_f,
+                 past = ratio > 0 ? (1 - ahead) / ratio : 0,
+                 aged = k->share < 1 ? 2 * ahead - 1 : 1; /* by how much of the age */
     int n, i;
     memset(k->weight, 0, sizeof k->weight);
     memset(k->eta, 0, sizeof k->eta);
     memset(k->left, 0, sizeof k->left);
     for (n = 0; n < k->n; n++) {
         const double G = (double)GS4I_NTH_CONST(k->G, n);
-        double z = (double)GS4I_NTH_CONST(l->inv_lambda, n) * dt, part = 1, age = 0.5, weight = 1;
+        double z = (double)GS4I_NTH_CONST(l->inv_lambda, n) * dt, age, weight = 1;
         if (!(G > (double)GS4I_TINY)) continue;
         if (GS4I_NTH_CONST(l->stretch, n) > 0) {
             double trace3 = 0, squares = 0, f1, stiff;
@@ -10984,27 +11000,22 @@ static void gs4i_weigh_stage(gs4i_solved_elastic *k, const gs4i_elastic *e)
                          (double)GS4I_NTH_CONST(l->alpha, n), trace3, squares, &f1, &stiff);
             z *= fmax(1 + f1, 0);
         }
-        if (z > 1e-3) {
-            part = -expm1(-z) / z;
-            age = 1 / z - 1 / expm1(z);
-        } else { /* series */
-            part = 1 - z * (0.5 - z / 6);
-            age = 0.5 - z / 12;
-        }
-        if (ratio > 0) weight = (1 - age + past) / ((double)r->alpha_f + past);
+        age = z > 1e-3 ? 1 / z - 1 / expm1(z) : 0.5 - z / 12;
+        if (ratio > 0) weight = (k->share - aged * age + past) / (ahead + past);
         GS4I_NTH(k->weight, n) = GS4I_C(weight);
-        GS4I_NTH(k->left, n) = GS4I_C(part);
-        GS4I_NTH(k->eta, n) = GS4I_C((double)r->alpha_f * weight * G * dt * part);
+        GS4I_NTH(k->left, n) = GS4I_C(gs4i_left_of_growth(z));
+        GS4I_NTH(k->eta, n) =
+            GS4I_C(k->share * weight * G * dt * gs4i_left_of_growth(k->share * z));
     }
 }
 
-/* S of particle n after the step, from that before, in units of G0: UCM and Oldroyd-B as S, which
- * may be far below c. */
+/* S of particle n after its share of the step, from that before, in units of G0: UCM and Oldroyd-B
+ * as S, which may be far below c. */
 static void gs4i_follow_one(const gs4i_solved_elastic *k, const gs4i_elastic *e, double L[3][3],
                             int n, double S[6], gs4i_elastic_count *count)
 {
     const gs4i_elastic_constants *l = k->constants;
-    const double G = (double)GS4I_NTH_CONST(k->G, n), dt = (double)k->integrator->dt;
+    const double G = (double)GS4I_NTH_CONST(k->G, n), dt = k->share * (double)k->integrator->dt;
     double c[6], A[3][3], H[6];
     gs4i_split p;
     int i;
@@ -11053,7 +11064,7 @@ static void gs4i_mean_gradient(const gs4i_solved_elastic *k, const gs4i_elastic 
             mean[i][j] = last[i][j] + weight * ((double)GS4I_NTH(L[i][j], n) - last[i][j]);
 }
 
-/* S (Pa) at the end of a step whose stage has the gradient L. */
+/* S (Pa) at the end of the share of a step whose stage has the gradient L. */
 static void gs4i_follow_flow(const gs4i_solved_elastic *k, const gs4i_elastic *e, gs4i_gradient L,
                              gs4i_symmetric after, gs4i_elastic_count *count)
 {
@@ -11086,10 +11097,7 @@ static void gs4i_known_stress(const gs4i_solved_elastic *k, const gs4i_elastic *
     gs4i_follow_flow(k, e, L, stage, count);
     gs4i_strain_rate(L, D);
     for (c = 0; c < 6; c++)
-        GS4I_BATCH_LOOP(b) {
-            stage[c][b] = e->s[c][b] + k->integrator->alpha_f * (stage[c][b] - e->s[c][b]);
-            q[c][b] = stage[c][b] - 2 * k->eta[b] * D[c][b];
-        }
+        GS4I_BATCH_LOOP(b) q[c][b] = stage[c][b] - 2 * k->eta[b] * D[c][b];
 }
 
 /* Density times the squared speed of elastic waves of each particle, Pa: 2 G0 c_max at most. The
@@ -11456,8 +11464,7 @@ static void gs4i_stage_solid(const gs4i_solid_constants *l, gs4i_deformation *e,
     for (i = 0; i < 3; i++)
         for (j = 0; j < 3; j++)
             GS4I_BATCH_LOOP(b)
-                Y[i][j][b] = integrator->prediction.ahead * e->rate[i][j][b]
-                             + integrator->s * (L[i][j][b] - e->rate[i][j][b]);
+                Y[i][j][b] = integrator->before * e->rate[i][j][b] + integrator->s * L[i][j][b];
     if (gs4i_is_small_step(Y, squared)) {
         gs4i_deform(Y, e->F, e->F);
         return;
@@ -12414,8 +12421,9 @@ static void gs4i_see_elastic_count(gs4i_response *r, const gs4i_elastic_count *c
     r->report->substeps += (uint64_t)count->substeps;
 }
 
-static gs4i_solved_elastic gs4i_begin_solved(gs4i_response *r, gs4i_gradient L, gs4i_lanes G,
-                                             gs4i_elastic *e, gs4i_elastic_count *count)
+static gs4i_solved_elastic gs4i_begin_solved(gs4i_response *r, gs4i_gradient L, double share,
+                                             gs4i_lanes G, gs4i_elastic *e,
+                                             gs4i_elastic_count *count)
 {
     gs4i_solved_elastic k;
     memset(count, 0, sizeof *count);
@@ -12425,6 +12433,7 @@ static gs4i_solved_elastic gs4i_begin_solved(gs4i_response *r, gs4i_gradient L, 
     k.constants = &r->elastic;
     k.G = G;
     k.integrator = r->integrator;
+    k.share = share;
     k.n = r->n;
     gs4i_weigh_stage(&k, e);
     return k;
@@ -12440,7 +12449,8 @@ static void gs4i_add_elastic(gs4i_response *r, gs4i_gradient L, gs4i_symmetric s
     int b, c;
     if (r->report->bad) return; /* refused anyway: a particle that fails takes some 50 ms */
     if (r->in_solve && r->integrator) {
-        const gs4i_solved_elastic k = gs4i_begin_solved(r, L, G, &e, &count);
+        const gs4i_solved_elastic k =
+            gs4i_begin_solved(r, L, (double)r->integrator->alpha_f, G, &e, &count);
         gs4i_symmetric known;
         gs4i_known_stress(&k, &e, L, known, s, &count);
     } else {
@@ -12506,10 +12516,9 @@ GS4I_INLINE void gs4i_stress(gs4i_response *r, gs4i_gradient L, const gs4i_wide 
     if (r->p->deformation_reals) gs4i_add_solid(r, L, J, sigma);
 }
 
-/* What a solve for the velocity of the stage has as viscosity: of the law, of what is elastic in
- * liquids, and of solids; and what it knows before, Pa. What
- * the viscosity has not of the stiffness, G0 (c_max - 1), is seen, as far as it lasts over a
- * step. */
+/* What a solve for the velocity of the stage has as viscosity, mu + eta + that of solids, and what
+ * it knows before, Pa. What the viscosity has not of the stiffness, G0 (c_max - 1), is seen, as far
+ * as it lasts over a step. */
 static void gs4i_stress_to_solve(gs4i_response *r, gs4i_gradient L, const gs4i_wide *J,
                                  gs4i_symmetric q, gs4i_wide *mu, gs4i_lanes eta, gs4i_lanes solid)
 {
@@ -12526,9 +12535,9 @@ static void gs4i_stress_to_solve(gs4i_response *r, gs4i_gradient L, const gs4i_w
     memset(solid, 0, sizeof(gs4i_lanes));
     if (r->p->deformation_reals) gs4i_tangent_of_solid(r, L, J, solid);
     if (!r->p->elastic_reals || r->report->bad) return;
-    k = gs4i_begin_solved(r, L, G, &e, &count);
+    k = gs4i_begin_solved(r, L, (double)r->integrator->alpha_f, G, &e, &count);
     gs4i_known_stress(&k, &e, L, q, stage, &count);
-    GS4I_BATCH_LOOP(b) eta[b] = k.eta[b];
+    memcpy(eta, k.eta, sizeof k.eta);
     gs4i_see_elastic(G, stage, stiffness);
     GS4I_BATCH_LOOP(b) stiffness[b] = (GS4I_C(0.5) * stiffness[b] - G[b]) * k.left[b];
     gs4i_see_elastic_count(r, &count);
@@ -12574,7 +12583,7 @@ static void gs4i_advance_solved(gs4i_response *r, gs4i_gradient L, int commit)
     gs4i_symmetric after;
     gs4i_lanes G;
     int i, b;
-    k = gs4i_begin_solved(r, L, G, &e, &count);
+    k = gs4i_begin_solved(r, L, 1, G, &e, &count);
     gs4i_follow_flow(&k, &e, L, after, &count);
     gs4i_see_elastic_count(r, &count);
     if (!commit) return;
@@ -14565,7 +14574,7 @@ typedef struct gs4i_fit {
     int result; /* of solves within that of pressure */
 } gs4i_fit;
 
-/* Of a particle, Pa s: its viscosity; and with what strain gives to elastic stress in a step. */
+/* Of a particle, Pa s: its viscosity; with (VE2); with what strain gives to stress of solids. */
 typedef struct gs4i_tangent {
     gs4_real viscosity, liquid, solid;
 } gs4i_tangent;
@@ -14573,6 +14582,7 @@ typedef struct gs4i_tangent {
 typedef struct gs4i_staggered {
     gs4i_box box;
     int from[3], to[3];            /* the domain, in cells of the box */
+    int low[3], high[3];           /* where faces go on: the same, and beyond an open wall */
     int first[3], end[3];          /* what is solved for: without copies behind periodic walls */
     gs4_real *given[3], *taken[3]; /* quads */
     gs4_real *seen[3];             /* v_i */
@@ -18157,7 +18167,7 @@ static int gs4i_has_stress(const gs4_sim *sim)
 
 /* The box around all blocks with nodes; along a periodic axis all of the domain, and a block of
  * copies on each side. */
-static void gs4i_fit_staggered(gs4i_staggered *f, const gs4i_grid *g)
+static void gs4i_fit_staggered(gs4i_staggered *f, const gs4i_grid *g, const gs4_wall walls[6])
 {
     gs4i_box *box = &f->box;
     int s, a, high[3];
@@ -18180,6 +18190,8 @@ static void gs4i_fit_staggered(gs4i_staggered *f, const gs4i_grid *g)
         f->to[a] = high[a] > g->cells[a] ? g->cells[a] - box->low[a] : box->size[a];
         f->first[a] = g->periodic[a] ? f->from[a] : 0;
         f->end[a] = g->periodic[a] ? f->to[a] : box->size[a];
+        f->low[a] = walls[2 * a] == GS4_WALL_OPEN ? 0 : f->from[a];
+        f->high[a] = walls[2 * a + 1] == GS4_WALL_OPEN ? box->size[a] : f->to[a];
     }
 }
 
@@ -18337,7 +18349,7 @@ static int gs4i_begin_staggered(gs4_sim *sim)
             (size_t)((elastic ? 22 : 13) + (bodies && !f->is_fitted ? 3 : 0)) * sizeof(gs4_real) + 6
             + (f->is_fitted ? 3 * sizeof(double) : 0);
     if (stress && (!f->is_implicit || f->is_fitted)) bytes += 3 * sizeof(gs4_real);
-    gs4i_fit_staggered(f, &sim->grid);
+    gs4i_fit_staggered(f, &sim->grid, sim->desc.walls);
     if (f->is_fitted || gs4i_box_is_periodic(&f->box))
         bytes += 6 * sizeof(double) + sizeof(size_t) + 2 * sizeof(gs4_real) + 1;
     if (gs4i_box_reserve(&sim->memory, &f->box, bytes) != GS4_OK)
@@ -19237,7 +19249,7 @@ static int gs4i_is_earlier(const gs4i_staggered *f, int c, const int from[3], in
     uint8_t known;
     memcpy(to, from, 3 * sizeof *to);
     to[a] = gs4i_around(f, a, from[a] + steps);
-    if (to[a] < f->from[a] || to[a] > f->to[a] - (a != c)) return 0;
+    if (to[a] < f->low[a] || to[a] > f->high[a] - (a != c)) return 0;
     known = f->known[c][gs4i_box_index(&f->box, 1 << c, to[0], to[1], to[2])];
     return known && known < layer;
 }
@@ -19301,8 +19313,8 @@ GS4I_INLINE void gs4i_extrapolate_face(const gs4i_staggered_pass *pass, int c, c
     gs4_real two[4] = { 0, 0, 0, 0 }, one[4] = { 0, 0, 0, 0 };
     int twos = 0, ones = 0, side, k;
     for (side = 0; side < 6; side++) {
-        const int a = side / 2, last = f->to[a] - (a != c);
-        const int room = f->box.periodic[a] ? 2 : side & 1 ? last - at[a] : at[a] - f->from[a];
+        const int a = side / 2, last = f->high[a] - (a != c);
+        const int room = f->box.periodic[a] ? 2 : side & 1 ? last - at[a] : at[a] - f->low[a];
         const ptrdiff_t d = side & 1 ? step[a] : -step[a], n1 = (ptrdiff_t)i + d, n2 = n1 + d;
         if (room < 1 || !known[n1] || known[n1] >= pass->layer) continue;
         for (k = 0; k < pass->numbers; k++) one[k] += u[4 * n1 + k];
@@ -19348,12 +19360,12 @@ static void gs4i_extrapolate_row(const gs4i_staggered_pass *pass, int c, int y, 
     const ptrdiff_t nx = gs4i_box_length(&f->box, 1 << c, 0),
                     step[3] = { 1, nx, nx * gs4i_box_length(&f->box, 1 << c, 1) };
     const size_t row = gs4i_box_index(&f->box, 1 << c, 0, y, z);
-    const int end = f->to[0] + (c == 0);
+    const int end = f->high[0] + (c == 0);
     uint8_t beside[GS4I_FACE_RUN];
     int at[3], first;
     at[1] = y;
     at[2] = z;
-    for (first = f->from[0]; first < end; first += GS4I_FACE_RUN) {
+    for (first = f->low[0]; first < end; first += GS4I_FACE_RUN) {
         gs4i_find_beside_known(f, c, first, y, z, beside);
         for (at[0] = first; at[0] < end && at[0] < first + GS4I_FACE_RUN; at[0]++)
             if (beside[at[0] - first] && !f->known[c][row + (size_t)at[0]])
@@ -19367,8 +19379,8 @@ static void gs4i_extrapolate_layer(int z, void *context)
     const gs4i_staggered *f = &pass->sim->staggered;
     int c, y;
     for (c = 0; c < 3; c++)
-        for (y = f->from[1]; y < f->to[1] + (c == 1); y++)
-            if (z >= f->from[2] && z < f->to[2] + (c == 2)) gs4i_extrapolate_row(pass, c, y, z);
+        for (y = f->low[1]; y < f->high[1] + (c == 1); y++)
+            if (z >= f->low[2] && z < f->high[2] + (c == 2)) gs4i_extrapolate_row(pass, c, y, z);
 }
 
 /* The first `numbers` from the known faces to those around and behind the walls. */
@@ -21559,13 +21571,16 @@ static void gs4i_take_trace(gs4i_gradient L)
     }
 }
 
-/* What a block gives: V/mu and V q to cells, V q and V to edges. */
+/* What a block gives: V/mu and V q/mu to cells and to edges. Where materials meet, layers across a
+ * cell have one stress, 2 mu D + q each: their mean strain gives it the mean of 1/mu for mu, and
+ * for q its mean weighed by 1/mu. Weighed by volume q of a stiff one would pull at cells that have
+ * the viscosity of a thin one to bear it. */
 typedef struct gs4i_stress_tiles {
-    gs4i_number_tile resistance, normal[3], shear[3], volume[3];
+    gs4i_number_tile resistance, normal[3], shear[3], weight[3];
 } gs4i_stress_tiles;
 
 static void gs4i_scatter_known_stress(gs4i_stress_tiles *t, const gs4i_stencils s[4], int n,
-                                      const gs4i_wide *volume, gs4i_symmetric q)
+                                      const gs4i_wide *give, gs4i_symmetric q)
 {
     gs4i_stencils edge;
     int b, e;
@@ -21573,10 +21588,10 @@ static void gs4i_scatter_known_stress(gs4i_stress_tiles *t, const gs4i_stencils 
         const int across = gs4i_place[(e + 1) % 3][(e + 2) % 3];
         gs4i_edge_stencil(s, e, &edge);
         for (b = 0; b < n; b++) {
-            const gs4_real V = GS4I_NTH_CONST(volume, b);
-            gs4i_scatter_single(t->normal[e], &s[0], b, V * GS4I_NTH(q[e], b));
-            gs4i_scatter_single(t->shear[e], &edge, b, V * GS4I_NTH(q[across], b));
-            gs4i_scatter_single(t->volume[e], &edge, b, V);
+            const gs4_real g = GS4I_NTH_CONST(give, b);
+            gs4i_scatter_single(t->normal[e], &s[0], b, g * GS4I_NTH(q[e], b));
+            gs4i_scatter_single(t->shear[e], &edge, b, g * GS4I_NTH(q[across], b));
+            gs4i_scatter_single(t->weight[e], &edge, b, g);
         }
     }
 }
@@ -21631,25 +21646,26 @@ static void gs4i_scatter_viscosity(int index, void *context)
         gs4i_turn_to_batch(&r, i, n);
         if (heat) gs4i_load_batch_heat(&r);
         gs4i_stress_to_solve(&r, L, J, sigma, mu, eta, solid);
-        gs4i_check_liquids(r.report, J, mu, p.id + i, n);
         if (f->is_fitted) gs4i_keep_tangents(f, i, n, mu, eta, solid);
+        GS4I_BATCH_LOOP(b) mu[b] += eta[b];
+        gs4i_check_liquids(r.report, J, mu, p.id + i, n);
         GS4I_BATCH_LOOP(b) {
             const gs4i_wide inv_density = r.constants.inv_density[b],
                             at_least = least / inv_density;
             gs4i_wide counts;
-            counts = mu[b] + eta[b] + solid[b];
+            counts = mu[b] + solid[b];
             GS4I_WIDE_MAX(counts, counts, at_least);
             volume[b] = q.x[3][b] * inv_density * J[b];
-            give[b] = volume[b] / counts;
+            give[b] = f->is_fitted ? volume[b] * counts : volume[b] / counts;
         }
         for (b = 0; b < n; b++) gs4i_scatter_single(tiles.resistance, &s[0], b, GS4I_NTH(give, b));
-        if (known) gs4i_scatter_known_stress(&tiles, s, n, volume, sigma);
+        if (known) gs4i_scatter_known_stress(&tiles, s, n, give, sigma);
     }
     gs4i_add_face_tile(sim, o, GS4I_AT_CELL, 1, tiles.resistance, f->viscosity);
     for (c = 0; c < 3 && known; c++) {
         gs4i_add_face_tile(sim, o, GS4I_AT_CELL, 1, tiles.normal[c], f->normal[c]);
         gs4i_add_face_tile(sim, o, 7 ^ 1 << c, 1, tiles.shear[c], f->shear[c]);
-        gs4i_add_face_tile(sim, o, 7 ^ 1 << c, 1, tiles.volume[c], f->turn[c]);
+        gs4i_add_face_tile(sim, o, 7 ^ 1 << c, 1, tiles.weight[c], f->turn[c]);
     }
     gs4i_report_liquids(r.report, &r.seen);
 }
@@ -21687,10 +21703,11 @@ static void gs4i_find_viscosities(int z, void *context)
     size_t i;
     if (z < f->box.size[2])
         GS4I_BOX_PLANE(&f->box, GS4I_AT_CELL, z, at, i) {
-            const gs4_real V = f->cell[4 * i + GS4I_CELL_FILL];
-            f->viscosity[i] = f->viscosity[i] > 0 ? V / f->viscosity[i] : GS4I_C(0);
+            const gs4_real V = f->cell[4 * i + GS4I_CELL_FILL], resistance = f->viscosity[i];
+            f->viscosity[i] = resistance > 0 ? V / resistance : GS4I_C(0);
+            if (f->is_fitted && V > 0) f->viscosity[i] = resistance / V;
             f->viscosity[i] *= gs4i_open_share_of_cell(f, i);
-            for (a = 0; a < 3 && elastic; a++) f->normal[a][i] /= gs4i_max(V, GS4I_TINY);
+            for (a = 0; a < 3 && elastic; a++) f->normal[a][i] /= gs4i_max(resistance, GS4I_TINY);
         }
     for (a = 0; a < 3 && elastic; a++)
         if (z < gs4i_box_length(&f->box, 7 ^ 1 << a, 2))
@@ -22179,8 +22196,7 @@ static double gs4i_rounding_of_stress(const gs4_sim *sim)
     double sum = 0;
     int i;
     for (i = 0; i < p->count; i++) {
-        const double G = (double)(t[i].liquid - t[i].viscosity + t[i].solid)
-                         / (double)sim->integrator.s,
+        const double G = (double)t[i].solid / (double)sim->integrator.s,
                      V = (double)(p->position[4 * (size_t)i + 3]
                                   * gs4i_constants_of(sim, (size_t)i)->inv_density);
         sum += V * G * (V * G);
@@ -30557,4 +30573,8 @@ GS4_API GS4I_COLD int gs4_estimate(const gs4_sim *sim, gs4_scheme scheme, gs4_in
  * Partitioned: what flies past dry walls does not feel them, falls in uneven steps are exact, the
  * limit of viscosity is that of the member. gs4_set_viscosity starts the integrator anew, as
  * gs4_set_gravity does: one step of the semi-implicit scheme decayed with the viscosity before.
+ * Implicit schemes: solids that reach an open wall do not fall there by themselves; a step that
+ * starts rates anew strains solids by what it says. Semi-implicit: elastic liquids that relax
+ * within a step gain no energy beside thin ones, whatever the member; liquids in scenes with solids
+ * have their viscosity once, and solves beside stiff solids converge.
  * gs4_estimate. */

@@ -32,12 +32,14 @@
 #include "test_partitioned_periodic.c"
 #include "test_partitioned_flows.c"
 #include "test_partitioned_exact.c"
+#include "extremes.h"
 #include "test_partitioned_extremes.c"
 #include "test_semi_implicit.c"
 #include "test_semi_long.c"
 #include "test_semi_viscoelastic.c"
 #include "test_semi_solids.c"
 #include "test_semi_melt.c"
+#include "test_semi_extremes.c"
 #include "test_mesh.c"
 #include "test_estimate.c"
 #include "test_reference.c"
@@ -138,6 +140,7 @@ int main(int count, char **values)
     run_semi_viscoelastic();
     run_semi_solids();
     run_semi_melt();
+    run_semi_extremes();
     run_mesh();
     run_estimate();
     RUN_ONCE(test_reference);

@@ -235,58 +235,12 @@ static void test_partitioned_extremes_viscous(void)
 
 /* --- draws over everything -------------------------------------------------------------------- */
 
-typedef struct extremes_draw {
-    uint32_t random;
-    gs4_sim_desc d;
-    gs4_material m[2];
-    gs4_sim *sim;
-    double g[3], speed; /* gravity; the fastest that is thrown in, cells a second */
-    double start;       /* J that were put in, with what gravity may give */
-    int kind, bodies, particles;
-    double mass, swing; /* of dt */
-} extremes_draw;
-
-static double extremes_between(extremes_draw *k, double low, double high)
-{
-    return low + (high - low) * (stability_random(&k->random) + 0.5);
-}
-static int extremes_pick(extremes_draw *k, int n) { return (int)extremes_between(k, 0, n - 1e-6); }
-static double extremes_power(extremes_draw *k, double low, double high)
-{
-    return pow(10, extremes_between(k, low, high));
-}
-
-static void extremes_describe(extremes_draw *k)
-{
-    static const double rho[4][2] = { { 0, 0 }, { 0.5, 0 }, { 1, 0 }, { 0.5, 0.5 } };
-    int a;
-    k->d = partitioned_cube(8);
-    for (a = 0; a < 3; a++) {
-        const int periodic = extremes_pick(k, 5) == 0;
-        k->d.cells[a] = 6 + extremes_pick(k, 7);
-        k->d.walls[2 * a] = periodic ? GS4_WALL_PERIODIC : (gs4_wall)extremes_pick(k, 4);
-        k->d.walls[2 * a + 1] = periodic ? GS4_WALL_PERIODIC : (gs4_wall)extremes_pick(k, 4);
-    }
-    k->d.cell_size = (gs4_real)0.125;
-    k->d.solver_tolerance = 0; /* as it is by default */
-    a = extremes_pick(k, 8);
-    k->d.integrator = a % 2 ? GS4_INTEGRATOR_BACKWARD_EULER : GS4_INTEGRATOR_GS4;
-    if (a % 2 == 0) {
-        k->d.rho_inf = (gs4_real)rho[a / 2][0];
-        k->d.rho_inf_spurious = (gs4_real)rho[a / 2][1];
-    }
-    for (a = 0; a < 3; a++) k->g[a] = 0;
-    a = extremes_pick(k, 3);
-    if (extremes_pick(k, 3)) k->g[a] = -extremes_power(k, -1, 2);
-    if (k->d.walls[2 * a] == GS4_WALL_PERIODIC) k->g[a] = 0;
-    k->d.gravity = at(k->g[0], k->g[1], k->g[2]);
-    CHECK_RESULT(NULL, gs4_create(&k->d, &k->sim), GS4_OK);
-}
-
+/* What the partitioned scheme is drawn with; liquids of constant viscosity. */
 static void extremes_materials(extremes_draw *k)
 {
     const double denser = extremes_pick(k, 2) ? extremes_power(k, -3, 3) : 1;
     int n;
+    k->materials = 2;
     for (n = 0; n < 2; n++) {
         const double mu = extremes_pick(k, 3) ? extremes_power(k, -3, 6) : 0;
         k->m[n] = partitioned_liquid(mu);
@@ -299,197 +253,27 @@ static void extremes_materials(extremes_draw *k)
     }
 }
 
-/* Bodies at rest, before there is material: that is left out where they are. */
-static void extremes_bodies(extremes_draw *k, gs4_shape shape[2])
-{
-    int n, a;
-    k->bodies = extremes_pick(k, 2) * extremes_pick(k, 3);
-    for (n = 0; n < k->bodies; n++) {
-        gs4_collider c;
-        double p[3], low[3], high[3];
-        const double r = extremes_between(k, 0.13, 0.35);
-        memset(&c, 0, sizeof c);
-        for (a = 0; a < 3; a++) {
-            p[a] = extremes_between(k, 0, 0.125 * k->d.cells[a]);
-            low[a] = p[a] - extremes_between(k, 0.1, 0.3);
-            high[a] = p[a] + extremes_between(k, 0.1, 0.3);
-        }
-        c.contact = (gs4_wall)extremes_pick(k, 3);
-        c.shape = extremes_pick(k, 2)
-                      ? gs4_sphere(at(p[0], p[1], p[2]), (gs4_real)r)
-                      : gs4_box(at(low[0], low[1], low[2]), at(high[0], high[1], high[2]));
-        shape[n] = c.shape;
-        CHECK_RESULT(k->sim, gs4_add_collider(k->sim, &c), GS4_OK);
-    }
-}
-
-/* One particle; spray; a film; all cells full; full but for a pocket; a block; two blocks. */
-static void extremes_fill(extremes_draw *k)
-{
-    double size[3], low[3], high[3], v[3];
-    gs4_fill f = scene_fill(at(0, 0, 0));
-    gs4_shape body[2];
-    int a, n, i, parts;
-    extremes_bodies(k, body);
-    k->kind = extremes_pick(k, 7);
-    k->speed = extremes_pick(k, 4) ? extremes_power(k, -2, 3) : 0;
-    parts = k->kind == 1 ? 40 : k->kind < 3 || k->kind == 5 ? 1 : 2;
-    for (a = 0; a < 3; a++) size[a] = 0.125 * k->d.cells[a];
-    for (n = 0; n < parts; n++) {
-        for (a = 0; a < 3; a++) {
-            v[a] = 0.125 * k->speed * extremes_between(k, -0.57, 0.57);
-            low[a] = extremes_between(k, 0.05 * size[a], 0.5 * size[a]);
-            high[a] = low[a] + extremes_between(k, 0.3, 0.7);
-            if (k->kind < 2) high[a] = (low[a] *= 1.8);
-            if (k->kind == 3 || k->kind == 4) low[a] = -1;
-            if (k->kind == 3 || k->kind == 4) high[a] = 9;
-        }
-        a = extremes_pick(k, 3);
-        if (k->kind == 2) high[a] = low[a] + extremes_between(k, 0.06, 0.2);
-        if (parts == 2 && n == 0) high[0] = 0.5 * size[0];
-        if (parts == 2 && n == 1) low[0] = 0.5 * size[0];
-        f.material = n % 2;
-        f.velocity = at(v[0], v[1], v[2]);
-        f.jitter = (gs4_real)(extremes_pick(k, 2) * extremes_between(k, 0, 1));
-        f.random_seed = k->random >> 4;
-        if (k->kind < 2) {
-            const gs4_real x[3] = { (gs4_real)low[0], (gs4_real)low[1], (gs4_real)low[2] };
-            gs4_add_points(k->sim, x, 1, (gs4_real)(0.125 * 0.125 * 0.125 / 8), &f);
-        } else
-            gs4_add_particles(
-                k->sim, gs4_box(at(low[0], low[1], low[2]), at(high[0], high[1], high[2])), &f);
-    }
-    if (k->kind == 4)
-        gs4_remove_particles(k->sim, gs4_sphere(at(size[0] / 2, size[1] / 2, size[2] / 2),
-                                                (gs4_real)extremes_between(k, 0.1, 0.3)));
-    for (i = 0; i < k->bodies; i++) gs4_remove_particles(k->sim, body[i]);
-}
-
-/* Kinetic energy, and of gravity; there is none of volume at first. */
-static double extremes_energy(extremes_draw *k)
-{
-    const gs4_view x = gs4_particles(k->sim, GS4_FIELD_POSITION),
-                   m = gs4_particles(k->sim, GS4_FIELD_MASS);
-    double sum = gs4_get_stats(k->sim).kinetic_energy;
-    int i, a;
-    for (i = 0; i < x.count; i++)
-        for (a = 0; a < 3; a++)
-            sum -= (double)m.data[i * m.stride] * k->g[a] * (double)x.data[i * x.stride + a];
-    return sum;
-}
-
-static int extremes_is_free(const extremes_draw *k)
-{
-    int i, free = k->bodies == 0;
-    for (i = 0; i < 6; i++)
-        free &= k->d.walls[i] == GS4_WALL_OPEN || k->d.walls[i] == GS4_WALL_PERIODIC;
-    return free;
-}
-
-static int extremes_views_are_finite(const gs4_sim *sim)
-{
-    static const gs4_field field[4] = { GS4_FIELD_POSITION, GS4_FIELD_VELOCITY,
-                                        GS4_FIELD_VOLUME_RATIO, GS4_FIELD_PRESSURE };
-    int n, i, c, good = 1;
-    for (n = 0; n < 4; n++) {
-        const gs4_view v = gs4_particles(sim, field[n]);
-        for (i = 0; i < v.count; i++)
-            for (c = 0; c < v.components; c++)
-                good &= fabs((double)v.data[i * v.stride + c]) < 1e30;
-    }
-    return good;
-}
-
-static int extremes_refused, extremes_taken, extremes_above;
-static double extremes_gain;
-
-static void extremes_print(const extremes_draw *k, uint32_t seed, const char *what)
-{
-    printf("draw %u: %s: kind %d, bodies %d, %s rho %g %g, walls %d%d%d%d%d%d, g %.2g, speed %.2g, "
-           "mu %.1e %.1e, density %.1e, K %.1e %.1e, swing %.2g\n",
-           (unsigned)seed, what, k->kind, k->bodies, k->d.integrator ? "BE" : "GS4",
-           (double)k->d.rho_inf, (double)k->d.rho_inf_spurious, (int)k->d.walls[0],
-           (int)k->d.walls[1], (int)k->d.walls[2], (int)k->d.walls[3], (int)k->d.walls[4],
-           (int)k->d.walls[5], k->g[0] + k->g[1] + k->g[2], k->speed, (double)k->m[0].viscosity,
-           (double)k->m[1].viscosity, (double)k->m[1].density, (double)k->m[0].bulk_modulus,
-           (double)k->m[1].bulk_modulus, k->swing);
-}
-
-/* A step, or a shorter one where it is refused; then nothing has changed. */
-static double extremes_step(extremes_draw *k, double dt)
-{
-    int tries, result = GS4_OK;
-    for (tries = 0; tries < 4; tries++, dt /= 2) {
-        const uint64_t hash = gs4_state_hash(k->sim);
-        result = gs4_step(k->sim, (gs4_real)dt);
-        if (result == GS4_OK) break;
-        extremes_refused++;
-        CHECK(result == GS4_ERROR_UNSTABLE || result == GS4_ERROR_NOT_CONVERGED);
-        CHECK(gs4_last_error(k->sim)[0] != 0);
-        CHECK(gs4_state_hash(k->sim) == hash);
-    }
-    extremes_taken += result == GS4_OK;
-    return result == GS4_OK ? dt : -1;
-}
-
-static void extremes_run(uint32_t seed)
+static void extremes_run(uint32_t seed, extremes_sum *sum)
 {
     extremes_draw k;
-    double e, most = 0, p[3], scale, moved = 0, time = 0;
-    gs4_stats s;
-    int i, c;
-    memset(&k, 0, sizeof k);
-    k.random = seed * 2654435769u + 12345u;
-    for (i = 0; i < 4; i++) extremes_pick(&k, 2);
+    int i;
+    extremes_begin(&k, seed, 0.125);
     extremes_describe(&k);
+    k.d.solver_tolerance = 0; /* as it is by default */
+    CHECK_RESULT(NULL, gs4_create(&k.d, &k.sim), GS4_OK);
     extremes_materials(&k);
     extremes_fill(&k);
     k.swing = extremes_pick(&k, 2) ? extremes_between(&k, 1, 10) : 1;
-    s = gs4_get_stats(k.sim);
-    k.particles = s.particles;
-    k.mass = s.mass;
-    k.start = extremes_energy(&k);
-    scale = sqrt(2 * s.kinetic_energy * s.mass);
-    for (c = 0; c < 3; c++) p[c] = s.momentum[c];
-    for (i = 0; i < 40; i++) {
+    extremes_put_in(&k);
+    for (i = 0; i < 40 && k.particles; i++) {
         double dt = fmin((double)gs4_stable_dt(k.sim), 1);
-        if (k.particles == 0) break;
         if (extremes_pick(&k, 20) == 0) dt *= extremes_power(&k, -9, 0);
         if (i % 2) dt /= k.swing;
-        if (!(dt > 1e-12)) break;
-        dt = extremes_step(&k, dt);
-        if (dt < 0) break;
-        time += dt;
-        s = gs4_get_stats(k.sim);
-        e = extremes_energy(&k);
-        most = fmax(most, e);
-        if (!extremes_views_are_finite(k.sim) || e > 100 * k.start + 1e9) break;
-        if (s.particles < k.particles) break;
-        for (c = 0; c < 3 && extremes_is_free(&k); c++)
-            moved = fmax(moved, fabs(s.momentum[c] - p[c] - s.mass * k.g[c] * time)
-                                    / (scale + s.mass * fabs(k.g[c]) * time + 1e-30));
+        if (!(dt > 1e-12) || !extremes_step(&k, dt, 4, sum) || !extremes_watch(&k)) break;
     }
-    CHECK(extremes_views_are_finite(k.sim));
-    for (c = 0; c < 6 && k.d.walls[c] != GS4_WALL_OPEN; c++) {
-    }
-    if (c == 6) {
-        CHECK(s.particles == k.particles);
-        CHECK_CLOSE(s.mass / (k.mass + 1e-30), k.particles ? 1 : 0, 1e-12);
-    }
-    if (k.start > 0 && most / k.start > 1.001 && test_filter[0]) {
-        char text[64];
-        sprintf(text, "energy %.4g at %d", most / k.start, i);
-        extremes_print(&k, seed, text);
-    }
-    if (moved > 1e-4 && test_filter[0]) {
-        char text[64];
-        sprintf(text, "momentum off by %.2e", moved);
-        extremes_print(&k, seed, text);
-    }
-    extremes_gain = fmax(extremes_gain, most / (k.start + 1e-30));
-    extremes_above += most > 1.01 * k.start + 1e-30;
-    CHECK_BETWEEN(most / (k.start + 1e-30), 0, 4);
-    CHECK_BETWEEN(moved, 0, 0.01);
+    extremes_judge(&k, seed, sum);
+    CHECK_BETWEEN(k.most / (k.start + 1e-30), 0, 4);
+    CHECK_BETWEEN(k.moved, 0, 0.01);
     gs4_destroy(k.sim);
 }
 
@@ -498,15 +282,13 @@ static void extremes_run(uint32_t seed)
 static void test_partitioned_extremes_draws(void)
 {
     const int draws = test_slow ? 500 : test_full ? 20 : 4;
+    extremes_sum sum;
     int n;
-    extremes_refused = extremes_taken = extremes_above = 0;
-    extremes_gain = 0;
-    for (n = 0; n < draws; n++) extremes_run((uint32_t)n);
-    if (test_filter[0])
-        printf("%d steps taken, %d refused, energy at most %.4g of what it was, %d above 1.01\n",
-               extremes_taken, extremes_refused, extremes_gain, extremes_above);
-    CHECK_BETWEEN(extremes_above, 0, draws / 50);
-    CHECK_BETWEEN(extremes_taken, 20 * draws, 40 * draws);
+    memset(&sum, 0, sizeof sum);
+    for (n = 0; n < draws; n++) extremes_run((uint32_t)n, &sum);
+    extremes_report(&sum);
+    CHECK_BETWEEN(sum.above, 0, draws / 50);
+    CHECK_BETWEEN(sum.taken, 20 * draws, 40 * draws);
 }
 
 static void run_partitioned_extremes(void)

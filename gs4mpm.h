@@ -365,9 +365,9 @@
  * it by 1/mu, as they do mu. Order in time 1.9 to 2.1 in x, v and S; shear waves at 32 cells a wave
  * within 1 % in steps ten times those of the explicit scheme. L~ is by the solve's own differences;
  * at sticky walls of the domain L and q go on straight (at sticky colliders the nearest of L is
- * taken: to
- * first order). Poiseuille flow of Oldroyd-B and UCM in steps of 100 times the explicit limit has
- * the error of Newton's liquid within 20 % of it, stress within .5 %. All work of S heats at once.
+ * taken: to first order). Poiseuille flow of Oldroyd-B and UCM in steps of 100 times the explicit
+ * limit has the error of Newton's liquid within 20 % of it, stress within .5 %. All work of S heats
+ * at once.
  *
  *     In scenes with solids all stress is that of particles, as in the partitioned scheme, at the
  * stage that u~ leads to:
@@ -382,8 +382,8 @@
  * cells within 9 % of beam theory, of 6 within 5 %. Stiff solids stop up to 1.3 cells before walls,
  * as far as kernels reach. A cube of 8 cells that turns by 0.05 a step keeps its energy within
  * 0.2 % a turn, by 0.1 within 1.4 %, to the third order in that (tests: semi_solids_turn); with
- * finite K it loses 0.6 % a quarter turn, 0.3 % in half the step. What is stiff and less than two
- * cells thick may need smaller steps, or does not converge. The correction of volume leaves solids
+ * finite K it loses 0.6 % a quarter turn, 0.3 % in half the step. Plates of one cell and more
+ * converge as cubes do, thinner ones may need smaller steps. The correction of volume leaves solids
  * alone: F says where they are.
  *     What nothing in a step can strain, a drop of large mu or G that lands with speed, is thrown
  * back at about half of it with (0, 0), as rates remember its impact; viscous ones not with
@@ -30455,6 +30455,8 @@ GS4_API GS4I_COLD int gs4_estimate(const gs4_sim *sim, gs4_scheme scheme, gs4_in
 #undef GS4I_STORE
 #undef GS4I_STICKS_BEFORE
 #undef GS4I_STOKES_AT_SURFACE
+#undef GS4I_STOKES_LEAST_FILL
+#undef GS4I_STOKES_BEYOND_MASS
 #undef GS4I_BODY_IS_FAR
 #undef GS4I_STOKES_LENGTH
 #undef GS4I_STOKES_PLANE
@@ -30576,5 +30578,6 @@ GS4_API GS4I_COLD int gs4_estimate(const gs4_sim *sim, gs4_scheme scheme, gs4_in
  * Implicit schemes: solids that reach an open wall do not fall there by themselves; a step that
  * starts rates anew strains solids by what it says. Semi-implicit: elastic liquids that relax
  * within a step gain no energy beside thin ones, whatever the member; liquids in scenes with solids
- * have their viscosity once, and solves beside stiff solids converge.
+ * have their viscosity once, solves beside stiff solids and of plates of one cell converge, and
+ * stiff solids turn without loss.
  * gs4_estimate. */

@@ -382,9 +382,10 @@
  * cells within 9 % of beam theory, of 6 within 5 %. Stiff solids stop up to 1.3 cells before walls,
  * as far as kernels reach. A cube of 8 cells that turns by 0.05 a step keeps its energy within
  * 0.2 % a turn, by 0.1 within 1.4 %, to the third order in that (tests: semi_solids_turn); with
- * finite K it loses 0.6 % a quarter turn, 0.3 % in half the step. Plates of one cell and more
- * converge as cubes do, thinner ones may need smaller steps. The correction of volume leaves solids
- * alone: F says where they are.
+ * finite K it loses 0.6 % a quarter turn, 0.3 % in half the step. Plates of 1.5 cells and more turn
+ * and land so, too, in as many iterations (tests: semi_solids_thin); what is thinner is liquid in
+ * few of its cells, and falls there by itself. The correction of volume leaves solids alone: F says
+ * where they are.
  *     What nothing in a step can strain, a drop of large mu or G that lands with speed, is thrown
  * back at about half of it with (0, 0), as rates remember its impact; viscous ones not with
  * backward Euler.
@@ -19233,9 +19234,9 @@ static void gs4i_classify_faces(int z, void *context)
 
 /* --- extrapolation ---------------------------------------------------------------------------- */
 
-/* What a face beyond goes on from: u_one + u_add - u_two. */
+/* What a face beyond goes on from: u_one + u_add - u_two, those of the slope of its axis. */
 typedef struct gs4i_face_line {
-    int one[3], add[3], two[3];
+    int one[3], add[3], two[3], slope;
 } gs4i_face_line;
 
 enum {
@@ -19275,35 +19276,74 @@ static int gs4i_lines_beside(const gs4i_staggered *f, int c, const int at[3], in
                     || !gs4i_is_earlier(f, c, l->add, a, d, layer, l->two))
                     continue;
                 memcpy(l->one, one, sizeof one);
+                l->slope = c;
                 l = lines + ++count;
             }
         }
     return count;
 }
 
-/* u of a face beyond by lines beside; 0 where there are none. */
+/* Where there are none, as in plates one cell thick, its slope is such that there is no shear in
+ * the surface: du_c/dx_a = - du_a/dx_c, from a pair of faces of axis a between it and the known
+ * one, or the next pair. */
+static int gs4i_lines_of_shear(const gs4i_staggered *f, int c, const int at[3], int layer,
+                               gs4i_face_line lines[GS4I_FACE_LINES])
+{
+    static const int nearest[3] = { 0, -1, 1 };
+    int count = 0, side, k;
+    for (side = 0; side < 6; side++) {
+        const int a = side / 2, up = side & 1;
+        gs4i_face_line *l = lines + count;
+        int between[3];
+        if (a == c || !gs4i_is_earlier(f, c, at, a, up ? 1 : -1, layer, l->one)) continue;
+        memcpy(between, at, sizeof between);
+        between[a] = gs4i_around(f, a, at[a] + up);
+        for (k = 0; k < 3; k++) {
+            if (!gs4i_is_earlier(f, a, between, c, nearest[k] - !up, layer, l->add)
+                || !gs4i_is_earlier(f, a, between, c, nearest[k] - up, layer, l->two))
+                continue;
+            l->slope = a;
+            count++;
+            break;
+        }
+    }
+    return count;
+}
+
+/* Lines for a face that has no two in a line before it. */
+static int gs4i_other_lines(const gs4i_staggered *f, int c, const int at[3], int layer,
+                            gs4i_face_line lines[GS4I_FACE_LINES])
+{
+    const int beside = gs4i_lines_beside(f, c, at, layer, lines);
+    return beside ? beside : gs4i_lines_of_shear(f, c, at, layer, lines);
+}
+
+/* u of a face beyond by those; 0 where there are none. */
 static int gs4i_extrapolate_beside(const gs4i_staggered_pass *pass, int c, const int at[3],
                                    size_t i)
 {
     gs4i_staggered *f = &pass->sim->staggered;
     gs4i_face_line lines[GS4I_FACE_LINES];
-    const int count = gs4i_lines_beside(f, c, at, pass->layer, lines);
+    const int count = gs4i_other_lines(f, c, at, pass->layer, lines);
     gs4_real *u = f->taken[c], sum[4] = { 0, 0, 0, 0 };
     int n, k;
     for (n = 0; n < count; n++) {
         const gs4i_face_line *l = lines + n;
-        const size_t one = gs4i_box_index(&f->box, 1 << c, l->one[0], l->one[1], l->one[2]),
-                     add = gs4i_box_index(&f->box, 1 << c, l->add[0], l->add[1], l->add[2]),
-                     two = gs4i_box_index(&f->box, 1 << c, l->two[0], l->two[1], l->two[2]);
-        for (k = 0; k < pass->numbers; k++)
-            sum[k] += u[4 * one + (size_t)k] + (u[4 * add + (size_t)k] - u[4 * two + (size_t)k]);
+        const int e = 1 << l->slope;
+        const gs4_real *one =
+                           u + 4 * gs4i_box_index(&f->box, 1 << c, l->one[0], l->one[1], l->one[2]),
+                       *v = f->taken[l->slope],
+                       *add = v + 4 * gs4i_box_index(&f->box, e, l->add[0], l->add[1], l->add[2]),
+                       *two = v + 4 * gs4i_box_index(&f->box, e, l->two[0], l->two[1], l->two[2]);
+        for (k = 0; k < pass->numbers; k++) sum[k] += one[k] + (add[k] - two[k]);
     }
     for (k = 0; k < pass->numbers && count; k++) u[4 * i + (size_t)k] = sum[k] / GS4I_C(count);
     return count;
 }
 
 /* An unknown face of axis c beside known ones: 2 u1 - u2 along the directions with two; else, with
- * solids, which rigid motion must not strain, by lines beside; else the mean of those with one. */
+ * solids, which rigid motion must not strain, by other lines, if need be in a later layer; else the
+ * mean of those with one. */
 GS4I_INLINE void gs4i_extrapolate_face(const gs4i_staggered_pass *pass, int c, const int at[3],
                                        const ptrdiff_t step[3], size_t i)
 {
@@ -19324,9 +19364,11 @@ GS4I_INLINE void gs4i_extrapolate_face(const gs4i_staggered_pass *pass, int c, c
         twos++;
     }
     if (!ones) return;
-    if (twos || !f->is_fitted || !gs4i_extrapolate_beside(pass, c, at, i))
+    if (twos || !f->is_fitted || !gs4i_extrapolate_beside(pass, c, at, i)) {
+        if (!twos && f->is_fitted && pass->layer + 1 < GS4I_FACE_LAYER + f->layers) return;
         for (k = 0; k < pass->numbers; k++)
             u[4 * i + (size_t)k] = twos ? two[k] / GS4I_C(twos) : one[k] / GS4I_C(ones);
+    }
     f->known[c][i] = (uint8_t)pass->layer;
 }
 
@@ -19545,10 +19587,11 @@ static int gs4i_lines_of_face(const gs4i_staggered *f, int c, const int at[3], i
                 || (linear && !gs4i_is_earlier(f, c, l->one, a, d, layer, l->two)))
                 continue;
             memcpy(l->add, l->one, sizeof l->one);
+            l->slope = c;
             if (!linear) l->add[0] = -1;
             count++;
         }
-        if (!count && f->is_fitted) count = gs4i_lines_beside(f, c, at, layer, lines);
+        if (!count && f->is_fitted) count = gs4i_other_lines(f, c, at, layer, lines);
     }
     return count;
 }
@@ -19572,8 +19615,8 @@ static int gs4i_number_face(gs4_sim *sim, int c, const int at[3], int32_t *numbe
     for (n = 0; n < count; n++) {
         GS4I_TRY(gs4i_number_face(sim, c, lines[n].one, &of[n].one));
         if (lines[n].add[0] < 0) continue;
-        GS4I_TRY(gs4i_number_face(sim, c, lines[n].add, &of[n].add));
-        GS4I_TRY(gs4i_number_face(sim, c, lines[n].two, &of[n].two));
+        GS4I_TRY(gs4i_number_face(sim, lines[n].slope, lines[n].add, &of[n].add));
+        GS4I_TRY(gs4i_number_face(sim, lines[n].slope, lines[n].two, &of[n].two));
     }
     for (n = 0; n < count; n++) {
         list = (gs4i_fitted_line *)gs4i_next_fitted(sim, &fit->lines, fit->line_count + n,
@@ -30578,6 +30621,6 @@ GS4_API GS4I_COLD int gs4_estimate(const gs4_sim *sim, gs4_scheme scheme, gs4_in
  * Implicit schemes: solids that reach an open wall do not fall there by themselves; a step that
  * starts rates anew strains solids by what it says. Semi-implicit: elastic liquids that relax
  * within a step gain no energy beside thin ones, whatever the member; liquids in scenes with solids
- * have their viscosity once, solves beside stiff solids and of plates of one cell converge, and
- * stiff solids turn without loss.
+ * have their viscosity once, solves beside stiff solids and of plates of 1.5 cells converge, and
+ * stiff cubes and plates turn without loss.
  * gs4_estimate. */

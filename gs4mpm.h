@@ -12189,6 +12189,8 @@ typedef struct gs4i_report {
     uint64_t rows;     /* of the tile that its particles touch */
     int bad;           /* GS4I_BAD_*: a particle cannot be trusted */
     uint32_t bad_id;
+    /* sums of m |v - v_n - dt a_n|^2, m |v_n|^2, m |dt a_n|^2 and m: see gs4i_was_impact */
+    double unforeseen, moved, foreseen, mass;
 } gs4i_report;
 
 enum {
@@ -12228,6 +12230,10 @@ static void gs4i_report_merge(gs4i_report *into, const gs4i_report *r)
     into->substeps += r->substeps;
     into->left_tile += r->left_tile;
     into->left += r->left;
+    into->unforeseen += r->unforeseen;
+    into->moved += r->moved;
+    into->foreseen += r->foreseen;
+    into->mass += r->mass;
     if (r->bad && !into->bad) {
         into->bad = r->bad;
         into->bad_id = r->bad_id;
@@ -21372,6 +21378,29 @@ static void gs4i_take_rates(const gs4i_taken_tiles *t, const gs4i_rate_tiles *ra
     }
 }
 
+/* What the change of velocity in a step has that the rate did not foresee, for gs4i_was_impact. */
+static void gs4i_see_surprise(gs4i_report *r, const gs4i_batch *before, const gs4i_batch *q,
+                              const gs4_real *masses, int n, double dt)
+{
+    int b, c;
+    for (b = 0; b < n; b++) {
+        double unforeseen = 0, moved = 0, foreseen = 0;
+        const double m = (double)masses[4 * b + 3];
+        for (c = 0; c < 3; c++) {
+            const double v = (double)GS4I_NTH_CONST(before->v[c], b),
+                         change = dt * (double)GS4I_NTH_CONST(before->a[c], b),
+                         more = (double)GS4I_NTH_CONST(q->v[c], b) - v - change;
+            unforeseen += more * more;
+            moved += v * v;
+            foreseen += change * change;
+        }
+        r->unforeseen += m * unforeseen;
+        r->moved += m * moved;
+        r->foreseen += m * foreseen;
+        r->mass += m;
+    }
+}
+
 /* Velocity by rule (4), with decay of what the grid does not see, implicit in itself; position with
  * the grid's velocity, and where volume wants it; J by the divergence. */
 static void gs4i_correct_by_faces(gs4i_integrator r, const gs4i_face_corrections *k, gs4i_batch *q)
@@ -21422,12 +21451,13 @@ static void gs4i_correct_from_faces(int index, void *context)
     if (heat) gs4i_load_heat_tiles(sim, o, heat);
     for (; i < end; i += GS4I_BATCH) {
         const int n = gs4i_batch_size(i, end);
-        gs4i_batch q;
+        gs4i_batch q, before;
         gs4i_stencils s[4];
         gs4i_gathered slope;
         gs4i_face_corrections k;
         gs4i_stored out;
         gs4i_stage_faces(sim, &frame, i, n, &q, s);
+        before = q;
         gs4i_gather_from_faces(sim, &tiles, &q, n, s, &slope, &k);
         if (p.deformation_reals) gs4i_leave_solids(sim, i, n, k.shift);
         gs4i_correct_by_faces(integrator, &k, &q);
@@ -21438,6 +21468,7 @@ static void gs4i_correct_from_faces(int index, void *context)
             continue;
         }
         if (heat) gs4i_gather_heat(&r, &s[0], k.L, heat);
+        gs4i_see_surprise(report, &before, &q, p.position + 4 * i, n, (double)integrator.dt);
         gs4i_pack_batch(&q, 1, &out);
         gs4i_correct_contact(sim, o, NULL, i, n, &out, &slope, report);
         gs4i_see_motion(&r.seen, q.v, k.L);
@@ -24637,6 +24668,7 @@ static gs4i_integrator gs4i_make_integrator(const gs4_sim *sim, gs4_real dt)
     if (k.restart && sim->desc.integrator == GS4_INTEGRATOR_GS4)
         k.impact /= 1 + k.alpha_m - k.gamma;
     if (k.restart) gs4i_family(&k, r, s, 1);
+    if (sim->restart == 2) k.alpha_f = 1;
     k.inertia = 1;
     if (sim->desc.scheme == GS4_SEMI_IMPLICIT && !sim->particles.deformation_reals)
         gs4i_damp_creeping(&k, gs4i_viscous_number(sim, dt) / 16);
@@ -24797,12 +24829,26 @@ static int gs4i_check_stage(gs4_sim *sim)
 /* A particle takes about 1 ms with so many, a thousand times what it takes else. */
 #define GS4I_MANY_SUBSTEPS 1000
 
+/* Did a step change velocity by what its rate did not foresee at all? */
+static int gs4i_was_impact(const gs4_sim *sim, const gs4i_report *r)
+{
+    const double dt = (double)sim->integrator.dt, g = dt * (double)gs4i_length(sim->desc.gravity),
+                 most = fmax(fmax(r->moved, r->foreseen), r->mass * g * g);
+    static double th = -1; static int dbg = 0, inres = 0;
+    if (th < 0) { th = getenv("TH") ? atof(getenv("TH")) : .5; dbg = getenv("DBG") ? atoi(getenv("DBG")) : 0; inres = getenv("INRES") != NULL; }
+    if (sim->desc.scheme != GS4_SEMI_IMPLICIT || sim->desc.integrator != GS4_INTEGRATOR_GS4) return 0;
+    if (dbg && (dbg > 1 || (!sim->integrator.restart && r->unforeseen > .09 * most))) printf("S step %d restart %d: S %.3e moved %.3e dt r %.3e ratio %.4f\n", (int)sim->steps, sim->integrator.restart, sqrt(r->unforeseen/r->mass), sqrt(r->moved/r->mass), sqrt(r->foreseen/r->mass), sqrt(r->unforeseen/(most+1e-300)));
+    return (inres || !sim->integrator.restart) && r->unforeseen > th * th * most;
+}
+
 /* S8: colliders move, emitters give, what left the domain goes. */
 static void gs4i_finish(gs4_sim *sim)
 {
     const double dt = (double)sim->integrator.dt;
+    int impact = 0;
     if (sim->particles.count) {
         gs4i_report r = gs4i_all_reports(sim);
+        impact = gs4i_was_impact(sim, &r);
         r.max_speed = GS4I_SQRT(r.max_speed);
         r.max_gradient = GS4I_SQRT(r.max_gradient);
         if (!sim->staggered.is_viscous) r.min_viscosity = 0; /* nothing asked for it */
@@ -24822,6 +24868,7 @@ static void gs4i_finish(gs4_sim *sim)
     sim->last_dt = dt;
     sim->steps++;
     sim->restart = 0;
+    if (impact) { int stale = sim->limits_stale; gs4i_restart(sim); sim->restart = 2; sim->limits_stale = stale; }
     sim->shift = sim->integrator.next_shift;
     gs4i_emit(sim);
     if (sim->bad_distance)

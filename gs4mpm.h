@@ -12189,7 +12189,8 @@ typedef struct gs4i_report {
     uint64_t rows;     /* of the tile that its particles touch */
     int bad;           /* GS4I_BAD_*: a particle cannot be trusted */
     uint32_t bad_id;
-    /* sums of m |v - v_n - dt a_n|^2, m |v_n|^2, m |dt a_n|^2 and m: see gs4i_was_impact */
+    /* sums of m |v_n+1 - v_n - dt r_n|^2, m |v_n|^2, m |dt r_n|^2, kg m^2/s^2, and of m, kg, by
+     * gs4i_see_surprise */
     double unforeseen, moved, foreseen, mass;
 } gs4i_report;
 
@@ -14641,6 +14642,12 @@ typedef enum gs4i_clock {
     GS4I_CLOCKS
 } gs4i_clock;
 
+/* Values of `restart` beside 0. After an impact the first step damps: it is backward Euler's. */
+enum {
+    GS4I_RESTART = 1,
+    GS4I_RESTART_DAMPED
+};
+
 struct gs4_sim {
     gs4_sim_desc desc;
     gs4i_memory memory;
@@ -14670,7 +14677,7 @@ struct gs4_sim {
     gs4_real top_speed;
     gs4_real shift; /* of the rates of positions, left by the last step */
     /* start rates anew; sort before the next step; `limits` are out of date */
-    int restart, needs_sort, limits_stale;
+    int restart /* GS4I_RESTART, GS4I_RESTART_DAMPED */, needs_sort, limits_stale;
     /* stable dt by what the stage of the last step saw; 0: it did not get there */
     gs4_real stage_limit;
     /* particles were edited by hand: check them; velocities too: find the spin of solids */
@@ -21378,29 +21385,6 @@ static void gs4i_take_rates(const gs4i_taken_tiles *t, const gs4i_rate_tiles *ra
     }
 }
 
-/* What the change of velocity in a step has that the rate did not foresee, for gs4i_was_impact. */
-static void gs4i_see_surprise(gs4i_report *r, const gs4i_batch *before, const gs4i_batch *q,
-                              const gs4_real *masses, int n, double dt)
-{
-    int b, c;
-    for (b = 0; b < n; b++) {
-        double unforeseen = 0, moved = 0, foreseen = 0;
-        const double m = (double)masses[4 * b + 3];
-        for (c = 0; c < 3; c++) {
-            const double v = (double)GS4I_NTH_CONST(before->v[c], b),
-                         change = dt * (double)GS4I_NTH_CONST(before->a[c], b),
-                         more = (double)GS4I_NTH_CONST(q->v[c], b) - v - change;
-            unforeseen += more * more;
-            moved += v * v;
-            foreseen += change * change;
-        }
-        r->unforeseen += m * unforeseen;
-        r->moved += m * moved;
-        r->foreseen += m * foreseen;
-        r->mass += m;
-    }
-}
-
 /* Velocity by rule (4), with decay of what the grid does not see, implicit in itself; position with
  * the grid's velocity, and where volume wants it; J by the divergence. */
 static void gs4i_correct_by_faces(gs4i_integrator r, const gs4i_face_corrections *k, gs4i_batch *q)
@@ -21429,6 +21413,31 @@ static void gs4i_correct_by_faces(gs4i_integrator r, const gs4i_face_corrections
     }
 }
 
+/* What the change of velocity has that the rate before did not foresee: see gs4i_was_impact. */
+static void gs4i_see_surprise(const gs4i_batch *before, const gs4i_batch *q, const gs4_real *mass,
+                              int n, double dt, gs4i_report *r)
+{
+    int b, c;
+    for (b = 0; b < n; b++) {
+        const double m = (double)mass[4 * b + 3];
+        for (c = 0; c < 3; c++) {
+            const double v = (double)GS4I_NTH_CONST(before->v[c], b),
+                         change = dt * (double)GS4I_NTH_CONST(before->a[c], b),
+                         more = (double)GS4I_NTH_CONST(q->v[c], b) - v - change;
+            r->unforeseen += m * more * more;
+            r->moved += m * v * v;
+            r->foreseen += m * change * change;
+        }
+        r->mass += m;
+    }
+}
+
+/* Only the semi-implicit scheme has steps that a stiff material lands in, and only GS4 rates. */
+static int gs4i_has_impacts(const gs4_sim *sim)
+{
+    return sim->desc.scheme == GS4_SEMI_IMPLICIT && sim->desc.integrator == GS4_INTEGRATOR_GS4;
+}
+
 static void gs4i_correct_from_faces(int index, void *context)
 {
     const gs4i_pass *pass = (const gs4i_pass *)context;
@@ -21437,7 +21446,8 @@ static void gs4i_correct_from_faces(int index, void *context)
     const gs4i_particles p = sim->particles;
     gs4i_heat_pass heat_pass, *heat = p.with_heat ? &heat_pass : NULL;
     const gs4i_integrator integrator = sim->integrator;
-    const int o = pass->blocks[index], with_rates = gs4i_has_known_stress(sim);
+    const int o = pass->blocks[index], with_rates = gs4i_has_known_stress(sim),
+              with_impacts = pass->commit && gs4i_has_impacts(sim);
     gs4i_report *report = &sim->reports[o];
     const gs4i_frame frame = gs4i_tile_frame(g, g->occupied_block[o]);
     gs4i_taken_tiles tiles;
@@ -21457,10 +21467,12 @@ static void gs4i_correct_from_faces(int index, void *context)
         gs4i_face_corrections k;
         gs4i_stored out;
         gs4i_stage_faces(sim, &frame, i, n, &q, s);
-        before = q;
         gs4i_gather_from_faces(sim, &tiles, &q, n, s, &slope, &k);
         if (p.deformation_reals) gs4i_leave_solids(sim, i, n, k.shift);
+        if (with_impacts) before = q;
         gs4i_correct_by_faces(integrator, &k, &q);
+        if (with_impacts)
+            gs4i_see_surprise(&before, &q, p.position + 4 * i, n, (double)integrator.dt, report);
         if (with_rates) gs4i_take_rates(&tiles, &rates, n, s, k.div, k.L);
         gs4i_advance_response(&r, i, n, k.L, NULL, q.v[3], pass->commit);
         if (!pass->commit) {
@@ -21468,7 +21480,6 @@ static void gs4i_correct_from_faces(int index, void *context)
             continue;
         }
         if (heat) gs4i_gather_heat(&r, &s[0], k.L, heat);
-        gs4i_see_surprise(report, &before, &q, p.position + 4 * i, n, (double)integrator.dt);
         gs4i_pack_batch(&q, 1, &out);
         gs4i_correct_contact(sim, o, NULL, i, n, &out, &slope, report);
         gs4i_see_motion(&r.seen, q.v, k.L);
@@ -23465,7 +23476,8 @@ static void gs4i_restart(gs4_sim *sim)
             memset(p->deformation + (size_t)p->deformation_reals * i + 21, 0,
                    3 * sizeof *p->deformation);
     }
-    sim->restart = sim->needs_sort = sim->limits_stale = 1;
+    sim->restart = GS4I_RESTART;
+    sim->needs_sort = sim->limits_stale = 1;
 }
 
 /* Particles of `mass` (kg) at xyz, which turn about `centre`. How many, or an error. */
@@ -24668,7 +24680,7 @@ static gs4i_integrator gs4i_make_integrator(const gs4_sim *sim, gs4_real dt)
     if (k.restart && sim->desc.integrator == GS4_INTEGRATOR_GS4)
         k.impact /= 1 + k.alpha_m - k.gamma;
     if (k.restart) gs4i_family(&k, r, s, 1);
-    if (sim->restart == 2) k.alpha_f = 1;
+    if (sim->restart == GS4I_RESTART_DAMPED) k.alpha_f = 1;
     k.inertia = 1;
     if (sim->desc.scheme == GS4_SEMI_IMPLICIT && !sim->particles.deformation_reals)
         gs4i_damp_creeping(&k, gs4i_viscous_number(sim, dt) / 16);
@@ -24829,16 +24841,28 @@ static int gs4i_check_stage(gs4_sim *sim)
 /* A particle takes about 1 ms with so many, a thousand times what it takes else. */
 #define GS4I_MANY_SUBSTEPS 1000
 
-/* Did a step change velocity by what its rate did not foresee at all? */
+/* Was there an impact? By (4) a rate goes on to work, before r in the next step, so of an impulse
+ * that stops all at once (0, 0) gives back a third, and a half in all. As nonsmooth generalized
+ * alpha has it (Chen, Acary, Virlez & Bruls 2013) an impulse has no part in rates: after a step
+ * whose change of velocity was by half of what moved other than its rate said, they start anew.
+ * Smooth motion of angular frequency w is other by (w dt)^2, a fall that begins or ends by g dt. A
+ * first step, which has no rate yet, has no say. */
 static int gs4i_was_impact(const gs4_sim *sim, const gs4i_report *r)
 {
-    const double dt = (double)sim->integrator.dt, g = dt * (double)gs4i_length(sim->desc.gravity),
-                 most = fmax(fmax(r->moved, r->foreseen), r->mass * g * g);
-    static double th = -1; static int dbg = 0, inres = 0;
-    if (th < 0) { th = getenv("TH") ? atof(getenv("TH")) : .5; dbg = getenv("DBG") ? atoi(getenv("DBG")) : 0; inres = getenv("INRES") != NULL; }
-    if (sim->desc.scheme != GS4_SEMI_IMPLICIT || sim->desc.integrator != GS4_INTEGRATOR_GS4) return 0;
-    if (dbg && (dbg > 1 || (!sim->integrator.restart && r->unforeseen > .09 * most))) printf("S step %d restart %d: S %.3e moved %.3e dt r %.3e ratio %.4f\n", (int)sim->steps, sim->integrator.restart, sqrt(r->unforeseen/r->mass), sqrt(r->moved/r->mass), sqrt(r->foreseen/r->mass), sqrt(r->unforeseen/(most+1e-300)));
-    return (inres || !sim->integrator.restart) && r->unforeseen > th * th * most;
+    const double fall = (double)sim->integrator.dt * (double)gs4i_length(sim->desc.gravity),
+                 most = fmax(0.25 * fmax(r->moved, r->foreseen), r->mass * fall * fall);
+    if (!gs4i_has_impacts(sim)) return 0;
+    if (sim->integrator.restart && sim->restart != GS4I_RESTART_DAMPED) return 0;
+    return r->unforeseen > most;
+}
+
+/* Speed and extremes are those of the step: `limits` stay good. */
+static void gs4i_restart_damped(gs4_sim *sim)
+{
+    const int stale = sim->limits_stale;
+    gs4i_restart(sim);
+    sim->limits_stale = stale;
+    sim->restart = GS4I_RESTART_DAMPED;
 }
 
 /* S8: colliders move, emitters give, what left the domain goes. */
@@ -24849,6 +24873,7 @@ static void gs4i_finish(gs4_sim *sim)
     if (sim->particles.count) {
         gs4i_report r = gs4i_all_reports(sim);
         impact = gs4i_was_impact(sim, &r);
+        r.unforeseen = r.moved = r.foreseen = r.mass = 0;
         r.max_speed = GS4I_SQRT(r.max_speed);
         r.max_gradient = GS4I_SQRT(r.max_gradient);
         if (!sim->staggered.is_viscous) r.min_viscosity = 0; /* nothing asked for it */
@@ -24868,7 +24893,7 @@ static void gs4i_finish(gs4_sim *sim)
     sim->last_dt = dt;
     sim->steps++;
     sim->restart = 0;
-    if (impact) { int stale = sim->limits_stale; gs4i_restart(sim); sim->restart = 2; sim->limits_stale = stale; }
+    if (impact) gs4i_restart_damped(sim);
     sim->shift = sim->integrator.next_shift;
     gs4i_emit(sim);
     if (sim->bad_distance)
@@ -25683,7 +25708,8 @@ static int gs4i_head_is_sound(const gs4i_head *h)
     int i, sound = 1;
     for (i = 0; i < 6; i++) sound &= times[i] >= 0 && times[i] <= (double)GS4I_HUGE;
     for (i = 0; i < 9; i++) sound &= limits[i] >= 0 && gs4i_finite(limits[i]);
-    return sound && (h->restart | h->needs_sort | h->limits_stale | h->needs_spin) >> 1 == 0
+    return sound && h->restart >= 0 && h->restart <= GS4I_RESTART_DAMPED
+           && (h->needs_sort | h->limits_stale | h->needs_spin) >> 1 == 0
            && (h->min_mass > 0 || h->particles == 0) && h->max_mass >= h->min_mass;
 }
 
@@ -27996,7 +28022,8 @@ static int gs4i_init(gs4_sim *sim)
     sim->particles.with_subgrid =
         sim->particles.with_rates && d->scheme == GS4_EXPLICIT && gs4i_finite(d->flip_decay_time);
 
-    sim->restart = sim->needs_sort = sim->limits_stale = 1;
+    sim->restart = GS4I_RESTART;
+    sim->needs_sort = sim->limits_stale = 1;
     g->table = (int32_t *)gs4i_alloc(&sim->memory, g->table_count, sizeof *g->table);
     if (!g->table) {
         const double bytes = (double)g->table_count * sizeof *g->table;

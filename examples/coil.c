@@ -1,12 +1,19 @@
-/* coil.c - a thick rope of liquid falls on a plate: Newtonian, Oldroyd-B, Pom-Pom.
+/* coil.c - a rope of liquid falls on a plate: Newtonian, Oldroyd-B, Pom-Pom; and on a post.
  *     cc -O3 -march=native examples/coil.c -Iexamples -I. -lm -lpthread -o coil
  *     ./coil --row 1          Newtonian; --row 2: Oldroyd-B; --row 3: Pom-Pom; pictures in out/
- *     ./coil --scheme semi-implicit     no step by viscosity or sound
+ *     ./coil --row 4          cold honey stacks columns that lean and sink; semi-implicit
+ *     ./coil --scheme semi-implicit     rows 1 to 3: no step by viscosity or sound
  *
- * The materials are those of the GS4 paper (table 4, coiling 1 to 3; figure 2); 61.25 Pa s are
- * local in all three. The scene is that of pour_honey.c, four times as large: the paper names no
- * lengths and no density. Row 1 coils fast and narrowly, and the coils melt into the heap. In
- * rows 2 and 3 the rope is elastic for 12 s (245 Pa): it lies down in wide loops that stay. */
+ * The materials of rows 1 to 3 are those of the GS4 paper (table 4, coiling 1 to 3; figure 2);
+ * 61.25 Pa s are local in all three. The scene is that of pour_honey.c, four times as large: the
+ * paper names no lengths and no density. Row 1 coils fast and narrowly, and the coils melt into
+ * the heap. In rows 2 and 3 the rope is elastic for 12 s (245 Pa): it lies down in wide loops that
+ * stay. With the semi-implicit scheme the ropes of rows 2 and 3 get too thin for these cells and
+ * crumble from 1.3 s on.
+ *     Row 4 is a rope of 4 mm, 24.5 Pa s, that comes at 0.7 m/s on a post 1 cm wide, for a second.
+ * It folds to a tower within 0.2 s, which falls. Then turns stack to a column of three to five, two
+ * ropes wide, that leans and sinks into the heap (0.5 to 0.6 s), and another stands on it. The
+ * heap runs over the post. It takes 2 minutes of processor time. */
 #include "example.h"
 
 typedef struct coil_scene { /* lengths in m, speed in m/s, frame time in s */
@@ -21,7 +28,7 @@ int main(int argc, char **argv)
     const float colours[4][3] = { { 0.93f, 0.60f, 0.10f },
                                   { 0.36f, 0.62f, 0.85f },
                                   { 0.90f, 0.50f, 0.62f },
-                                  { 0.95f, 0.90f, 0.80f } };
+                                  { 0.95f, 0.66f, 0.22f } };
     const coil_scene *c = &plate;
     example e = { 0 };
     gs4_sim_desc desc = { 0 };
@@ -44,7 +51,7 @@ int main(int argc, char **argv)
         }
     e.frame_time = c->frame_time;
     example_options(&e, argc, argv);
-    size = (float)(c->height / plate.height);
+    size = (float)((c == &post ? 0.75 : 1) * c->height / plate.height);
     thick = (c == &post ? 1 : 0.625) * c->below;
     mouth = c == &post ? 0.002 : 0.024;
 

@@ -51,7 +51,7 @@ int main(int argc, char **argv)
         }
     e.frame_time = c->frame_time;
     example_options(&e, argc, argv);
-    size = (float)((c == &post ? 0.75 : 1) * c->height / plate.height);
+    size = (float)((c == &post ? 0.85 : 1) * c->height / plate.height);
     thick = (c == &post ? 1 : 0.625) * c->below;
     mouth = c == &post ? 0.002 : 0.024;
 
@@ -106,7 +106,7 @@ int main(int argc, char **argv)
     e.look.eye[0] = 0.13f * size;
     e.look.eye[1] = 0.30f * size;
     e.look.eye[2] = 0.66f * size;
-    e.look.target[1] = c == &post ? 0.023f : 0.113f;
+    e.look.target[1] = c == &post ? 0.021f : 0.113f;
     e.look.width = 480;
     e.look.height = 540;
     e.look.palette = &colours[e.row - 1];

@@ -343,84 +343,6 @@ static void test_semi_coiling_gravity(void)
     }
 }
 
-/* The highest level, in whole cells of 1, at which there is more than 1.8 times the rope. */
-static int coil_top(const gs4_sim *sim, int down, double across, int levels)
-{
-    const gs4_view x = gs4_particles(sim, GS4_FIELD_POSITION);
-    const double volume = gs4_get_stats(sim).mass / (1000.0 * x.count);
-    double area[100] = { 0 };
-    int i, top = levels - 1;
-    CHECK(levels <= 100);
-    for (i = 0; i < x.count; i++) {
-        const int z = (int)(double)x.data[(size_t)i * (size_t)x.stride + down];
-        if (z >= 0 && z < levels) area[z] += volume;
-    }
-    while (top > 0 && area[top] < 1.8 * 0.25 * 3.14159 * across * across) top--;
-    return top + 1;
-}
-
-/* Turns of a thick rope stack to a column on a post, which sinks under its weight. At the depth z
- * in a column of the section A it shortens at the rate g z/(3 nu), the whole of the height L by
- * g L^2/(6 nu), and Q/A is what it grows by: L^2 = 6 nu Q/(g A). A is that of the disc within the
- * turns, of the radius U/Omega + d/2: both of the rope where it lies, Omega as measured. The foot
- * is the rim of the post, over which it runs and is taken away; it is narrower than the turns and
- * the column bulges there, so that it stands a little lower than the law. The rope's first folds
- * are a tower that falls: by more than two diameters, no faster than what begins with the speed of
- * the rope and falls, no slower than 3 nu/(g L), the time of sinking of a tower of the height L. */
-static void test_semi_column(void)
-{
-    enum {
-        PIECES = 240,
-        FROM = 110
-    };
-    const double pi = 3.14159265358979, across = 4, post = 6, H = 48, g = 0.02, nu = 25;
-    const double flux = pi * across * across / 4, piece = 2;
-    const coil_rope rope = { 1, across, post + H, 2, 1, nu, g, 9 };
-    gs4_sim *sim = coil_make(&rope, 1);
-    gs4_collider foot;
-    double angle = 0, turned = 0, mean = 0, tower = 0, low = H, tower_at = 0, low_at = 0;
-    double speed, section, law;
-    int i;
-    memset(&foot, 0, sizeof foot);
-    foot.contact = GS4_WALL_STICK;
-    foot.shape = gs4_cylinder(at(0, -3, 0), at(0, post, 0), 5);
-    CHECK(gs4_add_collider(sim, &foot) >= 0);
-    for (i = 1; i <= PIECES; i++) {
-        const int result = gs4_advance(sim, (gs4_real)piece);
-        double top, now;
-        CHECK_RESULT(sim, result, GS4_OK);
-        if (result != GS4_OK) break;
-        top = coil_top(sim, 1, across, (int)(post + H)) - post;
-        now = coil_angle(sim, 1, 2 * (top + post + across), angle);
-        if (i > FROM) {
-            turned += remainder(now - angle, 2 * pi);
-            mean += top / (PIECES - FROM);
-        } else if (top > tower) {
-            tower = low = top;
-            tower_at = i * piece;
-        } else if (top < low) {
-            low = top;
-            low_at = i * piece;
-        }
-        angle = now;
-        if (i % 10 == 0) coil_clear(sim, 1, across, i * piece + 2, 0);
-    }
-    turned = fabs(turned) / ((PIECES - FROM) * piece);
-    speed = coil_stretch(g, nu, H - mean);
-    section = pi * pow(speed / turned + 0.5 * across / sqrt(speed), 2);
-    law = sqrt(6 * nu * flux / (g * section));
-    if (test_filter[0])
-        printf("tower %g at %g s, %g at %g s; %.2f turns, column %.2f of %.2f, %d steps\n", tower,
-               tower_at, low, low_at, turned * (PIECES - FROM) * piece / (2 * pi), mean, law,
-               (int)gs4_get_stats(sim).steps);
-    CHECK(tower - low > 2 * across);
-    CHECK_BETWEEN(low_at - tower_at, (sqrt(1 + 2 * g * (tower - low)) - 1) / g,
-                  3 * nu / (g * tower));
-    CHECK(mean > 3 * across); /* turns that lie on each other */
-    CHECK_BETWEEN(mean / law, 0.8, 1.1);
-    gs4_destroy(sim);
-}
-
 /* --- a sheet that folds ----------------------------------------------------------------------- */
 
 enum {
@@ -722,6 +644,5 @@ static void run_semi_long(void)
     RUN_FULL_ONCE(test_semi_thread);
     RUN_SLOW(test_semi_coiling);
     RUN_SLOW(test_semi_coiling_gravity);
-    RUN_SLOW(test_semi_column);
     RUN_SLOW(test_semi_folding);
 }

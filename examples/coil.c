@@ -1,19 +1,19 @@
 /* coil.c - a rope of liquid falls on a plate: Newtonian, Oldroyd-B, Pom-Pom; and on a post.
  *     cc -O3 -march=native examples/coil.c -Iexamples -I. -lm -lpthread -o coil
  *     ./coil --row 1          Newtonian; --row 2: Oldroyd-B; --row 3: Pom-Pom; pictures in out/
- *     ./coil --row 4          cold honey stacks columns that lean and sink; semi-implicit
+ *     ./coil --row 4          cold honey on a post, semi-implicit: columns that lean, sink, stand
  *     ./coil --scheme semi-implicit     rows 1 to 3: no step by viscosity or sound
  *
  * The materials of rows 1 to 3 are those of the GS4 paper (table 4, coiling 1 to 3; figure 2);
  * 61.25 Pa s are local in all three. The scene is that of pour_honey.c, four times as large: the
  * paper names no lengths and no density. Row 1 coils fast and narrowly, and the coils melt into
- * the heap. In rows 2 and 3 the rope is elastic for 12 s (245 Pa): it lies down in wide loops that
- * stay. With the semi-implicit scheme the ropes of rows 2 and 3 get too thin for these cells and
- * crumble from 1.3 s on.
+ * the heap. In rows 2 and 3 the rope is elastic for 12 s (245 Pa) and lies down in wide loops. With
+ * the semi-implicit scheme the rope of row 2 frays for a time, nearly to breaking, from 1.4 s on.
  *     Row 4 is a rope of 4 mm, 24.5 Pa s, that comes at 0.7 m/s on a post 1 cm wide, for a second.
- * It folds to a tower by 0.18 s, which falls. Then turns stack to a column of three or four, four
- * ropes wide, that leans and sinks into the heap (0.45 to 0.6 s), and another of four or five turns
- * grows on it until 1 s. The heap runs over the post. It takes 2 minutes of processor time. */
+ * Its first folds make a tower by 0.2 s. Turns stack on that, three or four, while it leans and
+ * sinks to a heap that runs over the post, until 0.6 s. From then on turns stack to one column, of
+ * four or five that can be told apart, which still stands at the end: it does not fall again and
+ * again, as the secondary coiling of the paper does. It takes 2 minutes of processor time. */
 #include "example.h"
 
 typedef struct coil_scene { /* lengths in m, speed in m/s, frame time in s */

@@ -6648,11 +6648,11 @@ static int gs4i_elliptic_solve(gs4i_elliptic *e, const gs4_sim_desc *desc)
  *
  * FILL. A law stands for the stress of particles; what preconditions it must not resist less. A
  * plate one cell thick has no edge but those at its surfaces, without a row, so nothing would hold
- * it against bending: eigenvalues of the product with the preconditioner were up to 1200, and it did
- * not converge. So with a law a row counts what is filled of its cells; cells of air that material
- * reaches have rows, too, with the faces beyond, which have next to no mass: what is least of their
- * energy is left, as the cycle eliminates them. Eigenvalues are .02 to 7 then, but for two of 25.
- * What only reaches a wall is not held by it: cells of air have no rows with what is given.
+ * it against bending: eigenvalues of the product with the preconditioner were up to 1200, and no
+ * solve converged. So with a law a row counts what is filled of its cells; cells of air that
+ * material reaches have rows, too, with the faces beyond, which have next to no mass: what is least
+ * of their energy is left, as the cycle eliminates them. Eigenvalues are .02 to 7 then, but for two
+ * of 25. What only reaches a wall is not held by it: cells of air have no rows with what is given.
  *
  * Larionov, Batty & Bridson 2017. */
 

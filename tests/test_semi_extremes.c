@@ -183,6 +183,7 @@ static double semi_extremes_land(const gs4_material *m, gs4_integrator how, int 
     low[n] = 0.4;
     u[n] = -1;
     d.integrator = how;
+    if (sizeof(gs4_real) == 8) d.solver_tolerance = (gs4_real)1e-8; /* 1e-10 is its rounding */
     d.walls[2 * n] = (gs4_wall)n;
     f = scene_fill(at(u[0], u[1], u[2]));
     CHECK_RESULT(NULL, gs4_create(&d, &sim), GS4_OK);

@@ -6651,8 +6651,9 @@ static int gs4i_elliptic_solve(gs4i_elliptic *e, const gs4_sim_desc *desc)
  * it against bending: eigenvalues of the product with the preconditioner were up to 1200, and no
  * solve converged. So with a law a row counts what is filled of its cells; cells of air that
  * material reaches have rows, too, with the faces beyond, which have next to no mass: what is least
- * of their energy is left, as the cycle eliminates them. Eigenvalues are .02 to 7 then, but for two
- * of 25. What only reaches a wall is not held by it: cells of air have no rows with what is given.
+ * of their energy is left, as the cycle eliminates them. Eigenvalues are .02 to 10 then, but for
+ * two of 25 to 58. What only reaches a wall is not held by it: cells of air have no rows with what
+ * is given.
  *
  * Larionov, Batty & Bridson 2017. */
 
@@ -6860,7 +6861,7 @@ typedef struct gs4i_stokes_row {
     int coefficient[4]; /* signs included */
     gs4_real cut[2];    /* 1/t of each pair; 0: no surface lies between its faces */
     gs4_real fill;      /* n */
-    int cells;          /* a bit for each of its cells that is liquid */
+    int cells;          /* a bit for each of its cells that counts */
 } gs4i_stokes_row;
 
 /* How much of a cell has rows: of what is liquid 1, see FILL. */
@@ -21701,7 +21702,8 @@ static void gs4i_keep_tangents(gs4i_staggered *f, size_t i, int n, const gs4i_wi
     }
 }
 
-/* V/mu of the stage to cells, with the viscosity for grad v_i; and what is known of stress. */
+/* V/mu of the stage to cells, with the viscosity for grad v_i, or, as the law of particles adds up
+ * what is beside each other, with solids V mu; and what is known of stress. */
 static void gs4i_scatter_viscosity(int index, void *context)
 {
     const gs4i_pass *pass = (const gs4i_pass *)context;
@@ -21786,7 +21788,8 @@ static gs4_real gs4i_open_share_of_cell(const gs4i_staggered *f, size_t i)
     return gs4i_max(GS4I_C(0.01), gs4i_min(sides / 3, 1));
 }
 
-/* mu_c = V/(V/mu), before volumes become shares of cells, in what is open of a cell; means of q. */
+/* mu_c = V/(V/mu), with solids V mu/V, before volumes become shares of cells, in what is open of a
+ * cell; means of q. */
 static void gs4i_find_viscosities(int z, void *context)
 {
     const gs4i_staggered_pass *pass = (const gs4i_staggered_pass *)context;
@@ -21796,11 +21799,10 @@ static void gs4i_find_viscosities(int z, void *context)
     size_t i;
     if (z < f->box.size[2])
         GS4I_BOX_PLANE(&f->box, GS4I_AT_CELL, z, at, i) {
-            const gs4_real V = f->cell[4 * i + GS4I_CELL_FILL], resistance = f->viscosity[i];
-            f->viscosity[i] = resistance > 0 ? V / resistance : GS4I_C(0);
-            if (f->is_fitted && V > 0) f->viscosity[i] = resistance / V;
+            const gs4_real V = f->cell[4 * i + GS4I_CELL_FILL], sum = f->viscosity[i];
+            f->viscosity[i] = !(V > 0 && sum > 0) ? GS4I_C(0) : f->is_fitted ? sum / V : V / sum;
             f->viscosity[i] *= gs4i_open_share_of_cell(f, i);
-            for (a = 0; a < 3 && elastic; a++) f->normal[a][i] /= gs4i_max(resistance, GS4I_TINY);
+            for (a = 0; a < 3 && elastic; a++) f->normal[a][i] /= gs4i_max(sum, GS4I_TINY);
         }
     for (a = 0; a < 3 && elastic; a++)
         if (z < gs4i_box_length(&f->box, 7 ^ 1 << a, 2))

@@ -161,51 +161,24 @@ static void extremes_fill(extremes_draw *k)
     for (i = 0; i < k->bodies; i++) gs4_remove_particles(k->sim, body[i]);
 }
 
-/* Eigenvalues of a symmetric matrix xx yy zz xy xz yz, by Jacobi's turns. */
-static void extremes_eigenvalues(const double s[6], double value[3])
-{
-    double a[3][3];
-    int n, i, j, r;
-    for (i = 0; i < 3; i++)
-        for (j = 0; j < 3; j++) a[i][j] = s[i == j ? i : i + j + 2];
-    for (n = 0; n < 60; n++) {
-        const int p = n % 3 == 2, q = n % 3 ? 2 : 1;
-        const double t = 0.5 * atan2(2 * a[p][q], a[q][q] - a[p][p]), c = cos(t), d = sin(t);
-        for (r = 0; r < 3; r++) {
-            const double x = a[r][p], y = a[r][q];
-            a[r][p] = c * x - d * y;
-            a[r][q] = d * x + c * y;
-        }
-        for (r = 0; r < 3; r++) {
-            const double x = a[p][r], y = a[q][r];
-            a[p][r] = c * x - d * y;
-            a[q][r] = d * x + c * y;
-        }
-    }
-    for (i = 0; i < 3; i++) value[i] = a[i][i];
-}
-
 static double extremes_determinant(const gs4_real *F)
 {
-    double det = 0;
-    int c;
-    for (c = 0; c < 3; c++)
-        det += (double)F[c]
-               * ((double)F[3 + (c + 1) % 3] * (double)F[6 + (c + 2) % 3]
-                  - (double)F[3 + (c + 2) % 3] * (double)F[6 + (c + 1) % 3]);
-    return det;
+    double f[9];
+    int i;
+    for (i = 0; i < 9; i++) f[i] = (double)F[i];
+    return solid_determinant(f);
 }
 
 /* Eigenvalues of B = (det F)^(-2/3) F F^T: with J in its place rounding of F would be energy. */
 static void extremes_stretch(const gs4_real *F, double e[3])
 {
     static const int row[6] = { 0, 1, 2, 0, 0, 1 }, column[6] = { 0, 1, 2, 1, 2, 2 };
-    double B[6];
+    double B[6], Q[3][3];
     int i, c;
     for (i = 0; i < 6; i++)
         for (B[i] = 0, c = 0; c < 3; c++)
             B[i] += (double)F[3 * row[i] + c] * (double)F[3 * column[i] + c];
-    extremes_eigenvalues(B, e);
+    gs4i_eigen(B, e, Q);
     for (i = 0; i < 3; i++) e[i] /= pow(extremes_determinant(F), 2.0 / 3);
 }
 
@@ -213,11 +186,11 @@ static void extremes_stretch(const gs4_real *F, double e[3])
 static double extremes_conformation(const gs4_material *l, const gs4_real *S, double e[3])
 {
     const double mu = (1 - (double)l->local_fraction) * (double)l->viscosity;
-    double c[6];
+    double c[6], Q[3][3];
     int i;
     if (l->liquid == GS4_NEWTONIAN || !(mu > 0)) return 0;
     for (i = 0; i < 6; i++) c[i] = (double)S[i] * (double)l->relaxation_time / mu + (i < 3);
-    extremes_eigenvalues(c, e);
+    gs4i_eigen(c, e, Q);
     return mu / (double)l->relaxation_time;
 }
 

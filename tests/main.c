@@ -40,6 +40,7 @@
 #include "test_semi_solids.c"
 #include "test_semi_melt.c"
 #include "test_semi_extremes.c"
+#include "test_film.c"
 #include "test_mesh.c"
 #include "test_estimate.c"
 #include "test_reference.c"
@@ -141,6 +142,7 @@ int main(int count, char **values)
     run_semi_solids();
     run_semi_melt();
     run_semi_extremes();
+    run_film();
     run_mesh();
     run_estimate();
     RUN_ONCE(test_reference);

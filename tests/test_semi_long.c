@@ -160,13 +160,31 @@ typedef struct coil_rope {
     double cell, across, height, mouth; /* the nozzle's width and length, and how high it is */
     double speed, viscosity, gravity;   /* at the nozzle; kinematic */
     double radius;                      /* that the domain has room for */
+    double post;                        /* the radius of what it falls on; 0: a floor */
+    uint32_t seed;                      /* of its jitter */
 } coil_rope;
 
-/* A nozzle above a sticky floor lays a rope. */
+/* Instead of the floor: a slippery post, cells below whose top the domain ends. */
+enum {
+    COIL_BELOW = 14
+};
+
+static void coil_post(gs4_sim *sim, const coil_rope *r, int down)
+{
+    double low[3] = { 0, 0, 0 };
+    gs4_collider post;
+    memset(&post, 0, sizeof post);
+    low[down] = -(COIL_BELOW + 3) * r->cell;
+    post.contact = GS4_WALL_SLIP;
+    post.shape = gs4_cylinder(at(low[0], low[1], low[2]), at(0, 0, 0), (gs4_real)r->post);
+    CHECK(gs4_add_collider(sim, &post) >= 0);
+}
+
+/* A nozzle above a sticky floor or a post lays a rope. */
 static gs4_sim *coil_make(const coil_rope *r, int down)
 {
     const int a = (down + 1) % 3, b = (down + 2) % 3;
-    const int width = 2 * (int)(r->radius / r->cell + 7);
+    const int width = 2 * (int)(r->radius / r->cell + 7), below = r->post > 0 ? COIL_BELOW : 0;
     const gs4_material m = partitioned_liquid(1000 * r->viscosity);
     double low[3] = { 0, 0, 0 }, high[3] = { 0, 0, 0 }, flow[3] = { 0, 0, 0 }, origin[3];
     gs4_emitter nozzle;
@@ -179,14 +197,19 @@ static gs4_sim *coil_make(const coil_rope *r, int down)
     d.cell_size = (gs4_real)r->cell;
     d.cfl = (gs4_real)0.8;
     d.cells[a] = d.cells[b] = width;
-    d.cells[down] = (int)((r->height + r->mouth) / r->cell) + 3;
-    origin[down] = 0;
+    d.cells[down] = (int)((r->height + r->mouth) / r->cell) + 3 + below;
+    origin[down] = -below * r->cell;
     origin[a] = origin[b] = -0.5 * width * r->cell;
     d.origin = at(origin[0], origin[1], origin[2]);
-    for (i = 0; i < 6; i++) d.walls[i] = i == 2 * down ? GS4_WALL_STICK : GS4_WALL_OPEN;
+    for (i = 0; i < 6; i++) d.walls[i] = GS4_WALL_OPEN;
+    if (below)
+        d.solver_tolerance = (gs4_real)1e-3; /* it is chaotic */
+    else
+        d.walls[2 * down] = GS4_WALL_STICK;
     low[down] = -r->gravity;
     d.gravity = at(low[0], low[1], low[2]);
     CHECK_RESULT(NULL, gs4_create(&d, &sim), GS4_OK);
+    if (below) coil_post(sim, r, down);
     nozzle.fill.material = gs4_add_material(sim, &m);
     low[down] = r->height;
     high[down] = r->height + r->mouth;
@@ -195,6 +218,7 @@ static gs4_sim *coil_make(const coil_rope *r, int down)
                                 (gs4_real)(0.5 * r->across));
     nozzle.fill.velocity = at(flow[0], flow[1], flow[2]);
     nozzle.fill.jitter = (gs4_real)0.5;
+    nozzle.fill.random_seed = r->seed;
     CHECK(gs4_add_emitter(sim, &nozzle) >= 0);
     return sim;
 }
@@ -203,7 +227,7 @@ static gs4_sim *coil_make(const coil_rope *r, int down)
  * nothing held it: here by 800 m within a second. */
 static void test_semi_stream(void)
 {
-    const coil_rope rope = { 1, 4, 20, 2, 1, 1e6, 1600, 2 };
+    const coil_rope rope = { 1, 4, 20, 2, 1, 1e6, 1600, 2, 0, 0 };
     int down;
     for (down = 0; down < 3; down++) {
         gs4_sim *sim = coil_make(&rope, down);
@@ -258,7 +282,8 @@ static void test_semi_coiling(void)
         const int down = k % 3;
         const double height = across * (8 + k), middle = height - across / 2;
         const double time = 5 * 2 * pi * middle / (4 * speed);
-        const coil_rope rope = { 1, across, height, 2, speed, 1e4, 0, 0.25 * height + across / 2 };
+        const coil_rope rope = { 1, across, height, 2, speed, 1e4, 0, 0.25 * height + across / 2,
+                                 0, 0 };
         gs4_sim *sim = coil_make(&rope, down);
         const double rate =
             coil_turn(sim, &rope, down, time, 1.9 * height, 1) / (0.5 * time) * middle / speed;
@@ -328,7 +353,7 @@ static void test_semi_coiling_gravity(void)
         const double U = coil_stretch(g, nu, H);
         double length, radius, rate, time;
         const double law = coil_by_gravity(G, &length, &radius) * U / H;
-        const coil_rope rope = { 1, across, H + across / 2, 2, 1, nu, g, 0.5 * H };
+        const coil_rope rope = { 1, across, H + across / 2, 2, 1, nu, g, 0.5 * H, 0, 0 };
         gs4_sim *sim = coil_make(&rope, down);
         time = 6 * 2 * pi / law;
         /* what falls has the mean of both speeds; of a ring half is left */
@@ -340,6 +365,104 @@ static void test_semi_coiling_gravity(void)
                    (int)gs4_get_stats(sim).steps);
         CHECK_CLOSE(rate / law, 1, 0.07);
         gs4_destroy(sim);
+    }
+}
+
+/* --- a rope that builds columns --- */
+
+/* How high a heap is: to the top of the highest layer of a cell that holds 1.8 of the rope's area
+ * or more. A rope that hangs askew has less, a turn that lies 8 a/d of it, a its radius. */
+static double coil_top(gs4_sim *sim, const coil_rope *r, int down)
+{
+    enum {
+        LAYERS = 100
+    };
+    const double pi = 3.14159265358979, area = pi * r->across * r->across / 4;
+    const gs4_view x = gs4_particles(sim, GS4_FIELD_POSITION);
+    const double volume = gs4_get_stats(sim).mass / x.count / 1000;
+    int count[LAYERS] = { 0 };
+    int i, top = LAYERS - 1;
+    for (i = 0; i < x.count; i++) {
+        const double z = (double)x.data[(size_t)i * (size_t)x.stride + down] / r->cell;
+        if (z >= 0 && z < LAYERS) count[(int)z]++;
+    }
+    while (top >= 0 && count[top] * volume < 1.8 * area * r->cell) top--;
+    return (top + 1) * r->cell;
+}
+
+/* Counts falls of at least `swing`, between which it rises by as much. */
+typedef struct coil_swings {
+    double swing, highest, from; /* the highest; the highest that it fell from */
+    double end;                  /* the highest since it rose, the lowest since it fell */
+    int falling, falls;
+} coil_swings;
+
+static void coil_swing(coil_swings *s, double top)
+{
+    s->highest = fmax(s->highest, top);
+    if (s->falling ? top < s->end : top > s->end) s->end = top;
+    if (fabs(top - s->end) < s->swing) return;
+    if (!s->falling) {
+        s->from = fmax(s->from, s->end);
+        s->falls++;
+    }
+    s->falling = !s->falling;
+    s->end = top;
+}
+
+enum {
+    COIL_ACROSS = 3 /* cells of 1 m */
+};
+
+/* A rope of 1 m/s with inertia, on a slippery post, for a time in s. */
+static coil_swings coil_on_post(double gravity, int k, int time)
+{
+    const double d = COIL_ACROSS;
+    const coil_rope rope = { 1, d, 20 * d, 2, 1, 20, gravity, 11, 2 * d, (uint32_t)k };
+    gs4_sim *sim = coil_make(&rope, k % 3);
+    coil_swings s;
+    double top;
+    int i, result = GS4_OK;
+    memset(&s, 0, sizeof s);
+    s.swing = 1.5 * d;
+    for (i = 1; i <= time && result == GS4_OK; i++) {
+        result = gs4_advance(sim, 1);
+        top = coil_top(sim, &rope, k % 3);
+        if (test_filter[0] && i % 10 == 0) printf(" %g", top);
+        coil_swing(&s, top);
+    }
+    CHECK_RESULT(sim, result, GS4_OK);
+    if (test_filter[0])
+        printf("\ng %g, axis %d: the top is at %.2f d at most, falls %d times, from %.2f d, %d "
+               "steps\n",
+               gravity, k % 3, s.highest / d, s.falls, s.from / d, (int)gs4_get_stats(sim).steps);
+    gs4_destroy(sim);
+    return s;
+}
+
+/* Secondary coiling (Habibi et al. 2006). A rope that inertia bends turns at
+ *     a = U/Omega = 0.78 (nu d^2/U)^(1/3)         (shared/reference, rope_inextensible_inertia)
+ * and its turns stack to a column of width D = 2 a + d, which grows by V = U d/(8 a), without gaps,
+ * and sinks by g h^2/(6 nu) under its weight: h = sqrt(6 nu V/g) = 17 d = 4.3 D where
+ * Fr = U^2/(g d) is 83. There it falls before: such a column buckles 16/pi^2 (h/D)^2 times as fast
+ * as it sinks, 6 times at 2 D = 7.9 d. The next is built on what lies, and leans. What falls may
+ * be the last turns alone. Where Fr is 12 it sinks, to h = 6.4 d within sqrt(pi): pi/2 is of one
+ * that widens as it sinks, slender and steady, (ln A)'' = g A/(3 nu Q), and 4/pi is in V where
+ * whole turns lie on each other. 240 s after it lands it has 0.8 of that, h tanh(V t/h). */
+static void test_semi_secondary_coiling(void)
+{
+    const double pi = 3.14159265358979, d = COIL_ACROSS, nu = 20, Fr[2] = { 83, 12 };
+    const double a = 0.78 * pow(nu * d * d, 1.0 / 3), V = d / (8 * a);
+    int k;
+    for (k = 0; k < 2; k++) {
+        const coil_swings sinking = coil_on_post(1 / (Fr[1] * d), k, 300);
+        const coil_swings falling = coil_on_post(1 / (Fr[0] * d), k + 1, 1200);
+        const double h = sqrt(6 * nu * V * Fr[1] * d);
+        CHECK(falling.falls >= 2 && falling.from >= 6 * d);
+        CHECK(falling.highest < sqrt(6 * nu * V * Fr[0] * d));
+        CHECK(sinking.falls == 0);
+        CHECK_BETWEEN(sinking.highest / h, 1 / sqrt(pi), sqrt(pi));
+        if (test_filter[0]) printf("Fr 12: %.2f of sqrt(6 nu V/g)\n", sinking.highest / h);
     }
 }
 
@@ -644,5 +767,6 @@ static void run_semi_long(void)
     RUN_FULL_ONCE(test_semi_thread);
     RUN_SLOW(test_semi_coiling);
     RUN_SLOW(test_semi_coiling_gravity);
+    RUN_SLOW(test_semi_secondary_coiling);
     RUN_SLOW(test_semi_folding);
 }

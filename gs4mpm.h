@@ -19190,25 +19190,35 @@ static void gs4i_classify_cells(int z, void *context)
     }
 }
 
+/* Is a cell beside cell `at`, over a face, as full as that? */
+static int gs4i_is_beside_full(const gs4i_staggered *f, const int at[3])
+{
+    int n, a, x[3];
+    for (n = 0; n < 6; n++) {
+        for (a = 0; a < 3; a++)
+            x[a] = gs4i_around(f, a, at[a] + (a == n / 2 ? (n % 2 ? 1 : -1) : 0));
+        a = n / 2;
+        if (x[a] >= 0 && x[a] < f->box.size[a]
+            && f->cell[4 * gs4i_box_index(&f->box, GS4I_AT_CELL, x[0], x[1], x[2])]
+                   > GS4I_C(GS4I_LIQUID_FILL))
+            return 1;
+    }
+    return 0;
+}
+
 static void gs4i_classify_thin_cells(int z, void *context)
 {
     const gs4i_staggered_pass *pass = (const gs4i_staggered_pass *)context;
     gs4i_staggered *f = &pass->sim->staggered;
-    const size_t row = (size_t)f->box.size[0];
-    const size_t step[3] = { 1, row, row * (size_t)f->box.size[1] };
     int at[3], a;
     size_t i;
     GS4I_BOX_PLANE(&f->box, GS4I_AT_CELL, z, at, i) {
         const gs4_real *q = f->cell + 4 * i;
         int is_thin = f->kind[i] == GS4_CELL_AIR && q[GS4I_CELL_FILL] > GS4I_C(GS4I_THIN_CELL)
                       && !(q[GS4I_CELL_SOLID] > 0);
-        for (a = 0; a < 3 && is_thin; a++) {
-            is_thin = at[a] >= f->from[a] && at[a] < f->to[a];
-            if (at[a] > 0) is_thin &= !(f->cell[4 * (i - step[a])] > GS4I_C(GS4I_LIQUID_FILL));
-            if (at[a] + 1 < f->box.size[a])
-                is_thin &= !(f->cell[4 * (i + step[a])] > GS4I_C(GS4I_LIQUID_FILL));
-        }
-        if (is_thin) f->kind[i] = GS4_CELL_LIQUID;
+        for (a = 0; a < 3; a++)
+            is_thin &= f->box.periodic[a] || (at[a] >= f->from[a] && at[a] < f->to[a]);
+        if (is_thin && !gs4i_is_beside_full(f, at)) f->kind[i] = GS4_CELL_LIQUID;
     }
 }
 

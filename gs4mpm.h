@@ -392,9 +392,9 @@
  * where they are.
  *     What nothing in a step can strain, a drop of large mu or G that lands with speed, is stopped
  * in a step or two. A rate that remembers this impulse throws it back, (0, 0) at half of its
- * speed. So, with GS4, where the sum over all particles says that a step changed velocity by what
- * its rate did not foresee,
- *     sum m |v_n+1 - v_n - dt r_n|^2 > 0.16 max(sum m |v_n|^2, sum m |dt r_n|^2)
+ * speed. So, with GS4, where the sum over all particles says that a step changed velocity, and by
+ * what its rate did not foresee, w_n = v_n+1 - v_n,
+ *     sum m |w_n|^2 and sum m |w_n - dt r_n|^2 > 0.16 max(sum m |v_n|^2, sum m |dt r_n|^2)
  * and by more than g dt, it was an impact: rates start anew, as after gs4_set_gravity, with a step
  * of backward Euler. Smooth motion is other than foreseen by (w dt)^2. A drop of 1e8 Pa s stays
  * where it lands, with either integrator. A solid of 1e8 Pa comes back at .20 to .41 of its speed,
@@ -12208,9 +12208,9 @@ typedef struct gs4i_report {
     uint64_t rows;     /* of the tile that its particles touch */
     int bad;           /* GS4I_BAD_*: a particle cannot be trusted */
     uint32_t bad_id;
-    /* sums of m |v_n+1 - v_n - dt r_n|^2, m |v_n|^2, m |dt r_n|^2, kg m^2/s^2, and of m, kg, by
-     * gs4i_see_surprise */
-    double unforeseen, moved, foreseen, mass;
+    /* by gs4i_see_surprise: sums of m |v_n+1 - v_n - dt r_n|^2, m |v_n+1 - v_n|^2, m |v_n|^2 and
+     * m |dt r_n|^2, kg m^2/s^2, and of m, kg */
+    double unforeseen, changed, moved, foreseen, mass;
 } gs4i_report;
 
 enum {
@@ -12251,6 +12251,7 @@ static void gs4i_report_merge(gs4i_report *into, const gs4i_report *r)
     into->left_tile += r->left_tile;
     into->left += r->left;
     into->unforeseen += r->unforeseen;
+    into->changed += r->changed;
     into->moved += r->moved;
     into->foreseen += r->foreseen;
     into->mass += r->mass;
@@ -21522,11 +21523,12 @@ static void gs4i_see_surprise(const gs4i_batch *before, const gs4i_batch *q, con
         const double m = (double)mass[4 * b + 3];
         for (c = 0; c < 3; c++) {
             const double v = (double)GS4I_NTH_CONST(before->v[c], b),
-                         change = dt * (double)GS4I_NTH_CONST(before->a[c], b),
-                         more = (double)GS4I_NTH_CONST(q->v[c], b) - v - change;
-            r->unforeseen += m * more * more;
+                         foreseen = dt * (double)GS4I_NTH_CONST(before->a[c], b),
+                         change = (double)GS4I_NTH_CONST(q->v[c], b) - v;
+            r->unforeseen += m * (change - foreseen) * (change - foreseen);
+            r->changed += m * change * change;
             r->moved += m * v * v;
-            r->foreseen += m * change * change;
+            r->foreseen += m * foreseen * foreseen;
         }
         r->mass += m;
     }
@@ -24944,17 +24946,18 @@ static int gs4i_check_stage(gs4_sim *sim)
 
 /* Was there an impact? By (4) a rate goes on to work, before r in the next step: of an impulse that
  * stops something (0, 0) gives back a third, then a ninth, half in all. In nonsmooth generalized
- * alpha impulses have no part in rates (Chen, Acary, Virlez & Bruls 2013). So where the change of
- * velocity in a step was other than its rate said by more than 0.4 (chosen) of what moved, rates
+ * alpha impulses have no part in rates (Chen, Acary, Virlez & Bruls 2013). So where velocity in a
+ * step changed, and otherwise than its rate said, by more than 0.4 (chosen) of what moved, rates
  * start anew. Smooth motion of angular frequency w is other by (w dt)^2 of it, what begins or ends
- * to fall by g dt. A first step, whose rate says nothing, does not count. */
+ * to fall by g dt. A first step, whose rate says nothing, does not count, nor that no change came
+ * where the rate said one: after a first step in which a flow settles to creep. */
 static int gs4i_was_impact(const gs4_sim *sim, const gs4i_report *r)
 {
     const double fall = (double)sim->integrator.dt * (double)gs4i_length(sim->desc.gravity),
                  most = fmax(0.16 * fmax(r->moved, r->foreseen), r->mass * fall * fall);
     if (!gs4i_has_impacts(sim)) return 0;
     if (sim->integrator.restart && sim->restart != GS4I_RESTART_DAMPED) return 0;
-    return r->unforeseen > most;
+    return fmin(r->unforeseen, r->changed) > most;
 }
 
 /* Speed and extremes are those of the step: `limits` stay good. */
@@ -24974,7 +24977,7 @@ static void gs4i_finish(gs4_sim *sim)
     if (sim->particles.count) {
         gs4i_report r = gs4i_all_reports(sim);
         impact = gs4i_was_impact(sim, &r);
-        r.unforeseen = r.moved = r.foreseen = r.mass = 0;
+        r.unforeseen = r.changed = r.moved = r.foreseen = r.mass = 0;
         r.max_speed = GS4I_SQRT(r.max_speed);
         r.max_gradient = GS4I_SQRT(r.max_gradient);
         if (!sim->staggered.is_viscous) r.min_viscosity = 0; /* nothing asked for it */

@@ -54,6 +54,7 @@ static void report(const double area[SECTORS], const double laid[SECTORS],
         least = fmin(least, area[s]);
         most = fmax(most, area[s]);
     }
+    if (!(mean > 0)) return; /* too few frames */
     printf("sectors %d to %d: %.1f mm^2, %+.1f to %+.1f %%\n", first, first + count - 1, 1e6 * mean,
            100 * (least / mean - 1), 100 * (most / mean - 1));
 }

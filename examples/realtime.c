@@ -22,7 +22,7 @@ typedef struct record { /* of a second of the clock; times in s */
 } record;
 
 /* Takes `--budget MS` out of the options; s. */
-static double take_budget(const example *e, int *argc, char **argv)
+static double take_budget(int *argc, char **argv)
 {
     double ms = 12;
     for (int i = 1; i + 1 < *argc; ++i)
@@ -30,7 +30,6 @@ static double take_budget(const example *e, int *argc, char **argv)
             ms = strtod(argv[i + 1], NULL);
             for (*argc -= 2; i < *argc; ++i) argv[i] = argv[i + 2];
         }
-    if (!(ms > 0 && ms < 1000)) example_misuse(e, "--budget takes milliseconds, below 1000", "");
     return 1e-3 * ms;
 }
 
@@ -79,8 +78,10 @@ int main(int argc, char **argv)
     e.cells = 24;
     e.takes_scheme = 1;
     e.scheme = GS4_PARTITIONED;
-    budget.seconds = take_budget(&e, &argc, argv);
+    budget.seconds = take_budget(&argc, argv);
     example_options(&e, argc, argv);
+    if (!(budget.seconds > 0 && budget.seconds < 1))
+        example_misuse(&e, "--budget takes milliseconds, below 1000", "");
 
     desc.cell_size = real(0.6 / e.cells);
     desc.cells[0] = e.cells;
@@ -141,7 +142,6 @@ int main(int argc, char **argv)
     e.look.eye[1] = 0.45f;
     e.look.eye[2] = 1.0f;
     e.look.target[0] = 0.28f;
-    e.look.field_of_view = 32;
     e.look.palette = preview_speed;
     e.colour = EXAMPLE_SPEED;
     example_write(&e, sim);

@@ -31,7 +31,7 @@ int main(int argc, char **argv)
     double least_j = 1, least_occupied = 1, j = 1, occupied = 1;
     e.name = "ball_impact";
     e.frames = 60;
-    e.cells = 60;
+    e.cells = 40;
     e.frame_time = 1.0 / 500;
     e.rows = 3;
     example_options(&e, argc, argv);

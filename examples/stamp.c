@@ -1,4 +1,4 @@
-/* stamp.c - eight bunnies of toothpaste fall on each other; then a word is stamped in the pile.
+/* stamp.c - nine bunnies of toothpaste fall on each other; then a word is stamped in the pile.
  *     cc -O3 -march=native examples/stamp.c -Iexamples -I. -lm -lpthread -o stamp
  *     ./stamp                             pictures and particles in out/; some minutes
  *
@@ -10,31 +10,32 @@
 #include "bunny.h"
 
 enum {
-    BUNNIES = 8,
-    BARS = 13
+    BUNNIES = 9,
+    BARS = 14
 };
 /* a mesh's arrays must outlive the simulation */
 static gs4_real vertices[BUNNIES][BUNNY_VERTEX_COUNT][3];
 
-/* The word, of bars a unit wide: their left, lower, right and upper sides, in units. */
-static const double bars[BARS][4] = {
-    { 0, 4, 4, 5 },   { 0, 0, 1, 5 },   { 0, 0, 4, 1 },   { 3, 0, 4, 3 }, { 2, 2, 4, 3 },
-    { 5, 4, 9, 5 },   { 5, 2, 6, 5 },   { 5, 2, 9, 3 },   { 8, 0, 9, 3 }, { 5, 0, 9, 1 },
-    { 10, 2, 11, 5 }, { 10, 2, 14, 3 }, { 13, 0, 14, 5 },
-};
-static const double across = 14, high = 5, unit = 0.0075, tall = 0.03; /* the latter two in m */
+/* The word, of bars a unit wide, and its plate: left, lower, right and upper sides, in units. */
+static const double bars[BARS][4] = { { 0, 4, 4, 5 },   { 0, 0, 1, 5 },   { 0, 0, 4, 1 },
+                                      { 3, 0, 4, 3 },   { 2, 2, 4, 3 },   { 5, 4, 9, 5 },
+                                      { 5, 2, 6, 5 },   { 5, 2, 9, 3 },   { 8, 0, 9, 3 },
+                                      { 5, 0, 9, 1 },   { 10, 2, 11, 5 }, { 10, 2, 14, 3 },
+                                      { 13, 0, 14, 5 }, { -1, -1, 15, 6 } };
+static const double across = 14, high = 5, unit = 0.0075, tall = 0.02, relief = 0.009; /* m */
 
 /* Distance to the stamp, its lower side at y = 0. */
 static gs4_real stamp_distance(gs4_vec3 at, void *user)
 {
-    const double X = (double)at.x / unit + across / 2, Y = high / 2 - (double)at.z / unit,
-                 y = fabs((double)at.y - tall / 2) - tall / 2;
+    const double X = (double)at.x / unit + across / 2, Y = high / 2 - (double)at.z / unit;
     double best = 1;
     (void)user;
     for (int i = 0; i < BARS; ++i) {
-        const double *b = bars[i], dx = unit * fmax(b[0] - X, X - b[2]),
-                     dy = unit * fmax(b[1] - Y, Y - b[3]), out = hypot(fmax(dx, 0), fmax(dy, 0));
-        best = fmin(best, hypot(out, fmax(y, 0)) + fmin(0, fmax(fmax(dx, dy), y)));
+        const double *b = bars[i], low = i == BARS - 1 ? relief : 0;
+        const double x = unit * fmax(b[0] - X, X - b[2]), z = unit * fmax(b[1] - Y, Y - b[3]),
+                     y = fmax(low - (double)at.y, (double)at.y - tall);
+        best = fmin(best, hypot(hypot(fmax(x, 0), fmax(y, 0)), fmax(z, 0))
+                              + fmin(0, fmax(fmax(x, z), y)));
     }
     return real(best);
 }
@@ -54,7 +55,7 @@ static double print_depth(const gs4_sim *sim)
     for (int r = 0; r < 10; ++r)
         for (int c = 0; c < 28; ++c) {
             const int outside =
-                stamp_distance(vec((c - 13.5) * side, tall / 2, (r - 4.5) * side), NULL) > 0;
+                stamp_distance(vec((c - 13.5) * side, relief / 2, (r - 4.5) * side), NULL) > 0;
             sum[outside] += top[r][c];
             count[outside] += top[r][c] > 0;
         }
@@ -63,15 +64,15 @@ static double print_depth(const gs4_sim *sim)
 
 int main(int argc, char **argv)
 {
-    /* x, y, z, turn, tip */
     static const double place[BUNNIES][5] = {
-        { -0.044, 0.023, -0.018, 3.0, 0 },  { 0.001, 0.024, -0.018, 0.1, 0 },
-        { 0.046, 0.023, -0.018, 3.2, 0.1 }, { -0.045, 0.023, 0.018, 0.1, -0.1 },
-        { 0, 0.023, 0.017, 3.1, 0.1 },      { 0.045, 0.024, 0.018, -0.1, 0 },
-        { -0.024, 0.07, -0.004, 0.4, 1.3 }, { 0.024, 0.071, 0.004, 2.6, 1.5 }
+        { -0.044, 0.023, -0.0165, 3, 0 },  { 0.001, 0.024, -0.0165, 3.1, 0 },
+        { 0.045, 0.023, -0.0165, 3.2, 0 }, { -0.045, 0.023, 0.0165, 0.1, 0 },
+        { 0, 0.023, 0.0165, 0, 0 },        { 0.045, 0.024, 0.0165, -0.1, 0 },
+        { -0.04, 0.067, 0, 0.3, 1.3 },     { 0.003, 0.068, 0.002, 2.9, 1.5 },
+        { 0.044, 0.067, -0.002, 0.1, 1.4 }
     };
-    const float shades[2][3] = { { 0.96f, 0.97f, 0.96f }, { 0.40f, 0.74f, 0.72f } };
-    const double width = 0.16, size = 0.041, start = 0.11, low = 0.009;
+    const float shades[2][3] = { { 0.90f, 0.79f, 0.62f }, { 0.80f, 0.62f, 0.48f } };
+    const double width = 0.16, size = 0.041, start = 0.11, low = 0.006;
     example e = { 0 };
     gs4_sim_desc desc = { 0 };
     gs4_material paste;
@@ -100,21 +101,21 @@ int main(int argc, char **argv)
     paste.incompressible = 1;
     fill.velocity = vec(0, -0.5, 0);
     for (int i = 0; i < BUNNIES; ++i) { /* a material each, so that pictures tell them apart */
-        const double *p = place[i];
+        const double *p = place[i];     /* x, y, z, turn, tip */
         fill.material = example_need(sim, gs4_add_material(sim, &paste));
         example_need(
             sim, gs4_add_particles(
                      sim, bunny_at(vertices[i], size, p[3], p[4], vec(p[0], p[1], p[2])), &fill));
     }
-    stamp.shape = gs4_sdf(stamp_distance, NULL, vec(-across * unit / 2, 0, -high * unit / 2),
-                          vec(across * unit / 2, tall, high * unit / 2));
+    stamp.shape =
+        gs4_sdf(stamp_distance, NULL, vec(-9 * unit, 0, -5 * unit), vec(9 * unit, tall, 5 * unit));
     stamp.contact = GS4_WALL_SEPARATE;
     body = example_need(sim, gs4_add_collider(sim, &stamp));
 
     e.look.solids = things;
     e.look.solid_count = 1 + BARS;
-    e.look.eye[1] = 0.24f;
-    e.look.eye[2] = 0.13f;
+    e.look.eye[1] = 0.25f;
+    e.look.eye[2] = 0.10f;
     e.look.target[1] = 0.01f;
     e.look.width = 640;
     e.look.height = 480;
@@ -124,21 +125,20 @@ int main(int argc, char **argv)
     e.look.shine = -1;
     e.colour = EXAMPLE_MATERIAL;
 
-    for (double at = start, before = start;;) { /* where the stamp's lower side is */
+    for (double at = start;;) { /* where the stamp's lower side is */
         const double t = e.frame * e.frame_time;
-        const double speed = t < 0.3 ? 0 : t < 0.8 ? (low - at) / (0.8 - t) : 0.3;
+        const double speed = t < 0.3 ? 0 : t < 0.8 ? (low - at) / (0.8 - t) : t < 1 ? 0.3 : 1;
         pose.position.y = real(at);
         if (!e.frame) example_need(sim, gs4_put_collider(sim, body, &pose));
         example_need(sim, gs4_move_collider(sim, body, vec(0, speed, 0), vec(0, 0, 0)));
-        if (t > 0.8 && before < 0.06 && at >= 0.06)
+        if (e.frame == 30)
             printf("the print is %.1f mm deep when the stamp has left\n", 1e3 * print_depth(sim));
-        before = at;
         at += speed * e.frame_time;
         for (int i = 0; i < BARS; ++i)
             for (int k = 0; k < 2; ++k) {
                 float *corner = k ? things[1 + i].b : things[1 + i].a;
                 corner[0] = (float)(unit * (bars[i][2 * k] - across / 2));
-                corner[1] = (float)(at + k * tall);
+                corner[1] = (float)(at + (k ? tall : i == BARS - 1 ? relief : 0));
                 corner[2] = (float)(unit * (high / 2 - bars[i][3 - 2 * k]));
                 things[1 + i].kind = PREVIEW_BOX;
             }

@@ -1,6 +1,6 @@
 /* ball_impact.c - a ball falls on a floor: what it loses of its volume.
  *     cc -O3 -march=native examples/ball_impact.c -Iexamples -I. -lm -lpthread -o ball_impact
- *     ./ball_impact --row 1     explicit, sound at 1 m/s; --row 2: at 10 m/s; a minute each
+ *     ./ball_impact --row 1     explicit, sound at 1 m/s; --row 2: at 10 m/s; 25 s each
  *     ./ball_impact --row 3     partitioned, incompressible; pictures and particles in out/
  *
  * After figure 7 of the GS4 paper (figure 10: its volume over time). A liquid that carries sound

@@ -1,6 +1,6 @@
 /* stamp.c - nine bunnies of toothpaste fall on each other; then a word is stamped in the pile.
  *     cc -O3 -march=native examples/stamp.c -Iexamples -I. -lm -lpthread -o stamp
- *     ./stamp                             pictures and particles in out/; 100 s of processor time
+ *     ./stamp                             pictures and particles in out/; two minutes
  *
  * After figures 1 and 4 of the GS4 paper. Its bunnies are Newtonian, and a print in those fills
  * again; a liquid that keeps one has a yield stress, here 150 Pa, the weight of 12 mm of it. At

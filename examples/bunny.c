@@ -14,22 +14,6 @@ enum {
 /* a mesh's arrays must outlive the simulation */
 static gs4_real vertices[BUNNIES][BUNNY_VERTEX_COUNT][3];
 
-/* Bunny i: `size` long, turned about the upright axis and tipped over, its middle at (x, y, z). */
-static gs4_shape make_bunny(int i, double size, double turn, double tip, double x, double y,
-                            double z)
-{
-    for (int k = 0; k < BUNNY_VERTEX_COUNT; ++k) {
-        const double px = (double)bunny_vertices[k][0], py = (double)bunny_vertices[k][1] - 0.49,
-                     pz = (double)bunny_vertices[k][2];
-        const double qy = cos(tip) * py - sin(tip) * pz, qz = sin(tip) * py + cos(tip) * pz;
-        vertices[i][k][0] = real(x + size * (cos(turn) * px + sin(turn) * qz));
-        vertices[i][k][1] = real(y + size * qy);
-        vertices[i][k][2] = real(z + size * (cos(turn) * qz - sin(turn) * px));
-    }
-    return gs4_mesh(&vertices[i][0][0], BUNNY_VERTEX_COUNT, &bunny_triangles[0][0],
-                    BUNNY_TRIANGLE_COUNT);
-}
-
 int main(int argc, char **argv)
 {
     const double box = 0.24, size = 0.10, stamp_half = 0.06, stamp_height = 0.05,
@@ -69,9 +53,10 @@ int main(int argc, char **argv)
     for (int i = 0; i < BUNNIES; ++i) {
         const double x = i % 2 ? 0.054 : -0.054, z = i / 2 % 2 ? 0.054 : -0.054;
         fill.material = example_need(sim, gs4_add_material(sim, &liquid));
-        example_need(
-            sim, gs4_add_particles(
-                     sim, make_bunny(i, size, 1.3 * i, 0.5 * i, x, 0.06 + 0.075 * i, z), &fill));
+        example_need(sim, gs4_add_particles(sim,
+                                            bunny_at(vertices[i], size, 1.3 * i, 0.5 * i,
+                                                     vec(x, 0.06 + 0.075 * i, z)),
+                                            &fill));
     }
     stamp.shape = gs4_box(vec(-stamp_half, stamp_start, -stamp_half),
                           vec(stamp_half, stamp_start + stamp_height, stamp_half));

@@ -5,8 +5,7 @@
  *                                 &bunny_triangles[0][0], BUNNY_TRIANGLE_COUNT);
  *
  * y is up, the largest extent (x) is 1, x and z are centred on 0 and the lowest point is y = 0;
- * height 0.975, depth 0.761, volume 0.19979. Multiply a copy of the vertices to get another
- * size.
+ * height 0.975, depth 0.761, volume 0.19979. Another size, turned: bunny_at.
  *
  * Source: the npm package "bunny", version 1.0.1, by Mikola Lysenko, which states "Public
  * Domain"; a coarse copy of the Stanford Bunny of the Stanford Computer Graphics Laboratory,
@@ -1005,5 +1004,24 @@ static const int bunny_triangles[][3] = {
 {1781,1737,1838},{1737,982,1838},{982,1053,1838},{1053,816,1838},{816,589,1838}
 };
 /* clang-format on */
+
+#ifdef EXAMPLE_H /* included before this file */
+/* Fills `vertices` with a bunny `size` long, turned about the upright axis and tipped over, its
+ * middle at `at`; they must outlive the simulation. */
+static gs4_shape bunny_at(gs4_real (*vertices)[3], double size, double turn, double tip,
+                          gs4_vec3 at)
+{
+    for (int k = 0; k < BUNNY_VERTEX_COUNT; ++k) {
+        const double px = (double)bunny_vertices[k][0], py = (double)bunny_vertices[k][1] - 0.49,
+                     pz = (double)bunny_vertices[k][2];
+        const double qy = cos(tip) * py - sin(tip) * pz, qz = sin(tip) * py + cos(tip) * pz;
+        vertices[k][0] = (gs4_real)((double)at.x + size * (cos(turn) * px + sin(turn) * qz));
+        vertices[k][1] = (gs4_real)((double)at.y + size * qy);
+        vertices[k][2] = (gs4_real)((double)at.z + size * (cos(turn) * qz - sin(turn) * px));
+    }
+    return gs4_mesh(&vertices[0][0], BUNNY_VERTEX_COUNT, &bunny_triangles[0][0],
+                    BUNNY_TRIANGLE_COUNT);
+}
+#endif
 
 #endif

@@ -4,8 +4,8 @@
  *
  * After figure 2 of "Augmented MPM for phase-change and varied materials" (2014). The candy is at
  * 150 degrees and sets at 110, on the apple (15, from the start) and in air (20). It leaves a coat
- * on the apple and a neck below, which thins to a thread that sets and breaks. It conducts 100 times
- * too well, or the coat would have run off before it sets, and is softer than sugar when cold.
+ * on the apple and a neck below, which thins to a thread that sets and breaks. It conducts 100
+ * times too well, or the coat would have run off before it sets, and is softer than cold sugar.
  *     Explicit: at 12 Pa s sound and viscosity ask for steps of 0.15 ms, and a semi-implicit one of
  * 13 ms costs more than all of them, as it solves for what sets, too. It takes seven minutes of
  * processor time. */

@@ -19214,6 +19214,7 @@ static int gs4i_is_beside_full(const gs4i_staggered *f, const int at[3])
     return 0;
 }
 
+/* Liquid, too, where material is thin: see GS4I_THIN_CELL. */
 static void gs4i_classify_thin_cells(int z, void *context)
 {
     const gs4i_staggered_pass *pass = (const gs4i_staggered_pass *)context;

@@ -49,7 +49,7 @@ int main(int argc, char **argv)
 
     example_need(sim, gs4_material_preset("chocolate", &m));
     m.viscosity = real(e.row == 1 ? 0 : 39.2);
-    /* as stiff as chocolate, where elasticity limits no step; else so soft that the ears hang */
+    /* stiff, where elasticity limits no step; else so soft that the ears hang */
     m.shear_modulus = real(e.scheme == GS4_SEMI_IMPLICIT ? 1e7 : 8e4);
     m.yield_compression = m.yield_stretch = real(0.1);
     m.conductivity = real((double)m.conductivity * faster);

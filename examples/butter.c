@@ -4,13 +4,13 @@
  *
  * After figure 3 of "Augmented MPM" (2014). Pan and butter stick to each other: there is no
  * friction law here, the pat starts to slide when a layer under it has melted, and rides on it.
- * The pan has 130 degrees and is tilted by 8; butter melts at 32 and conducts 1000 times too
+ * The pan has 130 degrees and is tilted by 4; butter melts at 32 and conducts 1000 times too
  * well here. */
 #include "example.h"
 
 int main(int argc, char **argv)
 {
-    const double length = 0.24, tilt = 8 * 3.14159265 / 180, faster = 1000;
+    const double length = 0.24, tilt = 4 * 3.14159265 / 180, faster = 1000;
     const float colours[6][3] = { { 0.99f, 0.93f, 0.62f }, { 0.99f, 0.92f, 0.58f },
                                   { 0.98f, 0.90f, 0.52f }, { 0.93f, 0.70f, 0.18f },
                                   { 0.91f, 0.66f, 0.14f }, { 0.88f, 0.61f, 0.10f } };
@@ -22,7 +22,7 @@ int main(int argc, char **argv)
     gs4_sim *sim;
     e.name = "butter";
     e.frames = 72;
-    e.cells = 48;
+    e.cells = 64;
     e.frame_time = 1.0 / 20;
     example_options(&e, argc, argv);
 
@@ -44,6 +44,7 @@ int main(int argc, char **argv)
     m.conductivity = real((double)m.conductivity * faster);
     fill.material = example_need(sim, gs4_add_material(sim, &m));
     fill.temperature = 10;
+    fill.jitter = real(0.5);
     example_need(sim, gs4_add_particles(
                           sim, gs4_box(vec(-0.095, 0, -0.03), vec(-0.035, 0.034, 0.03)), &fill));
 

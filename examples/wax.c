@@ -44,6 +44,7 @@ int main(int argc, char **argv)
     m.conductivity = real((double)m.conductivity * faster);
     fill.material = example_need(sim, gs4_add_material(sim, &m));
     fill.temperature = 20;
+    fill.jitter = real(0.5);
     example_need(sim, gs4_add_particles(
                           sim, gs4_cylinder(vec(0, 0, 0), vec(0, height, 0), real(radius)), &fill));
 

@@ -511,14 +511,16 @@
  * also one whose solve did not converge; the semi-implicit scheme less each time, 2^-22 in all.
  * Its steps grow by at most twice each.
  *
- * IN A GAME. Sixty times a second, in 10 ms of computing each; desc.now is a clock. What does not
- * fit waits for the next frame, up to a tenth of a second: from there on the scene is slower than
- * the clock.
+ * IN A GAME. Each frame owes what has passed since the last, and has 10 ms of computing for that;
+ * clock(NULL), in seconds, is desc.now too. What does not fit waits for the next frame, up to a
+ * tenth of a second: from there on the scene is slower than the clock (examples/realtime.c).
  *
  *     gs4_budget budget = { 0, 0.010, NULL, NULL };
- *     double due = 0, done;
+ *     double due = 0, last = clock(NULL), now, done;
  *     while (is_running()) {
- *         due = due + 1.0 / 60 < 0.1 ? due + 1.0 / 60 : 0.1;
+ *         now = clock(NULL);
+ *         due = due + now - last < 0.1 ? due + now - last : 0.1;
+ *         last = now;
  *         if (gs4_advance_within(sim, (gs4_real)due, &budget, &done) < 0) break;
  *         due -= done;
  *         draw(gs4_particles(sim, GS4_FIELD_POSITION));

@@ -1,100 +1,118 @@
-/* bunny.c - eight bunnies of chocolate and cream fall on each other in a box; then a stamp comes
- * down on them.
+/* bunny.c - a bunny of liquid bounces and keeps its ears; one without its memory collapses.
  *     cc -O3 -march=native examples/bunny.c -Iexamples -I. -lm -lpthread -o bunny
- *     ./bunny                             pictures and particles in out/
+ *     ./bunny                             pictures and particles in out/; three minutes
  *
- * Shows meshes as shapes to fill, several materials, and a body that is moved while the
- * simulation runs. */
+ * After figure 5 of the GS4 paper. The right bunny is extended Pom-Pom: 306.25 Pa s in all, of
+ * which a hundredth is Newtonian, and the left one has that hundredth alone. (All of it would
+ * neither bounce nor collapse: a Newtonian bunny so thick stands where it lands.) Table 4 has
+ * lambda_b 0.613 s, but its G0, 4950 Pa, and its lambda_0s, 0.9 lambda_b in other rows, both say
+ * 0.0613 s, which it is here.
+ *
+ * The paper has 29 m/s and names neither length nor density. What counts is the impact speed over
+ * that of elastic waves, c = sqrt(G0/rho), as strain; lambda_b over length/c, by how much the
+ * bounce is over before the liquid forgets its shape; and height, v^2/2g, over length. A foam of
+ * 400 kg/m^3 (c = 3.5 m/s), 3 cm long, that lands at 1.25 m/s has 0.36, 7 and up to 2.6. It falls
+ * with its nose down, turning at 22 rad/s: what lands evenly on its feet and heavy haunches is
+ * thrown on its nose. A bounce is a wave, of elasticity at 3.5 and of sound at 12 m/s, that has to
+ * be resolved in time anyway, so it is for the explicit scheme.
+ *
+ * It leaves the floor by 13 mm, 0.43 of its length, lands again after 0.13 s and hops by 3 mm, with
+ * both ears, which are three cells thick. Its volume is never below 0.995 of the first and the
+ * same at the end; of 74 450 particles none is apart from the others. */
 #include "example.h"
 #include "bunny.h"
 
 enum {
-    BUNNIES = 8
+    BUNNIES = 2
 };
 /* a mesh's arrays must outlive the simulation */
 static gs4_real vertices[BUNNIES][BUNNY_VERTEX_COUNT][3];
 
+/* m: how high the lowest particle of the elastic bunny, the right one, is. */
+static double lowest(const gs4_sim *sim)
+{
+    const gs4_view at = gs4_particles(sim, GS4_FIELD_POSITION);
+    const uint8_t *material = gs4_particle_materials(sim);
+    double low = INFINITY;
+    for (int i = 0; i < at.count; ++i)
+        if (material[i] == 1) low = fmin(low, (double)at.data[(ptrdiff_t)i * at.stride + 1]);
+    return low;
+}
+
 int main(int argc, char **argv)
 {
-    const double box = 0.24, size = 0.10, stamp_half = 0.06, stamp_height = 0.05,
-                 stamp_start = 0.75;
-    const float colours[BUNNIES][3] = { { 0.30f, 0.16f, 0.09f }, { 0.98f, 0.93f, 0.84f },
-                                        { 0.55f, 0.34f, 0.20f }, { 0.30f, 0.16f, 0.09f },
-                                        { 0.98f, 0.93f, 0.84f }, { 0.55f, 0.34f, 0.20f },
-                                        { 0.98f, 0.93f, 0.84f }, { 0.30f, 0.16f, 0.09f } };
+    const double size = 0.03, width = 4 * size, drop = 0.4 * size, speed = 1.15, thick = 306.25;
+    const float colours[BUNNIES][3] = { { 0.35f, 0.19f, 0.11f }, { 0.98f, 0.93f, 0.84f } };
     example e = { 0 };
     gs4_sim_desc desc = { 0 };
     gs4_material liquid = { 0 };
     gs4_fill fill = { 0 };
-    gs4_collider stamp = { 0 };
-    preview_solid things[2] = { { 0 } };
+    preview_solid floor = { 0 };
+    gs4_stats first;
     gs4_sim *sim;
-    int body;
+    double hop = 0, least = 1;
+    int landed = 0;
     e.name = "bunny";
-    e.frames = 60;
-    e.cells = 36;
+    e.frames = 48;
+    e.cells = 144;
+    e.frame_time = 0.0045;
     example_options(&e, argc, argv);
 
-    desc.cell_size = real(box / e.cells);
-    desc.cells[0] = desc.cells[2] = e.cells;
-    desc.cells[1] = 3 * e.cells;
-    desc.origin = vec(-box / 2, 0, -box / 2);
+    desc.cell_size = real(width / e.cells);
+    desc.cells[0] = e.cells;
+    desc.cells[1] = e.cells / 2;
+    desc.cells[2] = e.cells * 2 / 5;
+    desc.origin = vec(-width / 2, 0, -width / 5);
     desc.gravity = vec(0, -9.81, 0);
     desc.cfl = real(0.8);
-    /* on a side wall that sticks, what grazes it would hang for ever */
-    for (int i = 0; i < 6; ++i)
-        desc.walls[i] = i == 2 ? GS4_WALL_STICK : i == 3 ? GS4_WALL_OPEN : GS4_WALL_SLIP;
+    for (int i = 0; i < 6; ++i) desc.walls[i] = i == 2 ? GS4_WALL_SEPARATE : GS4_WALL_OPEN;
     sim = example_create(&e, &desc);
 
-    liquid.density = 1200;
-    liquid.viscosity = 6;
-    liquid.sound_speed = 20;
-    /* a material each, so that the pictures can tell them apart */
+    liquid.density = 400;
+    liquid.viscosity = real(0.01 * thick);
+    liquid.sound_speed = 12;
+    fill.velocity = vec(0, -speed, 0);
+    fill.angular_velocity = vec(0, 0, 22);
     for (int i = 0; i < BUNNIES; ++i) {
-        const double x = i % 2 ? 0.054 : -0.054, z = i / 2 % 2 ? 0.054 : -0.054;
+        if (i) {
+            liquid.viscosity = real(thick);
+            liquid.liquid = GS4_POM_POM;
+            liquid.local_fraction = real(0.01);
+            liquid.relaxation_time = real(0.0613);
+            liquid.stretch_time = real(0.0551);
+            liquid.anisotropy = 1;
+            liquid.arms = 8;
+        }
         fill.material = example_need(sim, gs4_add_material(sim, &liquid));
-        example_need(sim, gs4_add_particles(sim,
-                                            bunny_at(vertices[i], size, 1.3 * i, 0.5 * i,
-                                                     vec(x, 0.06 + 0.075 * i, z)),
-                                            &fill));
+        example_need(sim,
+                     gs4_add_particles(sim,
+                                       bunny_at(vertices[i], size, 0, 0,
+                                                vec((i ? 0.7 : -1) * size, 0.49 * size + drop, 0)),
+                                       &fill));
     }
-    stamp.shape = gs4_box(vec(-stamp_half, stamp_start, -stamp_half),
-                          vec(stamp_half, stamp_start + stamp_height, stamp_half));
-    stamp.contact = GS4_WALL_STICK;
-    body = example_need(sim, gs4_add_collider(sim, &stamp));
 
-    things[0].kind = PREVIEW_ROOM;
-    for (int a = 0; a < 3; ++a) {
-        things[0].a[a] = a == 1 ? 0 : (float)(-box / 2);
-        things[0].b[a] = a == 1 ? 0.9f : (float)(box / 2);
-    }
-    things[1].kind = PREVIEW_BOX;
-    e.look.solids = things;
-    e.look.solid_count = 2;
-    e.look.eye[0] = 0.10f;
-    e.look.eye[1] = 0.36f;
-    e.look.eye[2] = 0.75f;
-    e.look.target[1] = 0.14f;
-    e.look.width = 540;
-    e.look.height = 600;
+    floor.kind = PREVIEW_FLOOR;
+    e.look.solids = &floor;
+    e.look.solid_count = 1;
+    e.look.eye[1] = (float)(1.2 * size);
+    e.look.eye[2] = (float)(4.6 * size);
+    e.look.target[1] = (float)(0.75 * size);
+    e.look.field_of_view = 26;
+    e.look.width = 900;
+    e.look.height = 480;
     e.look.palette = colours;
     e.look.palette_count = BUNNIES;
     e.look.high = BUNNIES - 1;
     e.colour = EXAMPLE_MATERIAL;
-
-    for (double at = stamp_start;;) { /* where the stamp's lower side is */
-        const double t = e.frame * e.frame_time, speed = t < 0.55  ? 0
-                                                         : t < 1.4 ? -(at - 0.02) / (1.4 - t)
-                                                         : t < 1.6 ? 0
-                                                                   : 0.5;
-        example_need(sim, gs4_move_collider(sim, body, vec(0, speed, 0), vec(0, 0, 0)));
-        at += speed * e.frame_time;
-        for (int a = 0; a < 3; ++a) {
-            things[1].a[a] = (float)(a == 1 ? at : -stamp_half);
-            things[1].b[a] = (float)(a == 1 ? at + stamp_height : stamp_half);
-        }
-        if (!example_frame(&e, sim)) break;
+    first = gs4_get_stats(sim);
+    while (example_frame(&e, sim)) {
+        const double low = lowest(sim);
+        least = fmin(least, gs4_get_stats(sim).volume / first.volume);
+        landed = landed || low < 0.05 * size;
+        if (landed) hop = fmax(hop, low);
     }
+    printf("it leaves the floor by %.0f mm; the least volume is %.3f, the last %.4f\n", 1e3 * hop,
+           least, gs4_get_stats(sim).volume / first.volume);
     gs4_destroy(sim);
     return 0;
 }

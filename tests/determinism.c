@@ -162,7 +162,7 @@ static void fill_block(gs4_sim *sim)
         stop("gs4_add_particles", sim);
 }
 
-/* examples/bunny.c on a coarse grid with z up: a box of 0.24 x 0.24 x 0.72 m whose walls are
+/* Eight bunnies on a coarse grid with z up: a box of 0.24 x 0.24 x 0.72 m whose walls are
  * sticky, two liquids, a stamp on its way down */
 static gs4_sim *create_bunnies(gs4_sim_desc *d)
 {

@@ -6,7 +6,7 @@
  * After figures 15 and 16 of the GS4 paper. Layers have two colours in turn; orange is what is hot.
  * It sets at 110 degrees to a solid so soft that its fall bends it: sound is slow in that, so
  * explicit steps do. The melt is Oldroyd-B, half of its viscosity local, as in the paper (table 4),
- * but 10 Pa s and not 2, or beads would be flat before they set. It conducts 1000 times too well. */
+ * but 10 Pa s and not 2, or beads were flat before they set. It conducts 1000 times too well. */
 #include "example.h"
 #include "strokes.h"
 
@@ -28,7 +28,7 @@ static gs4_vec3 nozzle_at(const part *p, double s)
     double at[2] = { 0, 0 };
     stroke_walk(&p->drawn, (k % 2 ? p->length - done : done) / p->size, at);
     return vec(p->middle + p->size * (at[0] - 0.36),
-               bed_top + layer * (1 + climb) + 0.3 * fmax(0, done - p->length),
+               bed_top + layer * (1.35 + climb) + 0.3 * fmax(0, done - p->length),
                p->size * (0.5 - at[1]));
 }
 
@@ -57,8 +57,7 @@ static void print_on(gs4_sim *sim, part *p, double t, preview_solid *drawn)
         nozzle.shape = gs4_cylinder(low, high, real(bead));
         nozzle.fill.material = p->begun % 2;
         nozzle.fill.temperature = 200;
-        /* as much as a bead one layer high and as wide as the nozzle takes */
-        nozzle.fill.velocity = vec(0, -2 * layer / (pi * bead) * p->speed, 0);
+        nozzle.fill.velocity = vec(0, -2 * layer / (pi * bead) * p->speed, 0); /* fills a bead */
         nozzle.start = real(t);
         nozzle.stop = real(++p->begun * p->length / p->speed);
         p->emitter = example_need(sim, gs4_add_emitter(sim, &nozzle));
@@ -86,7 +85,7 @@ int main(int argc, char **argv)
     example_options(&e, argc, argv);
     e.frame_time = dt; /* example_frame does the last of a frame */
     const int count = e.row == 1 ? 1 : 3;
-    const double stop = layers * (e.row == 1 ? 0.5 : 0.3);
+    const double stop = layers * (e.row == 1 ? 0.55 : 0.36);
     desc.cell_size = real(width / e.cells);
     desc.cells[0] = desc.cells[1] = desc.cells[2] = e.cells;
     desc.origin = vec(-width / 2, 0, -width / 2);
@@ -117,8 +116,9 @@ int main(int argc, char **argv)
     for (int i = 0; i < count; ++i) {
         part *p = &parts[i];
         p->drawn = e.row == 1 ? stroke_star() : stroke_letters[i];
+        if (i == 2) p->drawn.path[6] = 0.40; /* the bar of 4 ends before its stem */
         p->size = e.row == 1 ? 0.16 : 0.125;
-        p->middle = e.row == 1 ? 0 : 0.107 * (i - 1);
+        p->middle = e.row == 1 ? 0 : 0.112 * (i - 1);
         p->length = p->size * stroke_walk(&p->drawn, 0, NULL);
         p->speed = layers * p->length / stop;
     }

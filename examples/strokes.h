@@ -25,12 +25,13 @@ static const stroke stroke_letters[5] = {
     { 7, { 0.06, 0.03, 0.06, 0.97, 0.46, 0.97, 0.62, 0.84, 0.62, 0.62, 0.46, 0.48, 0.06, 0.48 } }
 };
 
-/* A closed star of five rounded points, one of them up, as high as 1.14 letters. */
+/* A star of five rounded points, one of them up, as high as 1.14 letters. It begins on the right and
+ * ends a little beyond that, so that its ends fuse. */
 static stroke stroke_star(void)
 {
     stroke star = { 0, { 0 } };
-    for (; star.points <= 80; ++star.points) {
-        const double angle = 2 * 3.14159265358979 / 80 * star.points,
+    for (; star.points <= 82; ++star.points) {
+        const double angle = 2 * 3.14159265358979 / 80 * (star.points + 21),
                      r = 0.5 + 0.13 * cos(5 * angle);
         star.path[2 * star.points] = 0.36 + r * sin(angle);
         star.path[2 * star.points + 1] = 0.5 + r * cos(angle);

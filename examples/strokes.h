@@ -25,8 +25,8 @@ static const stroke stroke_letters[5] = {
     { 7, { 0.06, 0.03, 0.06, 0.97, 0.46, 0.97, 0.62, 0.84, 0.62, 0.62, 0.46, 0.48, 0.06, 0.48 } }
 };
 
-/* A star of five rounded points, one of them up, as high as 1.14 letters. It begins on the right and
- * ends a little beyond that, so that its ends fuse. */
+/* A star of five rounded points, one of them up, as high as 1.14 letters. It begins on the right
+ * and ends a little beyond that, so that its ends fuse. */
 static stroke stroke_star(void)
 {
     stroke star = { 0, { 0 } };

@@ -36,7 +36,8 @@ typedef enum example_colour {
     EXAMPLE_PLAIN = 0,
     EXAMPLE_MATERIAL,
     EXAMPLE_SPEED,
-    EXAMPLE_TEMPERATURE
+    EXAMPLE_TEMPERATURE,
+    EXAMPLE_SETTING /* the number of the material where it is solid, look.high where liquid */
 } example_colour;
 
 /* For EXAMPLE_TEMPERATURE, where look.palette is not set: what is solid is grey, what is liquid
@@ -191,11 +192,15 @@ static double example_share(double x, double low, double high)
 static gs4_triangles example_surface(const example *e, gs4_sim *sim)
 {
     const gs4_field fields[] = { GS4_FIELD_POSITION, GS4_FIELD_MASS, GS4_FIELD_VELOCITY,
-                                 GS4_FIELD_TEMPERATURE };
+                                 GS4_FIELD_TEMPERATURE, GS4_FIELD_LIQUID_FRACTION };
     gs4_triangles t, liquid;
     example_need(sim, gs4_surface(sim, fields[e->colour], &t));
     if (e->colour == EXAMPLE_MATERIAL)
         for (int i = 0; i < t.vertex_count; ++i) t.values[i] = (gs4_real)t.materials[i];
+    if (e->colour == EXAMPLE_SETTING)
+        for (int i = 0; i < t.vertex_count; ++i)
+            t.values[i] = real(t.materials[i]
+                               + (double)t.values[i] * ((double)e->look.high - t.materials[i]));
     if (e->colour != EXAMPLE_TEMPERATURE) return t;
     example_need(sim, gs4_surface(sim, GS4_FIELD_LIQUID_FRACTION, &liquid)); /* the same vertices */
     for (int i = 0; i < t.vertex_count; ++i)

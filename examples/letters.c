@@ -8,33 +8,16 @@
  * green are elastic; red, yellow and orange yield at 4 to 10 % of strain and keep the shape that
  * the fall gave them. */
 #include "example.h"
+#include "strokes.h"
 
 enum {
-    LETTERS = 6,
-    MOST_POINTS = 12
+    LETTERS = 6
 };
-
-/* The path of a pen: x and y of its corners in heights of the letter, one after the other. */
-typedef struct pen {
-    int points;
-    double path[2 * MOST_POINTS];
-} pen;
 
 typedef struct letter {
-    const pen *drawn;
+    const stroke *drawn;
     double middle[3], size, tilt, thick;
 } letter;
-
-/* G, S, 4, M, P */
-static const pen pens[5] = {
-    { 10, { 0.62, 0.84, 0.50, 0.97, 0.22, 0.97, 0.06, 0.80, 0.06, 0.20,
-            0.22, 0.03, 0.50, 0.03, 0.64, 0.18, 0.64, 0.46, 0.40, 0.46 } },
-    { 12, { 0.62, 0.84, 0.50, 0.97, 0.20, 0.97, 0.06, 0.84, 0.06, 0.66, 0.20, 0.53,
-            0.50, 0.47, 0.64, 0.34, 0.64, 0.16, 0.50, 0.03, 0.20, 0.03, 0.06, 0.16 } },
-    { 4, { 0.50, 0.03, 0.50, 0.97, 0.04, 0.34, 0.68, 0.34 } },
-    { 5, { 0.06, 0.03, 0.06, 0.97, 0.40, 0.45, 0.74, 0.97, 0.74, 0.03 } },
-    { 7, { 0.06, 0.03, 0.06, 0.97, 0.46, 0.97, 0.62, 0.84, 0.62, 0.62, 0.46, 0.48, 0.06, 0.48 } }
-};
 
 /* Distance to the round bar that the pen drew, with flat front and back. */
 static gs4_real letter_distance(gs4_vec3 at, void *user)
@@ -98,7 +81,7 @@ int main(int argc, char **argv)
     for (int i = 0; i < LETTERS; ++i) {
         letter *l = &letters[i];
         const double r = 0.11;
-        l->drawn = &pens[which[i]];
+        l->drawn = &stroke_letters[which[i]];
         l->size = 0.13;
         l->thick = 0.085;
         l->tilt = place[i][2];

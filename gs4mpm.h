@@ -583,6 +583,9 @@
  *     GS4_STATIC               all functions static                                with the impl.
  *     GS4_PTHREADS             compile the thread pool (link with -lpthread)       with the impl.
  *     GS4_NO_VECTORS           arrays instead of vectors; the same bits, slower    with the impl.
+ *     GS4_NO_VISCOELASTIC, GS4_NO_SOLIDS, GS4_NO_HEAT, GS4_NO_IMPLICIT, GS4_NO_FILES
+ *                              left out, and refused with a sentence; all else has with the impl.
+ *                              the same bits. Without files no stdio.h
  *
  * ERRORS. Every call returns 0 or more for success and a negative gs4_result otherwise;
  * gs4_last_error has a sentence. Every field is checked, NaN included. A call that fails has
@@ -1296,14 +1299,38 @@ GS4_API void gs4_poisson_destroy(gs4_poisson *solver); /* NULL is fine */
 
 /* ==== [[base]] arithmetic rules, memory, text, tasks ========================================== */
 
+/* What is left out: 0 where the way to it parts, so that compilers drop what lies behind. */
+#ifdef GS4_NO_VISCOELASTIC
+#define GS4I_WITH_VISCOELASTIC 0
+#else
+#define GS4I_WITH_VISCOELASTIC 1
+#endif
+#ifdef GS4_NO_SOLIDS
+#define GS4I_WITH_SOLIDS 0
+#else
+#define GS4I_WITH_SOLIDS 1
+#endif
+#ifdef GS4_NO_HEAT
+#define GS4I_WITH_HEAT 0
+#else
+#define GS4I_WITH_HEAT 1
+#endif
+#ifdef GS4_NO_IMPLICIT
+#define GS4I_WITH_IMPLICIT 0
+#else
+#define GS4I_WITH_IMPLICIT 1
+#endif
+
 #include <stdlib.h>
 #include <string.h>
-#include <stdio.h>
 #include <math.h>
 #include <float.h>
 #include <limits.h>
 #include <assert.h>
-#if defined(__unix__) || defined(__APPLE__)
+#ifndef GS4_NO_FILES
+#include <stdio.h>
+#endif
+#if (defined(__unix__) || defined(__APPLE__)) && !defined(GS4_NO_FILES)
 #include <sys/types.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -5784,6 +5811,7 @@ static void gs4i_grid_link(gs4i_grid *g)
     g->colour_first[8] = n;
 }
 
+#ifndef GS4_NO_FILES
 /* Have all blocks around the occupied ones, and those they reach behind periodic walls, nodes? */
 static int gs4i_grid_is_complete(const gs4i_grid *g)
 {
@@ -5801,6 +5829,7 @@ static int gs4i_grid_is_complete(const gs4i_grid *g)
     }
     return 1;
 }
+#endif
 
 /* What nodes remember, moved to the slots of the n blocks of `list`. Between steps `force` and
  * `momentum` are free: they take the new order. */
@@ -12542,8 +12571,8 @@ GS4I_INLINE void gs4i_stress(gs4i_response *r, gs4i_gradient L, const gs4i_wide 
 {
     gs4i_liquid_stress(&r->constants, J, L, sigma, mu);
     gs4i_see_liquids(&r->seen, &r->constants, J, mu);
-    if (r->p->elastic_reals) gs4i_add_elastic(r, L, sigma);
-    if (r->p->deformation_reals) gs4i_add_solid(r, L, J, sigma);
+    if (GS4I_WITH_VISCOELASTIC && r->p->elastic_reals) gs4i_add_elastic(r, L, sigma);
+    if (GS4I_WITH_SOLIDS && r->p->deformation_reals) gs4i_add_solid(r, L, J, sigma);
 }
 
 /* What a solve for the velocity of the stage has as viscosity, mu + eta + that of solids, and what
@@ -12563,8 +12592,8 @@ static void gs4i_stress_to_solve(gs4i_response *r, gs4i_gradient L, const gs4i_w
     gs4i_see_thinnest(&r->seen, &r->constants, mu);
     memset(eta, 0, sizeof(gs4i_lanes));
     memset(solid, 0, sizeof(gs4i_lanes));
-    if (r->p->deformation_reals) gs4i_tangent_of_solid(r, L, J, solid);
-    if (!r->p->elastic_reals || r->report->bad) return;
+    if (GS4I_WITH_SOLIDS && r->p->deformation_reals) gs4i_tangent_of_solid(r, L, J, solid);
+    if (!GS4I_WITH_VISCOELASTIC || !r->p->elastic_reals || r->report->bad) return;
     k = gs4i_begin_solved(r, L, (double)r->integrator->alpha_f, G, &e, &count);
     gs4i_known_stress(&k, &e, L, q, stage, &count);
     memcpy(eta, k.eta, sizeof k.eta);
@@ -12680,8 +12709,8 @@ static void gs4i_advance_response(gs4i_response *r, size_t i, int n, gs4i_gradie
     if (!r->p->elastic_reals && !r->p->deformation_reals && !r->heat) return;
     gs4i_turn_to_batch(r, i, n);
     if (r->heat && r->constants.varies & GS4I_BY_CALL) gs4i_load_batch_heat(r);
-    if (r->p->elastic_reals) gs4i_advance_elastic(r, L, commit);
-    if (r->p->deformation_reals) gs4i_advance_solid(r, L, rates, J, commit);
+    if (GS4I_WITH_VISCOELASTIC && r->p->elastic_reals) gs4i_advance_elastic(r, L, commit);
+    if (GS4I_WITH_SOLIDS && r->p->deformation_reals) gs4i_advance_solid(r, L, rates, J, commit);
 }
 
 /* ==== [[boundary]] walls by images, bodies by nodes, what contact does to velocities =========== *
@@ -17187,7 +17216,7 @@ static void gs4i_scatter_stage(int index, void *context)
     gs4_sim *sim = pass->sim;
     const gs4i_grid *g = &sim->grid;
     const gs4i_particles p = sim->particles;
-    gs4i_heat_pass heat_pass, *heat = p.with_heat ? &heat_pass : NULL;
+    gs4i_heat_pass heat_pass, *heat = GS4I_WITH_HEAT && p.with_heat ? &heat_pass : NULL;
     const gs4i_integrator integrator = sim->integrator;
     const int o = pass->blocks[index], next = gs4i_next_block(pass, index);
     const gs4i_frame frame = gs4i_tile_frame(g, g->occupied_block[o]);
@@ -17488,7 +17517,7 @@ static void gs4i_correct_contact(gs4_sim *sim, int block, const uint64_t *clear,
             memset(L->dx + 4 * b, 0, 4 * sizeof *L->dx);
             memset(L->dy + 4 * b, 0, 4 * sizeof *L->dy);
             memset(L->dz + 4 * b, 0, 4 * sizeof *L->dz);
-            if (sim->particles.with_heat)
+            if (GS4I_WITH_HEAT && sim->particles.with_heat)
                 gs4i_begin_heat(&sim->particles, i + (size_t)b,
                                 &sim->constants[sim->particles.material[i + (size_t)b]],
                                 emitter->is.temperature);
@@ -17674,7 +17703,7 @@ static void gs4i_correct(int index, void *context)
     gs4_sim *sim = pass->sim;
     const gs4i_grid *g = &sim->grid;
     const gs4i_particles p = sim->particles;
-    gs4i_heat_pass heat_pass, *heat = p.with_heat ? &heat_pass : NULL;
+    gs4i_heat_pass heat_pass, *heat = GS4I_WITH_HEAT && p.with_heat ? &heat_pass : NULL;
     const gs4i_integrator integrator = gs4i_integrator_of_block(sim, pass->blocks[index]);
     const int o = pass->blocks[index], next = gs4i_next_block(pass, index);
     const gs4i_frame frame = gs4i_tile_frame(g, g->occupied_block[o]);
@@ -17699,7 +17728,7 @@ static void gs4i_correct(int index, void *context)
         int solids = 0;
         gs4i_tile_prefetch(g, next, row, gs4i_gradient_velocity(g));
         gs4i_tile_prefetch(g, next, row, gs4i_acceleration(g));
-        if (p.deformation_reals) {
+        if (GS4I_WITH_SOLIDS && p.deformation_reals) {
             gs4i_turn_to_batch(&r, i, n);
             solids = gs4i_load_solid_constants(&r.constants, &r.solid);
         }
@@ -17961,7 +17990,7 @@ static void gs4i_scatter_affinely(int index, void *context)
     gs4_sim *sim = pass->sim;
     const gs4i_grid *g = &sim->grid;
     const gs4i_particles p = sim->particles;
-    gs4i_heat_pass heat_pass, *heat = p.with_heat ? &heat_pass : NULL;
+    gs4i_heat_pass heat_pass, *heat = GS4I_WITH_HEAT && p.with_heat ? &heat_pass : NULL;
     const int o = pass->blocks[index];
     const gs4i_frame frame = gs4i_tile_frame(g, g->occupied_block[o]);
     gs4i_report *report = &sim->reports[o];
@@ -18051,7 +18080,7 @@ static void gs4i_gather_euler(int index, void *context)
     gs4_sim *sim = pass->sim;
     const gs4i_grid *g = &sim->grid;
     const gs4i_particles p = sim->particles;
-    gs4i_heat_pass heat_pass, *heat = p.with_heat ? &heat_pass : NULL;
+    gs4i_heat_pass heat_pass, *heat = GS4I_WITH_HEAT && p.with_heat ? &heat_pass : NULL;
     const int o = pass->blocks[index], next = gs4i_next_block(pass, index);
     const int edge = gs4i_at_edge(g, o) || gs4i_jumps_are_near(g, o);
     const gs4i_frame frame = gs4i_tile_frame(g, g->occupied_block[o]);
@@ -20863,7 +20892,7 @@ static void gs4i_scatter_stress(int index, void *context)
     gs4_sim *sim = pass->sim;
     gs4i_staggered *f = &sim->staggered;
     const gs4i_particles p = sim->particles;
-    gs4i_heat_pass heat_pass, *heat = p.with_heat ? &heat_pass : NULL;
+    gs4i_heat_pass heat_pass, *heat = GS4I_WITH_HEAT && p.with_heat ? &heat_pass : NULL;
     const int o = pass->blocks[index];
     const gs4i_frame frame = gs4i_tile_frame(&sim->grid, sim->grid.occupied_block[o]);
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
@@ -21624,7 +21653,7 @@ static void gs4i_correct_from_faces(int index, void *context)
     gs4_sim *sim = pass->sim;
     const gs4i_grid *g = &sim->grid;
     const gs4i_particles p = sim->particles;
-    gs4i_heat_pass heat_pass, *heat = p.with_heat ? &heat_pass : NULL;
+    gs4i_heat_pass heat_pass, *heat = GS4I_WITH_HEAT && p.with_heat ? &heat_pass : NULL;
     const gs4i_integrator integrator = sim->integrator;
     const int o = pass->blocks[index], with_rates = gs4i_has_known_stress(sim),
               with_impacts = pass->commit && gs4i_has_impacts(sim);
@@ -21843,7 +21872,7 @@ static void gs4i_scatter_viscosity(int index, void *context)
     const gs4i_frame frame = gs4i_tile_frame(&sim->grid, sim->grid.occupied_block[o]);
     const gs4_real least = GS4I_C(GS4I_LEAST_VISCOSITY) / (integrator->s * integrator->inv_area);
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
-    gs4i_heat_pass heat_pass, *heat = p.with_heat ? &heat_pass : NULL;
+    gs4i_heat_pass heat_pass, *heat = GS4I_WITH_HEAT && p.with_heat ? &heat_pass : NULL;
     const int known = gs4i_has_known_stress(sim);
     gs4i_number_tile velocity[3];
     gs4i_stress_tiles tiles;
@@ -22228,8 +22257,8 @@ static void gs4i_stress_of_trial(gs4i_response *r, const gs4i_tangent *t, gs4i_g
     for (a = 0; a < 3; a++)
         for (c = a; c < 3; c++)
             GS4I_BATCH_LOOP(b) sigma[gs4i_place[a][c]][b] = mu[b] * (L[a][c][b] + L[c][a][b]);
-    if (r->p->elastic_reals) gs4i_add_elastic(r, L, sigma);
-    if (r->p->deformation_reals) gs4i_add_solid(r, L, J, sigma);
+    if (GS4I_WITH_VISCOELASTIC && r->p->elastic_reals) gs4i_add_elastic(r, L, sigma);
+    if (GS4I_WITH_SOLIDS && r->p->deformation_reals) gs4i_add_solid(r, L, J, sigma);
 }
 
 /* Its tangent, as if all were isotropic: of solids, whose stress has no trace, without that of L.
@@ -22262,7 +22291,7 @@ static void gs4i_scatter_trial(int index, void *context)
     gs4i_staggered *f = &sim->staggered;
     const gs4i_particles p = sim->particles;
     const gs4i_tangent *tangent = (const gs4i_tangent *)f->tangent.data;
-    gs4i_heat_pass heat_pass, *heat = p.with_heat ? &heat_pass : NULL;
+    gs4i_heat_pass heat_pass, *heat = GS4I_WITH_HEAT && p.with_heat ? &heat_pass : NULL;
     const int o = pass->blocks[index];
     const gs4i_frame frame = gs4i_tile_frame(&sim->grid, sim->grid.occupied_block[o]);
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
@@ -22700,8 +22729,8 @@ static const gs4i_scheme *gs4i_scheme_of(const gs4_sim *sim)
         gs4i_finish_faces,           gs4i_accelerate_by_solve,
         gs4i_stable_semi_implicit_dt
     };
-    if (sim->desc.scheme == GS4_PARTITIONED) return &partitioned;
-    if (sim->desc.scheme == GS4_SEMI_IMPLICIT) return &semi_implicit;
+    if (GS4I_WITH_IMPLICIT && sim->desc.scheme == GS4_PARTITIONED) return &partitioned;
+    if (GS4I_WITH_IMPLICIT && sim->desc.scheme == GS4_SEMI_IMPLICIT) return &semi_implicit;
     return sim->desc.integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER ? &euler : &gs4;
 }
 
@@ -23403,9 +23432,13 @@ static int gs4i_make_history(gs4_sim *sim, const gs4_material *material)
 {
     gs4i_particles *p = &sim->particles;
     const gs4i_particles before = *p;
-    int result = material->liquid != GS4_NEWTONIAN ? gs4i_make_elastic(sim) : GS4_OK;
-    if (result == GS4_OK && material->solid != GS4_NO_SOLID) result = gs4i_make_deformation(sim);
-    if (result == GS4_OK && gs4i_has_heat(material)) result = gs4i_make_heat(sim, material);
+    int result = GS4I_WITH_VISCOELASTIC && material->liquid != GS4_NEWTONIAN
+                     ? gs4i_make_elastic(sim)
+                     : GS4_OK;
+    if (GS4I_WITH_SOLIDS && result == GS4_OK && material->solid != GS4_NO_SOLID)
+        result = gs4i_make_deformation(sim);
+    if (GS4I_WITH_HEAT && result == GS4_OK && gs4i_has_heat(material))
+        result = gs4i_make_heat(sim, material);
     if (result == GS4_OK) return GS4_OK;
     if (p->elastic != before.elastic)
         gs4i_free(&sim->memory, p->elastic, (size_t)p->capacity + 1,
@@ -23524,7 +23557,8 @@ static int gs4i_add_particle(gs4_sim *sim, gs4_vec3 x, gs4_vec3 v, gs4_real mass
     if (p->elastic_reals)
         memset(p->elastic + (size_t)p->elastic_reals * i, 0, (size_t)p->elastic_reals * real);
     if (p->deformation_reals) gs4i_undeform(p, i, 1);
-    if (p->with_heat) gs4i_begin_heat(p, i, &sim->constants[f->material], f->temperature);
+    if (GS4I_WITH_HEAT && p->with_heat)
+        gs4i_begin_heat(p, i, &sim->constants[f->material], f->temperature);
     p->id[i] = sim->next_id++;
     p->material[i] = (uint8_t)f->material;
     p->count++;
@@ -24551,6 +24585,22 @@ static int gs4i_empty_shape(gs4_sim *sim, const gs4_shape *shape)
     return result;
 }
 
+/* What belongs to the blocks and particles of a simulation. */
+static GS4I_COLD void gs4i_release_state(gs4_sim *sim)
+{
+    gs4i_memory *m = &sim->memory;
+    int i;
+    gs4i_particles_free(m, &sim->particles);
+    gs4i_grid_free(m, &sim->grid);
+    for (i = 0; i < 6; i++)
+        gs4i_free(m, sim->boundary.mirrors[i], (size_t)sim->boundary.mirror_capacity[i],
+                  sizeof(gs4i_mirror_pair));
+    gs4i_free(m, sim->reports, (size_t)sim->report_capacity, sizeof(gs4i_report));
+    gs4i_free_image_particles(m, &sim->image_particles);
+    gs4i_free_conduction(m, &sim->conduction);
+    gs4i_free_staggered(m, &sim->staggered);
+}
+
 /* ==== [[step]] one step; the function to read first is gs4i_step, at the end of this section == */
 
 /* --- what can go wrong, in words -------------------------------------------------------------- */
@@ -24691,7 +24741,7 @@ static void gs4i_find_limits(const gs4_sim *sim, gs4_real top_speed, gs4i_report
     gs4i_report_clear(report);
     gs4i_begin_response(&r, sim, p, NULL, report, NULL);
     memset(&heat, 0, sizeof heat);
-    if (p->with_heat) r.heat = &heat;
+    if (GS4I_WITH_HEAT && p->with_heat) r.heat = &heat;
     for (i = 0; i < p->count; i += GS4I_BATCH) {
         const int n = gs4i_batch_size((size_t)i, (size_t)p->count);
         gs4i_batch q;
@@ -24955,7 +25005,9 @@ static int gs4i_after_occupy(gs4_sim *sim)
         sim->reports = r;
         sim->report_capacity = sim->grid.occupied_capacity;
     }
-    return gs4i_reserve_conduction(sim) == GS4_OK ? GS4_OK : gs4i_fail_memory(&sim->error);
+    return !GS4I_WITH_HEAT || gs4i_reserve_conduction(sim) == GS4_OK
+               ? GS4_OK
+               : gs4i_fail_memory(&sim->error);
 }
 
 /* S1: sort. */
@@ -25157,9 +25209,9 @@ static int gs4i_scatter_state(gs4_sim *sim, gs4i_node_pass *nodes)
 {
     if (sim->needs_sort) GS4I_TRY(gs4i_bin(sim));
     if (sim->needs_spin && sim->particles.with_rates)
-        GS4I_TRY(sim->particles.with_affine         ? gs4i_find_affine(sim, nodes)
-                 : sim->particles.deformation_reals ? gs4i_find_spin(sim, nodes)
-                                                    : GS4_OK);
+        GS4I_TRY(GS4I_WITH_IMPLICIT && sim->particles.with_affine ? gs4i_find_affine(sim, nodes)
+                 : GS4I_WITH_SOLIDS && sim->particles.deformation_reals ? gs4i_find_spin(sim, nodes)
+                                                                        : GS4_OK);
     return gs4i_scatter_momenta(sim, nodes);
 }
 
@@ -25199,7 +25251,7 @@ static int gs4i_make_step(gs4_sim *sim, gs4_real dt)
     if (sim->particles.count) {
         GS4I_TRY(gs4i_scatter_state(sim, &nodes));
         GS4I_TRY(gs4i_accelerate(sim, &nodes));
-        if (sim->particles.with_heat) GS4I_TRY(gs4i_solve_heat(sim, &nodes));
+        if (GS4I_WITH_HEAT && sim->particles.with_heat) GS4I_TRY(gs4i_solve_heat(sim, &nodes));
         GS4I_TRY(gs4i_validate(sim, &nodes));
         gs4i_correct_particles(sim, &nodes);
     }
@@ -25220,6 +25272,7 @@ static int gs4i_step(gs4_sim *sim, gs4_real dt)
     return result;
 }
 
+#ifndef GS4_NO_FILES
 /* ==== [[files]] frames and checkpoints ======================================================== */
 
 /* A file that appears under its name only when it is whole: written beside it under a name of its
@@ -26044,22 +26097,6 @@ static int gs4i_rebuild(gs4_sim *next, const gs4i_head *h, const gs4i_pieces *p)
     return gs4i_state_is_sound(next, h, p) ? GS4_OK : GS4_ERROR_FORMAT;
 }
 
-/* What belongs to the blocks and particles of a simulation. */
-static GS4I_COLD void gs4i_release_state(gs4_sim *sim)
-{
-    gs4i_memory *m = &sim->memory;
-    int i;
-    gs4i_particles_free(m, &sim->particles);
-    gs4i_grid_free(m, &sim->grid);
-    for (i = 0; i < 6; i++)
-        gs4i_free(m, sim->boundary.mirrors[i], (size_t)sim->boundary.mirror_capacity[i],
-                  sizeof(gs4i_mirror_pair));
-    gs4i_free(m, sim->reports, (size_t)sim->report_capacity, sizeof(gs4i_report));
-    gs4i_free_image_particles(m, &sim->image_particles);
-    gs4i_free_conduction(m, &sim->conduction);
-    gs4i_free_staggered(m, &sim->staggered);
-}
-
 /* A copy that has no particles and no nodes yet, but says what they will carry. */
 static void gs4i_copy_without_state(const gs4_sim *sim, const gs4i_head *h, gs4_sim *next)
 {
@@ -26225,6 +26262,29 @@ static GS4I_COLD int gs4i_load(gs4_sim *sim, const char *path)
     fclose(f);
     return result;
 }
+#else
+/* What files are asked for where they are left out. */
+static int gs4i_fail_without_files(gs4_sim *sim, const char *path)
+{
+    (void)path;
+    return gs4i_fail(&sim->error, GS4_ERROR_ARGUMENT,
+                     "this was compiled without files (GS4_NO_FILES)");
+}
+
+static int gs4i_write_ply(gs4_sim *sim, const char *path)
+{
+    return gs4i_fail_without_files(sim, path);
+}
+
+static int gs4i_write_raw(gs4_sim *sim, const char *path)
+{
+    return gs4i_fail_without_files(sim, path);
+}
+
+static int gs4i_save(gs4_sim *sim, const char *path) { return gs4i_fail_without_files(sim, path); }
+
+static int gs4i_load(gs4_sim *sim, const char *path) { return gs4i_fail_without_files(sim, path); }
+#endif /* GS4_NO_FILES */
 
 /* ==== [[surface]] the surface of the material as triangles ===================================== *
  *
@@ -27429,6 +27489,7 @@ static int gs4i_make_surface(gs4_sim *sim, const gs4_view *field, gs4_triangles 
     return result == GS4_ERROR_MEMORY ? gs4i_fail_memory(&sim->error) : result;
 }
 
+#ifndef GS4_NO_FILES
 /* PLY with vertices and faces, as gs4i_write_ply. */
 static GS4I_COLD int gs4i_write_triangles(gs4_sim *sim, const gs4_triangles *t, const char *value,
                                           const char *path)
@@ -27465,6 +27526,15 @@ static GS4I_COLD int gs4i_write_triangles(gs4_sim *sim, const gs4_triangles *t, 
     gs4i_put_records(&f, face, 2, t->triangle_count);
     return gs4i_file_close(sim, &f);
 }
+#else
+static int gs4i_write_triangles(gs4_sim *sim, const gs4_triangles *t, const char *value,
+                                const char *path)
+{
+    (void)t;
+    (void)value;
+    return gs4i_fail_without_files(sim, path);
+}
+#endif
 
 /* ==== [[public]] every value checked, then the work =========================================== */
 
@@ -27714,6 +27784,9 @@ static int gs4i_check_numerics(gs4i_error *e, const gs4_sim_desc *d)
 {
     GS4I_TRY(gs4i_require_between(e, GS4_EXPLICIT, GS4_SEMI_IMPLICIT, "scheme is ", (int)d->scheme,
                                   "; it is none of gs4_scheme"));
+    GS4I_TRY(gs4i_require(e, GS4I_WITH_IMPLICIT || d->scheme == GS4_EXPLICIT,
+                          "scheme: the implicit ones were left out (GS4_NO_IMPLICIT); use "
+                          "GS4_EXPLICIT"));
     GS4I_TRY(gs4i_require_between(e, GS4_INTEGRATOR_GS4, GS4_INTEGRATOR_SYMPLECTIC_EULER,
                                   "integrator is ", (int)d->integrator,
                                   "; it is none of gs4_integrator"));
@@ -28040,12 +28113,26 @@ static int gs4i_check_scales(gs4i_error *e, gs4_real cell_size, const gs4_materi
         "gs4_real; use other units, or define GS4_DOUBLE");
 }
 
+/* Nothing of what was left out when this was compiled. */
+static int gs4i_check_left_out(gs4i_error *e, const gs4_material *m)
+{
+    GS4I_TRY(gs4i_require(e, GS4I_WITH_VISCOELASTIC || m->liquid == GS4_NEWTONIAN,
+                          "liquid: viscoelastic ones were left out (GS4_NO_VISCOELASTIC); use "
+                          "GS4_NEWTONIAN"));
+    GS4I_TRY(gs4i_require(e, GS4I_WITH_SOLIDS || m->solid == GS4_NO_SOLID,
+                          "solid: solids were left out (GS4_NO_SOLIDS); use GS4_NO_SOLID"));
+    return gs4i_require(e, GS4I_WITH_HEAT || !gs4i_has_heat(m),
+                        "conductivity, can_melt or viscous_heating: heat was left out "
+                        "(GS4_NO_HEAT); they must be 0");
+}
+
 static GS4I_COLD int gs4i_check_material(gs4i_error *e, const gs4i_scene *scene,
                                          const gs4_material *m)
 {
     const double K = (double)m->density * (double)m->sound_speed * (double)m->sound_speed;
     GS4I_TRY(gs4i_check(e, "density", m->density, GS4I_POSITIVE));
     GS4I_TRY(gs4i_check(e, "viscosity", m->viscosity, GS4I_NOT_NEGATIVE));
+    GS4I_TRY(gs4i_check_left_out(e, m));
     GS4I_TRY(gs4i_check_viscoelastic(e, m));
     GS4I_TRY(gs4i_check_solid(e, scene, m));
     GS4I_TRY(gs4i_check_cross_wlf(e, scene, m));
@@ -28451,7 +28538,7 @@ static void gs4i_settle_edit(const gs4_sim *sim)
 {
     const gs4i_particles *p = &sim->particles;
     int i;
-    for (i = 0; i < p->count && p->with_heat && sim->needs_check; i++)
+    for (i = 0; i < p->count && GS4I_WITH_HEAT && p->with_heat && sim->needs_check; i++)
         if (gs4i_abs(p->heat[4 * (size_t)i]) < GS4I_HUGE)
             gs4i_settle_phase(p, (size_t)i, &sim->constants[p->material[i]]);
 }
@@ -29465,8 +29552,8 @@ static int gs4i_make_point_batch(gs4i_error *e, const gs4_material *material,
     }
     q->mu = gs4i_viscosity_of(&q->mat, point->temperature, q->L, 0);
     if (!(q->mu >= 0 && q->mu < GS4I_HUGE)) return gs4i_fail_viscosity(e, q->mu);
-    gs4i_load_elastic_constants(&q->constants, &q->elastic);
-    return gs4i_load_solid_constants(&q->constants, &q->solid)
+    if (GS4I_WITH_VISCOELASTIC) gs4i_load_elastic_constants(&q->constants, &q->elastic);
+    return GS4I_WITH_SOLIDS && gs4i_load_solid_constants(&q->constants, &q->solid)
                ? gs4i_load_point_deformation(e, point->deformation, q)
                : GS4_OK;
 }
@@ -29531,8 +29618,11 @@ static int gs4i_point_step(gs4i_error *e, const gs4_material *material, gs4_poin
                                 ", which is more than rho_inf"));
     memset(&integrator, 0, sizeof integrator);
     integrator.dt = dt;
-    if (q.mat.shear_modulus > 0) return gs4i_step_solid_point(e, &q, &integrator, point);
-    return q.mat.inv_lambda > 0 ? gs4i_step_liquid_point(e, &q, &integrator, rho, point) : GS4_OK;
+    if (GS4I_WITH_SOLIDS && q.mat.shear_modulus > 0)
+        return gs4i_step_solid_point(e, &q, &integrator, point);
+    return GS4I_WITH_VISCOELASTIC && q.mat.inv_lambda > 0
+               ? gs4i_step_liquid_point(e, &q, &integrator, rho, point)
+               : GS4_OK;
 }
 
 GS4_API int gs4_point_step(const gs4_material *material, gs4_point *point,
@@ -29557,7 +29647,8 @@ static int gs4i_point_stress(gs4i_error *e, const gs4_material *material, const 
     GS4I_TRY(gs4i_require(e, cauchy != NULL, "cauchy is NULL"));
     mu = q.mat.local * q.mu;
     memset(solid, 0, sizeof solid);
-    if (q.mat.shear_modulus > 0) gs4i_solid_stress(&q.solid, q.d.F, q.J, solid, stiffness);
+    if (GS4I_WITH_SOLIDS && q.mat.shear_modulus > 0)
+        gs4i_solid_stress(&q.solid, q.d.F, q.J, solid, stiffness);
     for (i = 0; i < 3; i++)
         for (j = i; j < 3; j++)
             cauchy[gs4i_place[i][j]] =
@@ -30751,6 +30842,10 @@ GS4_API GS4I_COLD int gs4_estimate(const gs4_sim *sim, gs4_scheme scheme, gs4_in
 #undef GS4I_WIDE_MAX
 #undef GS4I_WIDE_MIN
 #undef GS4I_WIDTH
+#undef GS4I_WITH_HEAT
+#undef GS4I_WITH_IMPLICIT
+#undef GS4I_WITH_SOLIDS
+#undef GS4I_WITH_VISCOELASTIC
 
 #endif /* GS4MPM_IMPLEMENTATION */
 

@@ -11,7 +11,7 @@
 int main(int argc, char **argv)
 {
     static const double latent[3] = { 0, 2e5, 2e6 };
-    const double width = 0.20, radius = 0.024, height = 0.085, faster = 400;
+    const double width = 0.20, radius = 0.03, height = 0.085, faster = 400;
     example e = { 0 };
     gs4_sim_desc desc = { 0 };
     gs4_material m;
@@ -39,8 +39,8 @@ int main(int argc, char **argv)
 
     example_need(sim, gs4_material_preset("wax", &m));
     m.latent_heat = real(latent[e.row - 1]);
-    /* twenty times that of paraffin: drops that hang, not a splash */
-    m.viscosity = 1;
+    /* eighty times that of paraffin: films thicker than a cell, and no splash */
+    m.viscosity = 4;
     m.conductivity = real((double)m.conductivity * faster);
     fill.material = example_need(sim, gs4_add_material(sim, &m));
     fill.temperature = 20;

@@ -10,7 +10,7 @@ cd "$(dirname "$0")/.." || exit 1
 CC=${CC:-cc}
 
 quick='few_layout few_warnings few_hashes'
-full='warnings tsan fused scenes hashes asan fuzz arm hashes_double wasm windows tiny musl i386 form layout names units snippets link frames examples web'
+full='warnings tsan fused scenes hashes asan fuzz arm hashes_double wasm windows tiny musl i386 form layout names left_out units snippets link frames examples web'
 
 # A transfer kernel may be longer than 60 lines; nothing else. This one is a transpose, spelled out.
 long_functions='gs4i_from_lanes'
@@ -118,6 +118,29 @@ few_warnings() {
     check "$CC declarations" $CC -std=c99 $strict_c -I. -fsyntax-only "$tmp/declarations.c"
     have clang && check "clang -DGS4_DOUBLE" clang -std=c11 $strict_c -DGS4_DOUBLE -I. -fsyntax-only "$tmp/implementation.c"
     have g++ && check "g++ -DGS4_STATIC -DGS4_NO_VECTORS" g++ -std=c++11 $strict -DGS4_STATIC -DGS4_NO_VECTORS -I. -fsyntax-only "$tmp/implementation.cpp"
+}
+
+# ==== what is left out =========================================================================================
+
+# left_out_of COMPILER SWITCH...: refuses what it is without, and has the hash of one that is without nothing
+left_out_of() {
+    check "$*" "$@" -O1 -I. tests/left_out.c -o "$tmp/left_out" -lm || return
+    (cd "$tmp" && ./left_out) > "$tmp/left_out.hash" 2>&1
+    check "$* refuses that" test $? -eq 0
+    check "$* has the same bits else" cmp "$tmp/left_out.hash" "$tmp/whole.hash"
+}
+
+left_out() {
+    all='-DGS4_NO_VISCOELASTIC -DGS4_NO_SOLIDS -DGS4_NO_HEAT -DGS4_NO_IMPLICIT -DGS4_NO_FILES'
+    check "nothing" $CC -O1 -I. tests/left_out.c -o "$tmp/whole" -lm || return
+    (cd "$tmp" && ./whole) > "$tmp/whole.hash" 2>&1
+    check "works" test $? -eq 0
+    for switch in $all "$all"; do left_out_of $CC -std=c99 $strict_c $switch; done
+    have clang && left_out_of clang -std=c99 $strict_c $all
+    have g++ && left_out_of g++ -std=c++11 -x c++ $strict $all
+    have tcc && check "tcc" tcc -Wall -Werror $all -I. -c "$tmp/implementation.c" -o "$tmp/left_out.o"
+    $CC -O1 -DGS4_DOUBLE -I. tests/left_out.c -o "$tmp/whole" -lm && (cd "$tmp" && ./whole) > "$tmp/whole.hash" 2>&1
+    left_out_of $CC -std=c99 $strict_c -DGS4_DOUBLE $all
 }
 
 # ==== several translation units ================================================================================

@@ -3,8 +3,8 @@
  *     ./wax --row 1       no latent heat; --row 2: 2e5 J/kg, paraffin; --row 3: ten times that
  *
  * After figure 5 of "Augmented MPM" (2014), where the factors are 0, 1 and 10 too. The air has
- * 160 degrees, wax melts at 56. After two seconds row 1 is a puddle and row 2 a column on what
- * has run off it; row 3 has not begun to run after three. Greys are solid, colours liquid. Wax
+ * 160 degrees, wax melts at 56. After two seconds row 1 is a puddle, after three row 2 is a column
+ * on what has run off it, and row 3 has not begun to run. Greys are solid, colours liquid. Wax
  * conducts 400 times too well here. */
 #include "example.h"
 

@@ -1,6 +1,7 @@
-/* left_out.c - what is left out when the library is compiled (GS4_NO_SOLIDS and the like) is refused
- * with a sentence that names the macro, and changes nothing; what is not works as ever. Prints the
- * hash of a scene that needs none of it: the same of all builds. tests/portability.sh left_out. */
+/* left_out.c - what is left out when the library is compiled (GS4_NO_SOLIDS and the like) is
+ * refused with a sentence that names the macro, and changes nothing; what is not works as ever.
+ * Prints the hash of a scene that needs none of it: the same of all builds. portability.sh
+ * left_out runs it. */
 #include <stdio.h>
 #define GS4MPM_IMPLEMENTATION
 #include "gs4mpm.h"

@@ -12806,10 +12806,11 @@ typedef struct gs4i_patch {
 
 /* What the particles of a block have of the surface of a body. */
 typedef struct gs4i_surface {
-    int kind, has_images; /* GS4I_SURFACE_*; may particles have images by it? */
-    gs4_vec3 at, n;       /* midst of the block; where the body is flat, its normal */
-    gs4_real d;           /* distance of `at` */
-    gs4_real nearest;     /* no node that particles of the block see is nearer, up to three cells */
+    /* GS4I_SURFACE_*; may particles have images by it; is it one with those of other bodies? */
+    int kind, has_images, is_floor;
+    gs4_vec3 at, n;   /* midst of the block; where the body is flat, its normal */
+    gs4_real d;       /* distance of `at` */
+    gs4_real nearest; /* no node that particles of the block see is nearer, up to three cells */
 } gs4i_surface;
 
 typedef struct gs4i_patches {
@@ -15238,91 +15239,132 @@ enum {
     GS4I_SURFACE_CURVED
 };
 
-/* The least distance of p from sticky bodies at rest. */
-static gs4_real gs4i_still_distance(const gs4i_boundary *all, gs4_vec3 p)
+/* What occupied block o has of the surface of a body, once that is found. */
+GS4I_INLINE const gs4i_surface *gs4i_surface_of(const gs4_sim *sim, int collider, int o)
+{
+    return (const gs4i_surface *)sim->image_particles.patches.surfaces.data
+           + (size_t)collider * (size_t)sim->grid.occupied + (size_t)o;
+}
+
+#define GS4I_MOST_OF_FLOOR 128
+
+/* Sticky bodies at rest that may be part of a floor near a block; with more than there is room for
+ * none is. */
+typedef struct gs4i_floor {
+    const gs4i_collider *body[GS4I_MOST_OF_FLOOR];
+    int count;
+    gs4_real reach, deep; /* how far around the block, and how deep below, it has to be flat */
+} gs4i_floor;
+
+static void gs4i_find_floor(const gs4i_boundary *all, gs4_vec3 p, gs4i_floor *f)
+{
+    int i;
+    for (f->count = i = 0; i < all->collider_count; i++) {
+        const gs4i_collider *b = &all->colliders[i];
+        /* the farthest of the points of gs4i_floor_is_flat */
+        if (!gs4i_is_sticky(b) || gs4i_is_moving(b)
+            || gs4i_collider_distance(b, p) > 3 * (f->reach + f->deep))
+            continue;
+        if (f->count == GS4I_MOST_OF_FLOOR) {
+            f->count = 0;
+            return;
+        }
+        f->body[f->count++] = b;
+    }
+}
+
+static gs4_real gs4i_floor_distance(const gs4i_floor *f, gs4_vec3 p)
 {
     gs4_real least = GS4I_HUGE;
     int i;
-    for (i = 0; i < all->collider_count; i++)
-        if (gs4i_is_sticky(&all->colliders[i]) && !gs4i_is_moving(&all->colliders[i]))
-            least = gs4i_min(least, gs4i_collider_distance(&all->colliders[i], p));
+    for (i = 0; i < f->count; i++) least = gs4i_min(least, gs4i_collider_distance(f->body[i], p));
     return least;
 }
 
-/* Are sticky bodies at rest a half space for all points within `reach` of p, down to `deep` in it,
- * that ends at distance d from p along n? By 7 x 7 points at the surface, a little under it, down
- * there, and `reach` before it. Seams between bodies count as inside. */
-static int gs4i_bodies_are_flat(const gs4i_boundary *all, gs4_vec3 p, gs4_vec3 n, gs4_real d,
-                                gs4_real reach, gs4_real deep)
+/* Are they a half space for all points within reach of p, that ends at distance d from p along n
+ * and is twice as deep as asked? By 7 x 7 points at the surface, two below each and one `reach`
+ * before it. Seams between bodies count as inside. */
+static int gs4i_floor_is_flat(const gs4i_floor *f, gs4_vec3 p, gs4_vec3 n, gs4_real d)
 {
-    const gs4_real size = reach + deep, slight = GS4I_C(0.02) * deep;
+    const gs4_real size = f->reach + f->deep, slight = GS4I_C(0.02) * f->deep;
     const gs4_vec3 foot = gs4i_sub(p, gs4i_scale(n, d)), u = gs4i_abs(n.x) > GS4I_C(0.6)
                                                                  ? gs4i_vec3(n.y, -n.x, 0)
                                                                  : gs4i_vec3(0, n.z, -n.y);
     const gs4_vec3 along = gs4i_scale(u, size / (3 * gs4i_length(u))),
-                   across = gs4i_cross(n, along);
+                   across = gs4i_cross(n, along), down = gs4i_scale(n, -f->deep);
     int i;
     for (i = 0; i < 49; i++) {
-        /* the midst and the corners come early: there most cases end */
-        const int k = i * 24 % 49;
-        const gs4_vec3 q = gs4i_add(foot, gs4i_add(gs4i_scale(along, GS4I_C(k % 7 - 3)),
-                                                   gs4i_scale(across, GS4I_C(k / 7 - 3))));
-        if (gs4i_still_distance(all, q) > slight
-            || gs4i_still_distance(all, gs4i_sub(q, gs4i_scale(n, deep))) > slight
-            || gs4i_still_distance(all, gs4i_add(q, gs4i_scale(n, reach))) < reach - slight)
+        const gs4_vec3 q = gs4i_add(foot, gs4i_add(gs4i_scale(along, GS4I_C(i % 7 - 3)),
+                                                   gs4i_scale(across, GS4I_C(i / 7 - 3))));
+        const gs4_vec3 below = gs4i_add(q, down);
+        if (gs4i_floor_distance(f, q) > slight || gs4i_floor_distance(f, below) > slight
+            || gs4i_floor_distance(f, gs4i_add(below, down)) > slight
+            || gs4i_floor_distance(f, gs4i_add(q, gs4i_scale(n, f->reach))) < f->reach - slight)
             return 0;
     }
     return 1;
 }
 
-/* Is box b, which by itself is not flat near p, part of a floor of several bodies that is? Then d
- * and n of `f` are of that. */
-static int gs4i_is_of_floor(const gs4i_boundary *all, const gs4i_collider *b, gs4_real reach,
-                            gs4_real deep, gs4i_surface *f)
+/* Is a box, which by itself is not flat near occupied block o, part of a floor of several bodies
+ * that is? Then d and n of `surface` are of that. What an earlier body has found is not asked
+ * again. */
+static int gs4i_is_of_floor(const gs4_sim *sim, int collider, int o, gs4i_floor *f,
+                            gs4i_surface *surface)
 {
+    const gs4i_collider *b = &sim->boundary.colliders[collider];
     const gs4_shape *s = &b->is.shape;
-    const gs4_vec3 x = gs4i_to_collider(b, f->at);
+    const gs4_vec3 x = gs4i_to_collider(b, surface->at);
     const gs4_real d[6] = { s->a.x - x.x, x.x - s->b.x, s->a.y - x.y,
                             x.y - s->b.y, s->a.z - x.z, x.z - s->b.z };
-    int i;
-    if (s->kind != GS4_SHAPE_BOX || gs4i_is_moving(b) || all->collider_count < 2) return 0;
+    int i, k;
+    f->count = 0;
+    if (s->kind != GS4_SHAPE_BOX || gs4i_is_moving(b)) return 0;
     for (i = 0; i < 6; i++) {
         const gs4_real out = i & 1 ? GS4I_C(1) : GS4I_C(-1);
         const gs4_vec3 n = gs4i_turned(
             b, gs4i_vec3(i / 2 == 0 ? out : 0, i / 2 == 1 ? out : 0, i / 2 == 2 ? out : 0));
-        if (d[i] < -(reach + deep) || d[i] > 2 * (reach + deep)
-            || !gs4i_bodies_are_flat(all, f->at, n, d[i], reach, deep))
-            continue;
-        f->d = d[i];
-        f->n = n;
+        int found = 0;
+        if (gs4i_abs(d[i]) > f->reach + 2 * f->deep) continue;
+        for (k = 0; k < collider && !found; k++) {
+            const gs4i_surface *of = gs4i_surface_of(sim, k, o);
+            found = gs4i_is_sticky(&sim->boundary.colliders[k])
+                    && !gs4i_is_moving(&sim->boundary.colliders[k]) && of->is_floor
+                    && gs4i_dot(of->n, n) > GS4I_C(0.99999)
+                    && gs4i_abs(of->d - d[i]) < GS4I_C(0.001) * f->deep;
+        }
+        if (!found && !f->count) gs4i_find_floor(&sim->boundary, surface->at, f);
+        if (!found && (f->count < 2 || !gs4i_floor_is_flat(f, surface->at, n, d[i]))) continue;
+        surface->d = d[i];
+        surface->n = n;
+        surface->is_floor = 1;
         return 1;
     }
     return 0;
 }
 
-/* What a block has of the surface of a body: particles in it may have images by it, or none. */
-static gs4i_surface gs4i_find_surface(const gs4_sim *sim, const gs4i_collider *b, uint32_t block)
+GS4I_INLINE int gs4i_is_far(const gs4i_grid *g, gs4_real d)
 {
-    const gs4i_grid *g = &sim->grid;
-    const gs4_real reach = GS4I_BLOCK_REACH * g->h, deep = GS4I_IMAGE_NODES * g->h;
-    gs4i_surface f;
-    memset(&f, 0, sizeof f);
-    f.at = gs4i_block_centre(g, block);
-    f.d = gs4i_collider_distance(b, f.at);
-    f.kind = GS4I_SURFACE_FAR;
-    if (f.d < reach + GS4I_IMAGE_REACH * g->h)
-        f.kind = gs4i_collider_is_flat(b, f.at, reach, deep, &f.n)
-                         || gs4i_is_of_floor(&sim->boundary, b, reach, deep, &f)
-                     ? GS4I_SURFACE_FLAT
-                     : GS4I_SURFACE_CURVED;
-    return f;
+    return !(d < (GS4I_BLOCK_REACH + GS4I_IMAGE_REACH) * g->h);
 }
 
-/* The same of occupied block o, once it is found. */
-GS4I_INLINE const gs4i_surface *gs4i_surface_of(const gs4_sim *sim, int collider, int o)
+/* What occupied block o has of the surface of a body: particles in it may have images by it, or
+ * none. */
+static gs4i_surface gs4i_find_surface(const gs4_sim *sim, int collider, int o)
 {
-    return (const gs4i_surface *)sim->image_particles.patches.surfaces.data
-           + (size_t)collider * (size_t)sim->grid.occupied + (size_t)o;
+    const gs4i_grid *g = &sim->grid;
+    const gs4i_collider *b = &sim->boundary.colliders[collider];
+    gs4i_floor floor;
+    gs4i_surface f;
+    memset(&f, 0, sizeof f);
+    floor.reach = GS4I_BLOCK_REACH * g->h;
+    floor.deep = GS4I_IMAGE_NODES * g->h;
+    f.at = gs4i_block_centre(g, g->occupied_block[o]);
+    f.d = gs4i_collider_distance(b, f.at);
+    f.kind = gs4i_is_far(g, f.d)                                             ? GS4I_SURFACE_FAR
+             : gs4i_collider_is_flat(b, f.at, floor.reach, floor.deep, &f.n) ? GS4I_SURFACE_FLAT
+             : gs4i_is_of_floor(sim, collider, o, &floor, &f)                ? GS4I_SURFACE_FLAT
+                                                                             : GS4I_SURFACE_CURVED;
+    return f;
 }
 
 /* Number of the patch of a body in a slot, or -1. */
@@ -15539,13 +15581,14 @@ static int gs4i_list_patches(gs4_sim *sim, int collider)
     if (!all) return gs4i_fail_memory(&sim->error);
     memset(of, 0, (size_t)g->active * sizeof *of);
     for (o = 0; o < g->occupied; o++, surface++) {
-        *surface = gs4i_find_surface(sim, b, g->occupied_block[o]);
+        *surface = gs4i_find_surface(sim, collider, o);
         if (surface->kind != GS4I_SURFACE_CURVED) continue;
         for (i = 0; i < 27; i++) {
             const int slot = g->neighbour[27 * o + i];
             if (of[slot]) continue;
             of[slot] = -1; /* none of its nodes is seen */
-            if (gs4i_find_surface(sim, b, g->block[slot]).kind == GS4I_SURFACE_FAR) continue;
+            if (gs4i_is_far(g, gs4i_collider_distance(b, gs4i_block_centre(g, g->block[slot]))))
+                continue;
             all[p->count].collider = collider;
             all[p->count].slot = slot;
             of[slot] = ++p->count;
@@ -30764,6 +30807,7 @@ GS4_API GS4I_COLD int gs4_estimate(const gs4_sim *sim, gs4_scheme scheme, gs4_in
 #undef GS4I_NET_OF
 #undef GS4I_NEVER_MELTS
 #undef GS4I_NODES_REACH
+#undef GS4I_MOST_OF_FLOOR
 #undef GS4I_NODE_REALS
 #undef GS4I_NORMAL_SMOOTHINGS
 #undef GS4I_NO_HEAT

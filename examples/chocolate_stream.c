@@ -25,8 +25,8 @@ int main(int argc, char **argv)
     gs4_sim *sim;
     double lowest = 1;
     e.name = "chocolate_stream";
-    e.frames = 64;
-    e.cells = 40;
+    e.frames = 50;
+    e.cells = 44;
     e.frame_time = 1.0 / 20;
     example_options(&e, argc, argv);
 
@@ -45,6 +45,7 @@ int main(int argc, char **argv)
     example_need(sim, gs4_material_preset("chocolate", &m));
     /* the preset, softer still, lets the ears hang */
     m.shear_modulus = 8e4;
+    m.viscosity = 9; /* thrice the preset: films of more than a cell */
     m.yield_compression = m.yield_stretch = real(0.1);
     m.conductivity = real((double)m.conductivity * faster);
     fill.material = example_need(sim, gs4_add_material(sim, &m));
@@ -59,8 +60,8 @@ int main(int argc, char **argv)
                                                  &bunny_triangles[0][0], BUNNY_TRIANGLE_COUNT),
                                         &fill));
 
-    emitter.shape = gs4_cylinder(vec(-0.030, outlet_height, 0.010),
-                                 vec(-0.030, outlet_height + 0.015, 0.010), real(0.011));
+    emitter.shape = gs4_cylinder(vec(-0.026, outlet_height, 0.010),
+                                 vec(-0.026, outlet_height + 0.015, 0.010), real(0.014));
     emitter.fill.velocity = vec(0, -0.5, 0);
     emitter.fill.temperature = 70;
     emitter.fill.jitter = real(0.5);

@@ -45,18 +45,16 @@ int main(int argc, char **argv)
     double thick, mouth;
     float size;
     e.name = "coil";
-    e.frames = 60;
+    e.frames = 96;
     e.cells = 40;
     e.rows = 4;
     e.takes_scheme = 1;
-    for (int i = 1; i + 1 < argc; ++i)
-        if (!strcmp(argv[i], "--row") && !strcmp(argv[i + 1], "4")) {
-            c = &post;
-            e.frames = 96;
-            e.scheme = GS4_SEMI_IMPLICIT;
-        }
-    e.frame_time = c->frame_time;
     example_options(&e, argc, argv);
+    if (e.row == 4) {
+        c = &post;
+        e.scheme = GS4_SEMI_IMPLICIT;
+    }
+    e.frame_time = c->frame_time;
     size = (float)((c == &post ? 0.78 : 1) * c->height / plate.height);
     thick = (c == &post ? 1 : 0.625) * c->below;
     mouth = c == &post ? 0.008 / 3 : 0.024;

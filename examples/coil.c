@@ -7,8 +7,8 @@
  * The materials of rows 1 to 3 are those of the GS4 paper (table 4, coiling 1 to 3; figure 2);
  * 61.25 Pa s are local in all three. The scene is that of pour_honey.c, four times as large: the
  * paper names no lengths and no density. Row 1 coils fast and narrowly, and the coils melt into
- * the heap. In rows 2 and 3 the rope is elastic for 12 s (245 Pa): it lies down in wide loops that
- * stay and stack to a tower. These rows are explicit, where the rope stays whole and smooth. With
+ * the heap. In rows 2 and 3 the rope is elastic for 12 s (245 Pa): it lies down in wide loops;
+ * those of row 2 stay and stack to a tower. These rows are explicit, where the rope stays whole and smooth. With
  * the semi-implicit scheme that of row 2, four cells thick and less, necks at 1.4 s and is torn at
  * 1.7 s, in longer steps and more time. The first 4 s of row 2 take a minute of processor time.
  *     Row 4 is secondary coiling (section 7.3 there; Habibi et al. 2006): 4 mm, 67.5 Pa s, 1.81 m/s
@@ -27,7 +27,7 @@ typedef struct coil_scene { /* lengths in m, speed in m/s, frame time in s */
     double width, below, height, plate_radius, rope_radius, speed, frame_time;
 } coil_scene;
 
-static const coil_scene plate = { 0.34, 0.04, 0.28, 0.15, 0.017, 0.23, 1.0 / 15 };
+static const coil_scene plate = { 0.34, 0.04, 0.28, 0.15, 0.017, 0.23, 1.0 / 24 };
 static const coil_scene post = { 0.16 / 3, 0.056 / 3, 0.08, 0.008, 0.002, 1.81, 0.01 };
 
 int main(int argc, char **argv)

@@ -3,8 +3,8 @@
  *     ./honey_spoon                      some minutes; pictures in out/
  *
  * The spoon rises in 0.8 s and tips from 0.3 to 1.2 s. A neck of honey follows it, has grown thin
- * at 1.1 s and folds on the surface; at 1.5 s what is in the dish begins to leave it over the tip,
- * in one thick stream. That is too short for more than a bend where it lands, at most.
+ * at 0.9 s and sinks back. From 1.4 s on what is in the dish leaves it over the tip in one thick
+ * stream, which is too short to coil.
  *     The explicit scheme: at 40 Pa s and 6 mm a cell viscosity and sound limit it to 0.25 ms, and
  * a neck that grows thin stays whole for longer. With the semi-implicit scheme it broke to crumbs.
  * Bowl and spoon are sticky meshes. */

@@ -10,7 +10,7 @@
  * the heap. In rows 2 and 3 the rope is elastic for 12 s (245 Pa) and lies down in wide loops; row
  * 2's stay and stack to a tower. These rows are explicit, where the rope stays whole and smooth.
  * With the semi-implicit scheme that of row 2, four cells thick and less, necks at 1.4 s and is
- * torn at 1.7 s, at three times the cost. Row 2 takes a minute of processor time.
+ * torn at 1.7 s, at over three times the cost. Row 2 takes a minute of processor time.
  *     Row 4 is secondary coiling (section 7.3 there; Habibi et al. 2006): 4 mm, 67.5 Pa s, 1.81 m/s
  * as after a fall of 17 cm, on a slippery post. It lands at 0.05 s and folds to a tower, which has
  * settled to 2 cm at 0.13 s, and coils. The turns stack to a column, 3.7 cm at 0.33 s, which bends

@@ -3,8 +3,8 @@
  *     ./honey_spoon                      some minutes; pictures in out/
  *
  * The spoon rises in 0.8 s and tips from 0.3 to 1.2 s. A neck of honey follows it, has grown thin
- * at 0.9 s and sinks back. From 1.4 s on what is in the dish leaves it over the tip in one thick
- * stream, which is too short to coil.
+ * at 0.9 s and sinks back. From 1.4 s on what is in the dish leaves it over the tip; the spoon
+ * rises on, the stream grows thin, and from 2.7 s on it folds to and fro on the honey.
  *     The explicit scheme: at 40 Pa s and 6 mm a cell viscosity and sound limit it to 0.25 ms, and
  * a neck that grows thin stays whole for longer. With the semi-implicit scheme it broke to crumbs.
  * Bowl and spoon are sticky meshes. */
@@ -94,7 +94,7 @@ int main(int argc, char **argv)
     preview_solid things[3] = { { 0 } };
     gs4_sim *sim;
     e.name = "honey_spoon";
-    e.frames = 80;
+    e.frames = 66;
     e.cells = 48;
     e.frame_time = 1.0 / 20;
     example_options(&e, argc, argv);
@@ -139,7 +139,7 @@ int main(int argc, char **argv)
     e.look.clarity = 0.012f;
     do { /* where it is at the end of a frame */
         const double t = (e.frame + 1) * e.frame_time, tip = 1.5 * fmax(0, fmin(0.9, t - 0.3));
-        pose.position.y = real(-0.055 + 0.194 * fmin(t, 0.8));
+        pose.position.y = real(-0.055 + 0.194 * fmin(t, 0.8) + 0.04 * fmax(0, fmin(1.5, t - 1.5)));
         pose.quaternion[0] = real(cos(tip / 2));
         pose.quaternion[1] = real(-sin(tip / 2));
         example_need(sim, gs4_move_collider_to(sim, SPOON, &pose, real(e.frame_time)));

@@ -30984,4 +30984,4 @@ GS4_API GS4I_COLD int gs4_estimate(const gs4_sim *sim, gs4_scheme scheme, gs4_in
  * have their viscosity once, solves beside stiff solids and of plates of 1.5 cells converge, and
  * stiff cubes and plates turn without loss. With GS4 stiff drops that land are thrown back no more,
  * which viscous ones were at half of their speed. Checkpoints of before cannot be read.
- * gs4_estimate. */
+ * gs4_estimate. GS4_NO_SOLIDS and the like leave parts out. */

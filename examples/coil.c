@@ -7,8 +7,8 @@
  * The materials of rows 1 to 3 are those of the GS4 paper (table 4, coiling 1 to 3; figure 2);
  * 61.25 Pa s are local in all three. The scene is that of pour_honey.c, four times as large: the
  * paper names no lengths and no density. Row 1 coils fast and narrowly, and the coils melt into
- * the heap. In rows 2 and 3 the rope is elastic for 12 s (245 Pa) and lies down in wide loops; row
- * 2's stay and stack to a tower. These rows are explicit, where the rope stays whole and smooth.
+ * the heap. In rows 2 and 3 the rope is elastic for 12 s (245 Pa) and lies down in wide loops,
+ * which stay and stack to a tower. These rows are explicit, where the rope stays whole and smooth.
  * With the semi-implicit scheme that of row 2, four cells thick and less, necks at 1.4 s and is
  * torn at 1.7 s, at over three times the cost. Row 2 takes a minute of processor time.
  *     Row 4 is secondary coiling (section 7.3 there; Habibi et al. 2006): 4 mm, 67.5 Pa s, 1.81 m/s

@@ -1,7 +1,7 @@
 /* print3d.c - nozzles print a star or letters of hot polymer in layers, which set; then the bed
  * tips up and lets go, and what was printed lands on its edge, bends, bounces and falls over.
  *     cc -O3 -march=native examples/print3d.c -Iexamples -I. -lm -lpthread -o print3d
- *     ./print3d --row 1                   a star; --row 2: letters, a nozzle each; some 3 minutes
+ *     ./print3d --row 1                   a star; --row 2: letters, a nozzle each; some 4 minutes
  *
  * After figures 15 and 16 of the GS4 paper. Layers have two colours in turn; orange is what is hot.
  * It sets at 110 degrees to a solid so soft that its fall bends it: sound is slow in that, so

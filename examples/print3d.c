@@ -4,9 +4,9 @@
  *     ./print3d --row 1                   a star; --row 2: letters, a nozzle each; some 4 minutes
  *
  * After figures 15 and 16 of the GS4 paper. Layers have two colours in turn; orange is what is hot.
- * It sets at 110 degrees to a solid so soft that its fall bends it; sound is slow in that: explicit
- * steps do. The melt is Oldroyd-B as in table 4, but of 10 Pa s and not 2, or beads were flat before
- * they set, and conducts 1000 times too well. After 2 s G and 4 tear where they are thin in cells. */
+ * It sets at 110 degrees to a solid so soft that its fall bends it; sound is slow in that:
+ * explicit steps do. The melt is Oldroyd-B as in table 4, but of 10 Pa s, not 2: beads were flat
+ * before they set. It conducts 1000 times too well. After 2 s G and 4 tear where they are thin. */
 #include "example.h"
 #include "strokes.h"
 

@@ -78,6 +78,7 @@ int main(int count, char **values)
     RUN_FULL(test_elastic_couette);
     RUN(test_stress_is_paid_for_where_it_is);
     RUN_ONCE(test_stress_counts);
+    RUN_ONCE(test_stress_step_work);
     RUN(test_stress_edited_euler);
     RUN_SLOW(test_drop_draws_back);
     RUN_SLOW(test_die_swell);

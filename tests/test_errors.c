@@ -1471,7 +1471,7 @@ static void test_errors_viscosity_that_turns(void)
                 }
 }
 
-/* Substeps until a step is refused, of a Pom-Pom that swings faster than they can follow. */
+/* Work until a step is refused, of a Pom-Pom that takes too much. */
 static uint64_t err_fast_pom_pom(double size, int *particles)
 {
     gs4_sim_desc d = err_desc();
@@ -1479,7 +1479,7 @@ static uint64_t err_fast_pom_pom(double size, int *particles)
     const gs4_fill f = scene_fill(at(0, 0, 0));
     gs4_sim *sim = NULL;
     gs4_edit e;
-    uint64_t substeps;
+    uint64_t work;
     int i;
     d.cells[0] = d.cells[1] = d.cells[2] = 16;
     d.cell_size = (gs4_real)(1.0 / 16);
@@ -1498,13 +1498,15 @@ static uint64_t err_fast_pom_pom(double size, int *particles)
         const gs4_real *x = gs4_particles(sim, GS4_FIELD_POSITION).data + 3 * i;
         e.data[i * e.stride] = 5 * x[1];
     }
-    ERR_REFUSED(sim, gs4_step(sim, gs4_stable_dt(sim) / 2), GS4_ERROR_UNSTABLE, "swings faster");
-    substeps = gs4i_all_reports(sim).substeps;
+    ERR_REFUSED(sim, gs4_step(sim, gs4_stable_dt(sim) / 2), GS4_ERROR_UNSTABLE,
+                "takes more than 30 times the work");
+    work = gs4i_all_reports(sim).work;
     gs4_destroy(sim);
-    return substeps;
+    return work;
 }
 
-/* One particle whose stress cannot be followed says it for all of its block: each took 63 ms. */
+/* Anisotropy far above 1 and a stretch that relaxes a million times faster: the split gave up after
+ * 20000 substeps of one particle, 63 ms. What is refused says so early, for all of its block. */
 static void test_errors_fast_pom_pom(void)
 {
     int few, many;
@@ -1512,7 +1514,7 @@ static void test_errors_fast_pom_pom(void)
     if (test_filter[0])
         printf("%d particles %lu, %d %lu\n", few, (unsigned long)one, many, (unsigned long)all);
     CHECK(few == 8 && many == 512);
-    CHECK(one > 1000 && all == one);
+    CHECK(one > 500 && one < 8000 && all < GS4I_MEAN_WORK * 512);
 }
 
 static void test_errors_no_end(void)
@@ -2520,7 +2522,6 @@ typedef enum err_trap {
     ERR_SHORT_STEPS,
     ERR_COLD,
     ERR_NO_DECAY,
-    ERR_MANY_SUBSTEPS,
     ERR_TRAPS
 } err_trap;
 
@@ -2547,18 +2548,6 @@ static void err_walk_into(err_trap trap, err_words *words)
     m.can_melt = 1;
     m.melting_temperature = 30;
     f.temperature = trap == ERR_COLD ? 0 : 40;
-    if (trap == ERR_MANY_SUBSTEPS) {
-        m = scene_liquid(1000, 0.01, 10);
-        f.temperature = 0;
-        f.velocity = at(0, 0, -3);
-        f.angular_velocity = at(0, 5, 0);
-        m.liquid = GS4_POM_POM;
-        m.relaxation_time = (gs4_real)1e-4;
-        m.stretch_time = (gs4_real)1e-5;
-        low = gs4_box(at(0.25, 0.25, 0.25), at(0.375, 0.375, 0.375));
-        m.anisotropy = (gs4_real)0.9;
-        m.arms = 2;
-    }
     memset(&body, 0, sizeof body);
     memset(&e, 0, sizeof e);
     body.shape = gs4_box(at(-1, -1, -1), at(2, 2, trap == ERR_BODY_OVER_MATERIAL ? 0.4 : 0.2));
@@ -2582,8 +2571,7 @@ static void err_walk_into(err_trap trap, err_words *words)
     e.fill = f;
     e.shape = high;
     if (trap == ERR_STILL_EMITTER) e.fill.velocity = at(0, 0, 0);
-    for (twice = 0; twice < 2 && trap != ERR_MANY_SUBSTEPS; twice++)
-        CHECK(gs4_add_emitter(sim, &e) >= 0);
+    for (twice = 0; twice < 2; twice++) CHECK(gs4_add_emitter(sim, &e) >= 0);
     for (twice = 0; twice < 4; twice++)
         CHECK_RESULT(sim, gs4_step(sim, (gs4_real)0.4 * gs4_stable_dt(sim)), 0);
     gs4_destroy(sim);
@@ -2603,8 +2591,7 @@ static void test_errors_traps(void)
                                                   "gives nothing",
                                                   "a million steps",
                                                   "temperature 0",
-                                                  "flip_decay_time",
-                                                  "substeps" };
+                                                  "flip_decay_time" };
     int trap;
     for (trap = 0; trap < ERR_TRAPS; trap++) {
         err_words w = { NULL, 0, 0 };

@@ -223,6 +223,7 @@ static gs4i_split stress_split(int set, const double L[9])
     int i;
     memset(&p, 0, sizeof p);
     p.inv_lambda = 1;
+    p.patience = 1 << 20;
     if (set >= 0) {
         p.stretch = 2 * reference_sets[set][0];
         p.nu = 2 / reference_sets[set][1];
@@ -230,22 +231,6 @@ static gs4i_split stress_split(int set, const double L[9])
     }
     for (i = 0; i < 9; i++) p.L[i / 3][i % 3] = L[i];
     return p;
-}
-
-static void stress_split_fixed(gs4i_split *p, double c[6], double time, int steps)
-{
-    const double h = time / steps;
-    double E[3][3];
-    int i;
-    gs4i_exponential(p->L, h, E);
-    for (i = 0; i < steps; i++) {
-        if (p->stretch > 0) {
-            gs4i_relax(p, c, 0.5 * h);
-            gs4i_convect(E, c);
-            gs4i_relax(p, c, 0.5 * h);
-        } else
-            gs4i_linear_advance(p, c, h);
-    }
 }
 
 static double stress_split_error(const double c[6], const double S[4])
@@ -256,8 +241,8 @@ static double stress_split_error(const double c[6], const double S[4])
     return stress_error(s, S);
 }
 
-/* Over the rows of a run with fixed steps, or one call of gs4i_split_advance each (fineness 0). */
-static void stress_split_follow(const reference_row *rows, int n, int fineness, double *error)
+/* Over the rows of a run, one call of gs4i_split_advance each. */
+static void stress_split_follow(const reference_row *rows, int n, double *error)
 {
     double c[6], L[9];
     gs4i_split p;
@@ -266,63 +251,32 @@ static void stress_split_follow(const reference_row *rows, int n, int fineness, 
     p = stress_split(rows->set, L);
     for (i = 0; i < 3; i++) c[i] += 1;
     for (k = 0; k < n; k++) {
-        const double time = rows[k].t - (k ? rows[k - 1].t : 0);
-        if (fineness)
-            stress_split_fixed(
-                &p, c, time, (int)ceil(time * stress_rate_of(rows) * 25 + 1e-9) * (fineness / 25));
-        else
-            CHECK(gs4i_split_advance(&p, c, time) == GS4_OK);
+        p.work = 0;
+        CHECK(gs4i_split_advance(&p, c, rows[k].t - (k ? rows[k - 1].t : 0)) == GS4_OK);
         error[k] = stress_split_error(c, rows[k].S);
+        if (test_filter[0] && p.work > 1000) printf("work %d\n", p.work);
     }
 }
 
 static void test_stress_split(void)
 {
-    int first, n, k, orders = 0;
-    double worst[2] = { 0, 0 };
+    int first, n, k;
+    double worst = 0;
     for (first = 0; first < STRESS_ROWS; first += n) {
         const reference_row *rows = &reference_rows[first];
-        double cost, error[8], fine[8], finer[8];
+        const int sudden = rows->kind == REF_STEP || rows->kind == REF_CESSATION;
+        double error[8];
         n = stress_rows(first);
         if (rows->kind == REF_STEADY) continue;
-        cost = rows[n - 1].t * stress_rate_of(rows);
-        if (test_slow || cost < (test_full ? 100 : 30)) {
-            stress_split_follow(rows, n, 0, error);
-            for (k = 0; k < n; k++) {
-                CHECK(error[k]
-                      < (rows->kind == REF_STEP || rows->kind == REF_CESSATION ? 2e-3 : 1e-3));
-                worst[0] = fmax(worst[0], error[k]);
-                if (test_filter[0] && error[k] > 5e-4)
-                    printf("row %d: error %.2e\n", first + k, error[k]);
-            }
-        }
-        if (rows->kind == REF_STEP || rows->kind == REF_CESSATION
-            || (!test_slow && cost > (test_full ? 15 : 5)))
-            continue;
-        stress_split_follow(rows, n, 200, fine);
-        stress_split_follow(rows, n, 400, finer);
+        stress_split_follow(rows, n, error);
         for (k = 0; k < n; k++) {
-            worst[1] = fmax(worst[1], fine[k]);
-            CHECK(fine[k] < (rows->set < 0 ? 1e-9 : 1e-3)); /* UCM and Oldroyd-B: exact */
-            if (finer[k] < 1e-9) continue;
-            /* 1.899 here, 1.95 with twice the steps, on its way to 2 */
-            if (first + k == 83) {
-                double finest[8];
-                stress_split_follow(rows, n, 800, finest);
-                CHECK_BETWEEN(log2(fine[k] / finer[k]), 1.89, 2);
-                CHECK_BETWEEN(log2(finer[k] / finest[k]), 1.94, 2);
-                orders++;
-                continue;
-            }
-            CHECK_BETWEEN(log2(fine[k] / finer[k]), 1.9, 2.1);
-            orders++;
-            if (test_filter[0] && (fine[k] > 1e-3 || !(log2(fine[k] / finer[k]) >= 1.9)))
-                printf("row %d: errors %.2e %.2e, order %.2f\n", first + k, fine[k], finer[k],
-                       log2(fine[k] / finer[k]));
+            CHECK(error[k] < (rows->set < 0 ? 1e-9 : sudden ? 2e-3 : 1e-3)); /* linear: exact */
+            worst = fmax(worst, error[k]);
+            if (test_filter[0] && error[k] > 5e-4)
+                printf("row %d: error %.2e\n", first + k, error[k]);
         }
     }
-    if (test_filter[0])
-        printf("worst error %.1e, with fixed steps %.1e; %d orders\n", worst[0], worst[1], orders);
+    if (test_filter[0]) printf("worst error %.1e\n", worst);
 }
 
 /* In one call over up to 1e4 relaxation times: the steady state. */
@@ -730,6 +684,155 @@ static void test_stress_bounded(void)
     if (test_filter[0]) printf("%d of %d steps refused\n", refused, steps);
 }
 
+/* --- how much work it is ---------------------------------------------------------------------- */
+
+/* A pom-pom liquid with lambda_b = 1 and a flow that strains by up to 1 in the time dt. */
+static gs4i_split stress_draw_work(double dt, double anisotropy)
+{
+    const double rate = stress_log(1e-3, 1) / dt, still[9] = { 0 };
+    gs4i_split p = stress_split(-1, still);
+    double trace = 0;
+    int i;
+    p.stretch = 2 * stress_log(0.3, 100);
+    p.nu = 2 / stress_log(1, 20);
+    p.alpha = anisotropy;
+    for (i = 0; i < 9; i++) {
+        p.L[i / 3][i % 3] = 0.5 * rate * stress_random();
+        if (i % 4 == 0) trace += p.L[i / 3][i % 3];
+    }
+    for (i = 0; i < 3; i++) p.L[i][i] -= trace / 3;
+    return p;
+}
+
+/* dS/dt of (5), lambda_b = 1; how fast that changes at most. */
+static double stress_slope(const gs4i_split *p, const double S[6], double slope[6])
+{
+    const double trace3 = (S[0] + S[1] + S[2]) / 3, L2 = 1 + trace3, Lam = sqrt(L2),
+                 e = p->stretch * exp(p->nu * (Lam - 1));
+    double SS[3][3], squares = 0, strain = 0, f;
+    int i, j, k;
+    for (i = 0; i < 3; i++)
+        for (j = 0; j < 3; j++) {
+            SS[i][j] = 0;
+            for (k = 0; k < 3; k++) SS[i][j] += S[stress_index[i][k]] * S[stress_index[k][j]];
+            strain += fabs(p->L[i][j]);
+        }
+    squares = SS[0][0] + SS[1][1] + SS[2][2];
+    f = e * (trace3 / (1 + Lam)) / Lam + (1 - p->alpha * squares / 3) / L2;
+    for (i = 0; i < 3; i++)
+        for (j = i; j < 3; j++) {
+            double sum = p->L[i][j] + p->L[j][i] - f * S[stress_index[i][j]] - (i == j ? f - 1 : 0)
+                         - p->alpha * SS[i][j];
+            for (k = 0; k < 3; k++)
+                sum += p->L[i][k] * S[stress_index[k][j]] + p->L[j][k] * S[stress_index[k][i]];
+            slope[stress_index[i][j]] = sum;
+        }
+    return 2 * strain + fabs(f) + 1 + e * (1 + p->nu) * (1 + L2) + 2 * p->alpha * sqrt(squares);
+}
+
+/* Classical Runge-Kutta over the time, of a length that is far within its stability. Does it stay
+ * inside of the bounds? */
+static int stress_follow_slowly(const gs4i_split *p, double S[6], double time)
+{
+    double now = 0;
+    int i, k, lasts = 1;
+    while (now < time && lasts) {
+        static const double at_stage[4] = { 0, 0.5, 0.5, 1 }, weight[4] = { 1, 2, 2, 1 };
+        double slope[6] = { 0, 0, 0, 0, 0, 0 }, sum[6] = { 0, 0, 0, 0, 0, 0 }, Y[6], h = 0;
+        double room[6], values[3], Q[3][3];
+        for (k = 0; k < 4; k++) {
+            double fast;
+            for (i = 0; i < 6; i++) Y[i] = S[i] + at_stage[k] * h * slope[i];
+            fast = stress_slope(p, Y, slope);
+            if (k == 0) h = fmin(0.2 / fast, time - now);
+            for (i = 0; i < 6; i++) sum[i] += weight[k] * slope[i];
+        }
+        now = h < time - now ? now + h : time;
+        for (i = 0; i < 6; i++) S[i] += h / 6 * sum[i];
+        for (i = 0; i < 6; i++) room[i] = S[i] + (i < 3 ? 1 / fmax(p->alpha, 1) : 0);
+        gs4i_eigen(room, values, Q);
+        lasts = fmin(values[0], fmin(values[1], values[2])) > 0 && room[0] < 1e5;
+    }
+    return lasts;
+}
+
+/* The difference, over S; constant flow is steady after 100 of
+ * the longest relaxation time, where it is slow to settle. */
+static double stress_work_error(const gs4i_split *p, const double before[6], const double after[6],
+                                double dt)
+{
+    double S[6], difference = 0, size = 1e-12;
+    int i;
+    for (i = 0; i < 6; i++) S[i] = before[i] - (i < 3);
+    if (!stress_follow_slowly(p, S, fmin(dt, 100 / fmin(1, 0.5 * p->stretch)))) return 0;
+    for (i = 0; i < 6; i++) {
+        difference = fmax(difference, fabs(after[i] - (i < 3) - S[i]));
+        size = fmax(size, fabs(S[i]));
+    }
+    return difference / size;
+}
+
+static double stress_difference(const double c[6], const double exact[6])
+{
+    double difference = 0, size = 1e-12;
+    int i;
+    for (i = 0; i < 6; i++) {
+        difference = fmax(difference, fabs(c[i] - exact[i]));
+        size = fmax(size, fabs(exact[i] - (i < 3)));
+    }
+    return difference / size;
+}
+
+/* From rest, and on in another flow: as exact as it should be, and within bounded work. Random
+ * search over 2.4e5 steps, anisotropy to 100, r from 0.01 to 1e4, found 1600. The split of before
+ * took up to 20000 substeps, each of some 30 units. What a step may take is held by
+ * test_stress_step_work. */
+static void test_stress_work(void)
+{
+    static const double anisotropies[5] = { 0, 0.3, 1, 10, 100 };
+    const int draws = test_slow ? 400 : test_full ? 40 : 10;
+    int decade, i, k, j;
+    stress_seed = 5;
+    for (decade = -2; decade <= 8; decade++) {
+        double worst = 0, worst_rough = 0, all = 0;
+        int most = 0;
+        for (i = 0; i < draws; i++) {
+            const double alpha = anisotropies[i % 5], dt = pow(10, decade + 0.5 * stress_random());
+            double c[6] = { 1, 1, 1, 0, 0, 0 };
+            gs4i_split p = stress_draw_work(dt, alpha);
+            for (k = 0; k < 2; k++) {
+                double before[6], lenient[6], error, rough;
+                gs4i_split q = p;
+                memcpy(before, c, sizeof c);
+                memcpy(lenient, c, sizeof c);
+                p.bounded = p.substeps = p.work = 0;
+                q.bounded = q.substeps = q.work = 0;
+                q.patience = GS4I_PATIENCE;
+                CHECK(gs4i_split_advance(&p, c, dt) == GS4_OK);
+                error = p.bounded ? 0 : stress_work_error(&p, before, c, dt);
+                CHECK(error < 1e-3);
+                /* as steps call it: against what is exact */
+                CHECK(gs4i_split_advance(&q, lenient, dt) == GS4_OK);
+                rough = p.bounded || q.bounded ? 0 : stress_difference(lenient, c);
+                CHECK(rough < 1e-3);
+                worst_rough = fmax(worst_rough, rough);
+                if (test_filter[0] && error > 5e-4)
+                    printf("draw %d: error %.1e, alpha %g, substeps %d, work %d\n", i, error, alpha,
+                           p.substeps, p.work);
+                worst = fmax(worst, error);
+                all += p.work;
+                most = p.work > most ? p.work : most;
+                for (j = 0; j < 9; j++) /* backwards, and turned */
+                    p.L[j / 3][j % 3] *= j % 4 == 0 ? -1 : 0.5 * stress_random();
+            }
+        }
+        CHECK(most <= 1600 && all <= 2 * GS4I_MEAN_WORK * 2 * draws);
+        if (test_filter[0])
+            printf("dt/lambda_b 1e%d: work %.1f, at most %d, worst error %.1e, in steps %.1e\n",
+                   decade, all / (2.0 * draws), most, worst, worst_rough);
+    }
+}
+
 /* --- bad arguments ---------------------------------------------------------------------------- */
 
 static void stress_refused(const gs4_material *m, const gs4_point *p, const gs4_real *L, double dt,
@@ -858,5 +961,6 @@ static void run_stress(void)
     RUN_FULL(test_stress_random);
     RUN(test_stress_thin);
     RUN(test_stress_bounded);
+    RUN_ONCE(test_stress_work);
     RUN(test_stress_bad_arguments);
 }

@@ -276,6 +276,90 @@ static void test_stress_counts(void)
     }
 }
 
+static double viscoelastic_random(uint64_t *seed) /* -1 to 1 */
+{
+    *seed = *seed * 6364136223846793005u + 1442695040888963407u;
+    return (double)(int64_t)*seed / 9223372036854775808.0;
+}
+
+/* Work of each particle in one step, on average, of a block that sheared flow strains by up to 1/2,
+ * and the result; GS4_ERROR_FORMAT where gs4_advance does not get through either. */
+static double viscoelastic_step_work(const gs4_material *m, double rate, int *result)
+{
+    gs4_sim_desc d = scene_cube(16);
+    const gs4_fill f = scene_fill(at(0, 0, 0));
+    gs4_sim *sim = physics_create(&d, m);
+    gs4i_report r;
+    gs4_edit e;
+    gs4_real dt;
+    int i;
+    CHECK(gs4_add_particles(sim, gs4_box(at(0.25, 0.25, 0.25), at(0.5, 0.5, 0.5)), &f) == 512);
+    e = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
+    for (i = 0; i < e.count; i++) {
+        const gs4_real *x = gs4_particles(sim, GS4_FIELD_POSITION).data + 3 * i;
+        e.data[i * e.stride] = (gs4_real)(rate * ((double)x[1] - 0.375));
+        e.data[i * e.stride + 1] = (gs4_real)(0.6 * rate * ((double)x[2] - 0.375));
+    }
+    dt = (gs4_real)0.8 * gs4_stable_dt(sim);
+    *result = gs4_step(sim, dt);
+    r = gs4i_all_reports(sim);
+    if (*result != GS4_OK) {
+        CHECK(*result == GS4_ERROR_UNSTABLE);
+        if (strstr(gs4_last_error(sim), "30 times")) {
+            CHECK(strstr(gs4_last_error(sim), "anisotropy") != NULL);
+            if (gs4_advance(sim, dt) != GS4_OK) {
+                *result = GS4_ERROR_FORMAT;
+                if (test_filter[0]) printf("%s\n", gs4_last_error(sim));
+            }
+        } else
+            *result = GS4_ERROR_ABI; /* for another reason */
+    }
+    gs4_destroy(sim);
+    return (double)r.work / (double)(r.asked ? r.asked : 1);
+}
+
+/* No input makes a step cost more than 30 of others: a counter of work bounds it (GS4I_MEAN_WORK),
+ * and steps that would take more are refused, which gs4_advance gets through but for few. */
+static void test_stress_step_work(void)
+{
+    const int draws = test_slow ? 3000 : test_full ? 300 : 24;
+    uint64_t seed = 3;
+    double worst = 0;
+    int i, refused = 0, odd = 0, stuck = 0;
+    for (i = 0; i < draws; i++) {
+        const double lambda = pow(10, -4.5 + 3.5 * viscoelastic_random(&seed)),
+                     rate = 60 + 50 * viscoelastic_random(&seed);
+        gs4_material m =
+            scene_liquid(1000, lambda * pow(10, 2.5 + 2.5 * viscoelastic_random(&seed)), 10);
+        double work;
+        int result;
+        m.liquid = i % 8 == 7 ? GS4_OLDROYD_B : GS4_POM_POM;
+        m.relaxation_time = (gs4_real)lambda;
+        if (m.liquid == GS4_POM_POM) {
+            m.stretch_time = (gs4_real)(lambda * pow(10, -1 + 3 * viscoelastic_random(&seed)));
+            m.arms = (gs4_real)pow(10, 1 + viscoelastic_random(&seed));
+            m.anisotropy = (gs4_real)(i % 2 ? pow(10, 1 + viscoelastic_random(&seed))
+                                            : fmax(0, fmin(1, 0.5 + viscoelastic_random(&seed))));
+        }
+        work = viscoelastic_step_work(&m, rate, &result);
+        refused += result == GS4_ERROR_UNSTABLE || result == GS4_ERROR_FORMAT;
+        stuck += result == GS4_ERROR_FORMAT;
+        odd += result == GS4_ERROR_ABI;
+        if (result == GS4_OK) {
+            CHECK(work <= GS4I_MEAN_WORK + 8 * GS4I_SPARE_WORK / 512.0); /* 8 blocks */
+            if (test_filter[0] && work > worst)
+                printf("draw %d: work %.1f, lambda_b %.2g, r %.3g, Q %.3g, alpha %.3g\n", i, work,
+                       lambda, lambda / (double)m.stretch_time, (double)m.arms,
+                       (double)m.anisotropy);
+            worst = fmax(worst, work);
+        }
+    }
+    CHECK(worst > 30 && odd < draws / 4 && refused < draws / 3 && stuck <= refused / 30);
+    if (test_filter[0])
+        printf("%d draws, %d refused for work, %d of them for good, %d else\n", draws, refused,
+               stuck, odd);
+}
+
 /* Symplectic Euler keeps no rates, so an edit that changes nothing changes nothing afterwards: the
  * next step is no first step. */
 static void test_stress_edited_euler(void)

@@ -154,6 +154,8 @@ int main(int count, char **values)
     RUN_FULL(test_stability_of_blades);
     RUN_ONCE(test_stability_of_two_densities);
     RUN_FULL(test_extremes);
+    RUN(test_safe_slopes);
+    RUN(test_cells_together);
     RUN_FULL(test_short_decay);
     RUN(test_tiny_step);
     RUN(test_thickening);

@@ -488,6 +488,122 @@ static void test_extremes(void)
     if (test_filter[0]) printf("%d scenes, %d of %d calls refused\n", count, refused, 21 * count);
 }
 
+/* Velocities (a x, b y, c z) + (0, s x, 0) + (v, 0, 0) of the nodes of a tile, cells of 1/2 m, mass
+ * beside them; do they prove that a step of 0.1 s is safe? */
+static gs4_real stability_tile[4 * 512 + 16];
+
+static int stability_slopes(gs4_sim *sim, double a, double b, double c, double s, double v)
+{
+    int i;
+    memset(sim, 0, sizeof *sim);
+    sim->grid.h = (gs4_real)0.5;
+    sim->integrator.dt = (gs4_real)0.1;
+    for (i = 0; i < 512; i++) {
+        const double x = 0.5 * (i % 8 - 3.5), y = 0.5 * (i / 8 % 8 - 3.5), z = 0.5 * (i / 64 - 3.5);
+        stability_tile[4 * i] = (gs4_real)(a * x + v);
+        stability_tile[4 * i + 1] = (gs4_real)(b * y + s * x);
+        stability_tile[4 * i + 2] = (gs4_real)(c * z);
+        stability_tile[4 * i + 3] = 1;
+    }
+    return gs4i_slopes_are_safe(sim, ~(uint64_t)0, stability_tile);
+}
+
+/* The second lemma of the manual's SAFETY: |div u| dt < 0.2 and |u_a| dt < h, neither more nor
+ * less. */
+static void test_safe_slopes(void)
+{
+    static gs4_sim sim;
+    const double under = 1.99, over = 2.01; /* 0.2 / dt */
+    uint32_t state = 1;
+    int i, k;
+    for (i = -1; i <= 1; i += 2) {
+        CHECK(stability_slopes(&sim, i * under, 0, 0, 0, 0));
+        CHECK(!stability_slopes(&sim, i * over, 0, 0, 0, 0));
+        CHECK(!stability_slopes(&sim, 0, i * over, 0, 0, 0));
+        CHECK(!stability_slopes(&sim, 0, 0, i * over, 0, 0));
+        CHECK(stability_slopes(&sim, under / 3, under / 3, i * under / 3, 0, 0));
+        CHECK(!stability_slopes(&sim, over / 3, over / 3, i * over / 3, 0, 0));
+        CHECK(stability_slopes(&sim, 0, 0, 0, 2.8, 0)); /* shear, beyond what div u may be */
+        CHECK(stability_slopes(&sim, 0, 0, 0, 0, i * 4.99));
+        CHECK(!stability_slopes(&sim, 0, 0, 0, 0, i * 5.01));
+    }
+    stability_slopes(&sim, 0, 0, 0, 0, 4);
+    memset(stability_tile + 4 * 200, 0, 4 * sizeof *stability_tile); /* nothing is there */
+    CHECK(gs4i_slopes_are_safe(&sim, ~(uint64_t)0, stability_tile));
+    stability_tile[4 * 200 + 3] = 1;
+    CHECK(!gs4i_slopes_are_safe(&sim, ~(uint64_t)0, stability_tile));
+    CHECK(gs4i_slopes_are_safe(&sim, ~((uint64_t)1 << 25), stability_tile)); /* not touched */
+    stability_slopes(&sim, 0, 0, 0, 0, 4);
+    stability_tile[4 * 100 + 1] = (gs4_real)NAN;
+    CHECK(!gs4i_slopes_are_safe(&sim, ~(uint64_t)0, stability_tile));
+    for (k = 0; k < 20; k++) { /* what it lets pass is so, for particles of any place */
+        gs4_real x[4 * GS4I_BATCH];
+        gs4i_frame frame = { { 0, 0, 0 }, { 0, 0, 0 }, 2 };
+        gs4i_lanes at[4];
+        gs4i_stencils s;
+        gs4i_local g;
+        int n;
+        stability_slopes(&sim, 0, 0, 0, 0, 0);
+        for (i = 0; i < 512 * 4; i++)
+            if (i % 4 < 3) stability_tile[i] = (gs4_real)stability_random(&state);
+        for (sim.integrator.dt = 1; !gs4i_slopes_are_safe(&sim, ~(uint64_t)0, stability_tile);)
+            sim.integrator.dt *= (gs4_real)0.97;
+        for (i = 0; i < 3; i++) {
+            const int cell = 4 + (int)floor(6 * stability_random(&state));
+            for (n = 0; n < GS4I_BATCH; n++)
+                x[4 * n + i] = (gs4_real)(0.5 * (cell + 0.5 + stability_random(&state)));
+        }
+        for (n = 0; n < GS4I_BATCH; n++) x[4 * n + 3] = 1;
+        gs4i_to_lanes(x, GS4I_BATCH, at);
+        gs4i_stencils_at(&s, &frame, at);
+        gs4i_gather_cell(stability_tile + 4 * s.base[0], &s, 1, &g);
+        for (n = 0; n < GS4I_BATCH; n++)
+            CHECK(fabs((double)(((gs4_real *)g.L[0][0])[n] + ((gs4_real *)g.L[1][1])[n]
+                                + ((gs4_real *)g.L[2][2])[n])
+                       * (double)sim.integrator.dt)
+                  < 0.2001);
+    }
+}
+
+/* S7 leaves particles of a block by cell, whatever they have, so that batches are full. */
+static void test_cells_together(void)
+{
+    int k, i, o;
+    for (k = 0; k < 2; k++) {
+        gs4_sim_desc d = scene_cube(16);
+        gs4_material m = scene_liquid(1000, 1, 10);
+        gs4_fill f = scene_fill(at(0, 0, 0));
+        gs4_sim *sim;
+        gs4_edit v;
+        const gs4_real *x;
+        static double mass[32768];
+        d.integrator = k ? GS4_INTEGRATOR_SYMPLECTIC_EULER : GS4_INTEGRATOR_GS4;
+        d.max_particles = 32768;
+        f.jitter = 1;
+        f.random_seed = 3;
+        CHECK(gs4_create(&d, &sim) == GS4_OK);
+        CHECK_RESULT(sim, gs4_add_material(sim, &m), 0);
+        CHECK_RESULT(sim, gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1, 1, 1)), &f), 0);
+        v = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
+        x = sim->particles.position;
+        for (i = 0; i < v.count; i++) {
+            v.data[(size_t)i * (size_t)v.stride] = (gs4_real)(3 * ((double)x[4 * i + 2] - 0.5));
+            v.data[(size_t)i * (size_t)v.stride + 2] = (gs4_real)(3 * (0.5 - (double)x[4 * i]));
+            sim->particles.position[4 * i + 3] *= (gs4_real)(1 + 1e-3 * (i % 7));
+            mass[sim->particles.id[i]] = (double)x[4 * i + 3];
+        }
+        for (i = 0; i < 40; i++)
+            CHECK_RESULT(sim, gs4_step(sim, (gs4_real)0.5 * gs4_stable_dt(sim)), GS4_OK);
+        for (o = 0; o < sim->grid.occupied; o++)
+            for (i = sim->grid.first[o]; i < sim->grid.first[o + 1]; i++) {
+                CHECK(mass[sim->particles.id[i]] == (double)x[4 * i + 3]);
+                CHECK(i == sim->grid.first[o]
+                      || sim->particles.order[i - 1] <= sim->particles.order[i]);
+            }
+        gs4_destroy(sim);
+    }
+}
+
 static gs4_real stability_shear_rate(gs4_real T, gs4_real rate, void *user)
 {
     (void)T;

@@ -196,8 +196,8 @@
  *     S8  colliders move, emitters give, particles that left are dropped
  *
  * With sharp_gradients L~ and grad u are those of Z K v_i and Z K u_i, U is of Z K u_i, and
- * f_i = - K^T Z^T sum V_p sigma grad w + sum w m g, with Z as in [[grid]]; K continues what nodes at
- * a surface see on one side of them alone: [[step]], gs4i_find_levers. The decay takes little from
+ * f_i = - K^T Z^T sum V_p sigma grad w + sum w m g, with Z as in [[grid]]; K continues what nodes
+ * at a surface see on one side alone: [[step]], gs4i_find_levers. The decay takes little from
  * motion that the grid does see: as much as a kinematic viscosity of h^2 / (4 flip_decay_time). It
  * takes no momentum: sum m V = sum m v~.
  *
@@ -6093,9 +6093,10 @@ GS4I_INLINE gs4_real gs4i_deconvolution_weight(gs4_real filled)
 /* Eight nodes in a row along an axis: two of the block before (its slot, or -1), four of slot s,
  * two of the block behind. */
 GS4I_INLINE void gs4i_line_of_nodes(const gs4i_grid *g, int s, const int side[2], int node,
-                                    int apart, const gs4_real *from, const gs4_real *lean,
-                                    gs4_real fill_fraction[8], gs4i_quad v[8])
+                                    int apart, const gs4_real *from, gs4_real fill_fraction[8],
+                                    gs4i_quad v[8])
 {
+    const gs4_real *lean = from == g->momentum ? g->lean : NULL;
     int i;
     for (i = 0; i < 8; i++) {
         const int slot = i < 2 ? side[0] : i < 6 ? s : side[1];
@@ -6116,8 +6117,8 @@ GS4I_INLINE void gs4i_line_of_nodes(const gs4i_grid *g, int s, const int side[2]
     }
 }
 
-/* sharp = S (from + lean), or S transposed of from, on the nodes of a slot; fourth numbers are
- * copied. */
+/* sharp = S (from + lean) of velocities, or S transposed of forces, on the nodes of a slot; fourth
+ * numbers are copied. */
 static void gs4i_deconvolve_block(const gs4i_grid *g, int s, const gs4_real *from, int transposed)
 {
     const size_t first = (size_t)GS4I_NODE_REALS * (size_t)s;
@@ -6143,7 +6144,7 @@ static void gs4i_deconvolve_block(const gs4i_grid *g, int s, const gs4_real *fro
             const int node = (line / apart * 4 * apart) + line % apart;
             gs4_real fill_fraction[8], share[8];
             gs4i_quad v[8], d, own;
-            gs4i_line_of_nodes(g, s, side, node, apart, from, lean, fill_fraction, v);
+            gs4i_line_of_nodes(g, s, side, node, apart, from, fill_fraction, v);
             for (i = 1; i < 7; i++)
                 share[i] = gs4i_min(fill_fraction[i],
                                     gs4i_min(fill_fraction[i - 1], fill_fraction[i + 1]));
@@ -31747,6 +31748,7 @@ GS4_API GS4I_COLD int gs4_estimate(const gs4_sim *sim, gs4_scheme scheme, gs4_in
 #undef GS4I_COLD
 #undef GS4I_CONDUCTS
 #undef GS4I_COST_OF_CELL
+#undef GS4I_LEVER_STIFFNESS
 #undef GS4I_DECONVOLVED_EIGENVALUES
 #undef GS4I_DEFAULT_ITERATIONS
 #undef GS4I_DEFAULT_TOLERANCE
@@ -31996,5 +31998,5 @@ GS4_API GS4I_COLD int gs4_estimate(const gs4_sim *sim, gs4_scheme scheme, gs4_in
  * The explicit schemes work on eight particles of a cell side by side: a step takes 0.74 to 0.87 of
  * the time it took. So each step may change the order of particles, not only one that sorts. What
  * turns or shears needs no trial pass.
- * sharp_gradients take the error out of surfaces, too: that of modes of free spheres is a sixth to a
- * tenth of before, of drops that breathe and columns that collapse two thirds to a half. */
+ * sharp_gradients take the error out of surfaces, too: that of modes of viscous spheres is a
+ * quarter to a sixth of before, of drops that breathe and columns that collapse .57 to .78. */

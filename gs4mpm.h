@@ -195,9 +195,8 @@
  *         dspin/dt = curl(A - grad u grad u)/2 - (1/flip_decay_time + k_n) (spin - curl u/2)
  *     S8  colliders move, emitters give, particles that left are dropped
  *
- * With sharp_gradients L~ and grad u are those of Z K v_i and Z K u_i, U is of Z K u_i, and
- * f_i = - K^T Z^T sum V_p sigma grad w + sum w m g, with Z as in [[grid]]; K continues what nodes
- * at a surface see on one side alone: [[step]], gs4i_find_levers. The decay takes little from
+ * With sharp_gradients L~ and grad u are those of Z v_i and Z u_i, U is of Z u_i, and
+ * f_i = - Z^T sum V_p sigma grad w + sum w m g, with Z as in [[grid]]. The decay takes little from
  * motion that the grid does see: as much as a kinematic viscosity of h^2 / (4 flip_decay_time). It
  * takes no momentum: sum m V = sum m v~.
  *
@@ -604,7 +603,7 @@
  *
  * MEMORY. GS4: 65 bytes a particle in float (position, velocity, J and their rates, mass, id,
  * material, and 4 for sorting), 16 more unless flip_decay_time is INFINITY, 49 a cell near material
- * (sharp_gradients: 117), 16 more near walls and colliders, 4 per 64 cells of the domain; 40
+ * (sharp_gradients: 69), 16 more near walls and colliders, 4 per 64 cells of the domain; 40
  * (double: 72) more for each particle within 8 cells of a sticky collider, 264 (double: 516) for
  * each with an image, within three cells, and 20 (double: 40) a cell where such a collider is not
  * flat. Symplectic Euler: 89 and 33. A scene with a viscoelastic liquid: 48 more a particle (Euler
@@ -978,11 +977,9 @@ typedef struct gs4_sim_desc {
     void *now_user;
 
     /* 1: the error of second order of the transfers is taken out of gradients and forces, of
-     * liquids alone and not with symplectic Euler, and surfaces are to second order. Waves of
-     * elasticity and sound are within 0.1 % at 32 cells a wave instead of 1.1 %, modes of a viscous
-     * sphere of 6 cells within 2.5 % instead of 11 %; the error of a drop that breathes is a third
-     * to a quarter at 24 cells. A step takes 1.3 to 1.7 times as long, the longer the more surface,
-     * and there are 1.5 (sound) to 2.3 (viscosity) times as many. */
+     * liquids alone and not with symplectic Euler. Waves of elasticity and sound are within 0.1 %
+     * at 32 cells a wave instead of 1.1 %; the error of a drop that breathes halves. A step takes
+     * 1.2 times as long, and there are 1.5 (sound) to 2.3 (viscosity) times as many. */
     int sharp_gradients;
 } gs4_sim_desc;
 
@@ -5495,9 +5492,6 @@ typedef struct gs4i_grid {
     int with_deconvolution; /* sharpened gradients: */
     /* a field sharpened; how full its nodes are, one number each: see gs4i_deconvolve_block */
     gs4_real *deconvolved, *fill_fraction;
-    /* how far nodes are from what they see, and its mass; how much that counts for; what it makes
-     * of their velocities: see gs4i_find_levers */
-    gs4_real *places, *levers, *lean;
     gs4i_scratch lists[2], histogram; /* of sorting */
 } gs4i_grid;
 
@@ -5688,9 +5682,6 @@ static void gs4i_grid_free(gs4i_memory *m, gs4i_grid *g)
     gs4i_free(m, g->remembered, c, GS4I_NODE_REALS * sizeof(gs4_real));
     gs4i_free(m, g->deconvolved, c, GS4I_NODE_REALS * sizeof(gs4_real));
     gs4i_free(m, g->fill_fraction, c, GS4I_BLOCK_NODES * sizeof(gs4_real));
-    gs4i_free(m, g->places, c, GS4I_NODE_REALS * sizeof(gs4_real));
-    gs4i_free(m, g->levers, c, GS4I_NODE_REALS * sizeof(gs4_real));
-    gs4i_free(m, g->lean, c, GS4I_NODE_REALS * sizeof(gs4_real));
     gs4i_free(m, g->occupied_block, o, sizeof *g->occupied_block);
     gs4i_free(m, g->first, o + 1, sizeof *g->first);
     gs4i_free(m, g->neighbour, o, 27 * sizeof *g->neighbour);
@@ -5721,13 +5712,9 @@ static int gs4i_grid_reserve(gs4i_memory *m, gs4i_grid *g, int count, int with_r
     n.remembered = with_remembered ? (gs4_real *)gs4i_alloc(m, c, node) : NULL;
     n.deconvolved = g->with_deconvolution ? (gs4_real *)gs4i_alloc(m, c, node) : NULL;
     n.fill_fraction = g->with_deconvolution ? (gs4_real *)gs4i_alloc(m, c, one) : NULL;
-    n.places = g->with_deconvolution ? (gs4_real *)gs4i_alloc(m, c, node) : NULL;
-    n.levers = g->with_deconvolution ? (gs4_real *)gs4i_alloc(m, c, node) : NULL;
-    n.lean = g->with_deconvolution ? (gs4_real *)gs4i_alloc(m, c, node) : NULL;
     if (!n.block || !n.occupant || !n.jump_of || !n.spread || !n.momentum || !n.force || !n.flags
         || (with_remembered && !n.remembered)
-        || (g->with_deconvolution
-            && (!n.deconvolved || !n.fill_fraction || !n.places || !n.levers || !n.lean))) {
+        || (g->with_deconvolution && (!n.deconvolved || !n.fill_fraction))) {
         gs4i_free(m, n.block, c, sizeof *n.block);
         gs4i_free(m, n.occupant, c, sizeof *n.occupant);
         gs4i_free(m, n.jump_of, c, sizeof *n.jump_of);
@@ -5737,9 +5724,6 @@ static int gs4i_grid_reserve(gs4i_memory *m, gs4i_grid *g, int count, int with_r
         gs4i_free(m, n.remembered, c, node);
         gs4i_free(m, n.deconvolved, c, node);
         gs4i_free(m, n.fill_fraction, c, one);
-        gs4i_free(m, n.places, c, node);
-        gs4i_free(m, n.levers, c, node);
-        gs4i_free(m, n.lean, c, node);
         gs4i_free(m, n.flags, c, GS4I_BLOCK_NODES);
         return GS4_ERROR_MEMORY;
     }
@@ -5755,9 +5739,6 @@ static int gs4i_grid_reserve(gs4i_memory *m, gs4i_grid *g, int count, int with_r
     gs4i_free(m, g->remembered, old, node);
     gs4i_free(m, g->deconvolved, old, node);
     gs4i_free(m, g->fill_fraction, old, one);
-    gs4i_free(m, g->places, old, node);
-    gs4i_free(m, g->levers, old, node);
-    gs4i_free(m, g->lean, old, node);
     gs4i_free(m, g->flags, old, GS4I_BLOCK_NODES);
     *g = n;
     return GS4_OK;
@@ -5800,23 +5781,25 @@ static int gs4i_grid_reserve_occupied(gs4i_memory *m, gs4i_grid *g, int count)
     return GS4_OK;
 }
 
-/* Blocks along one axis that tiles of block `b` reach, those behind a periodic wall included, and
- * with sharpened gradients those that continue these; at most 8. */
-static int gs4i_axis_reach(const gs4i_grid *g, int axis, int b, int out[8])
+/* Blocks along one axis that tiles of block `b` reach, those behind a periodic wall included; at
+ * most 6. */
+static int gs4i_axis_reach(const gs4i_grid *g, int axis, int b, int out[6])
 {
-    const int cells = g->cells[axis], beyond = g->with_deconvolution ? 4 : 0,
-              first = 4 * (b - 1) - 2; /* tile nodes first .. first + 7 */
-    int n = 0, node, side, i;
+    int n = 0, n_cells = g->cells[axis], i;
     for (i = -1; i <= 1; i++) out[n++] = b + i;
-    if (!g->periodic[axis]) return n;
-    for (node = first; node < first + GS4I_TILE; node++)
-        for (side = -1; side <= 1; side += 2) {
-            const int other = node + side * cells, at = gs4i_block_at(other);
-            if (other < -beyond || other >= cells + beyond) continue;
+    if (g->periodic[axis]) {
+        int first = 4 * (b - 1) - 2, node; /* tile nodes first .. first + 7 */
+        for (node = first; node < first + GS4I_TILE; node++) {
+            int wrapped = node < 0          ? node + n_cells
+                          : node >= n_cells ? node - n_cells
+                                            : node,
+                at = gs4i_block_at(wrapped);
+            if (wrapped == node) continue;
             for (i = 0; i < n && out[i] != at; i++) {
             }
-            if (i == n && n < 8) out[n++] = at;
+            if (i == n && n < 6) out[n++] = at;
         }
+    }
     return n;
 }
 
@@ -5840,7 +5823,7 @@ static int gs4i_grid_collect(gs4i_memory *m, gs4i_grid *g, const uint32_t *occup
     uint32_t *list = (uint32_t *)g->lists[1].data;
     int o, n = 0, result = GS4_OK;
     for (o = 0; o < count && result == GS4_OK; o++) {
-        int at[3], rx[8], ry[8], rz[8], nx, ny, nz, i, j, k;
+        int at[3], rx[6], ry[6], rz[6], nx, ny, nz, i, j, k;
         gs4i_block_coordinates(g, occupied[o], at);
         nx = gs4i_axis_reach(g, 0, at[0], rx);
         ny = gs4i_axis_reach(g, 1, at[1], ry);
@@ -5913,7 +5896,7 @@ static int gs4i_grid_is_complete(const gs4i_grid *g)
 {
     int o, i, j, k;
     for (o = 0; o < g->occupied; o++) {
-        int at[3], rx[8], ry[8], rz[8], nx, ny, nz;
+        int at[3], rx[6], ry[6], rz[6], nx, ny, nz;
         gs4i_block_coordinates(g, g->occupied_block[o], at);
         nx = gs4i_axis_reach(g, 0, at[0], rx);
         ny = gs4i_axis_reach(g, 1, at[1], ry);
@@ -6096,7 +6079,6 @@ GS4I_INLINE void gs4i_line_of_nodes(const gs4i_grid *g, int s, const int side[2]
                                     int apart, const gs4_real *from, gs4_real fill_fraction[8],
                                     gs4i_quad v[8])
 {
-    const gs4_real *lean = from == g->momentum ? g->lean : NULL;
     int i;
     for (i = 0; i < 8; i++) {
         const int slot = i < 2 ? side[0] : i < 6 ? s : side[1];
@@ -6108,25 +6090,16 @@ GS4I_INLINE void gs4i_line_of_nodes(const gs4i_grid *g, int s, const int side[2]
         if (slot >= 0) {
             fill_fraction[i] = g->fill_fraction[at];
             GS4I_LOAD(v[i], from + 4 * at);
-            if (lean) {
-                gs4i_quad more;
-                GS4I_LOAD(more, lean + 4 * at);
-                GS4I_SUM(v[i], v[i], more);
-            }
         }
     }
 }
 
-/* sharp = S (from + lean) of velocities, or S transposed of forces, on the nodes of a slot; fourth
- * numbers are copied. */
+/* sharp = S from, or its transpose, on the nodes of a slot; fourth numbers are copied. */
 static void gs4i_deconvolve_block(const gs4i_grid *g, int s, const gs4_real *from, int transposed)
 {
-    const size_t first = (size_t)GS4I_NODE_REALS * (size_t)s;
-    const gs4_real *lean = transposed ? NULL : g->lean;
-    gs4_real *to = g->deconvolved + first, most = 0;
+    gs4_real *to = g->deconvolved + (size_t)GS4I_NODE_REALS * (size_t)s, most = 0;
     int at[3], a, line, i;
-    memcpy(to, from + first, GS4I_NODE_REALS * sizeof *to);
-    for (i = 0; i < GS4I_NODE_REALS && lean; i++) to[i] += lean[first + (size_t)i];
+    memcpy(to, from + (size_t)GS4I_NODE_REALS * (size_t)s, GS4I_NODE_REALS * sizeof *to);
     for (i = 0; i < GS4I_BLOCK_NODES; i++)
         most = gs4i_max(most, g->fill_fraction[(size_t)GS4I_BLOCK_NODES * (size_t)s + (size_t)i]);
     if (!(most > 0)) return;
@@ -15496,32 +15469,6 @@ GS4I_INLINE void gs4i_scatter_affine(gs4_real *tile, const gs4i_stencils *s, int
     }
 }
 
-/* tile += w_ij (m x, m), for particle n of a batch; x in cells from the first node of the tile. */
-GS4I_INLINE void gs4i_scatter_place(gs4_real *tile, const gs4i_stencils *s, int n, gs4_real mass)
-{
-    gs4_real place[4];
-    int a;
-    for (a = 0; a < 3; a++) {
-        const int cell = (s->base[n] >> 3 * a & 7) + 1;
-        place[a] = mass * (GS4I_C(cell) + GS4I_NTH_CONST(s->xi[a], n));
-    }
-    place[3] = mass;
-    gs4i_scatter_quad(tile, s, n, place);
-}
-
-/* What gs4i_scatter_place summed becomes sum w m (x_i - x). */
-static void gs4i_finish_places(gs4_real *tile)
-{
-    int x, y, z;
-    for (z = 0; z < GS4I_TILE; z++)
-        for (y = 0; y < GS4I_TILE; y++)
-            for (x = 0; x < GS4I_TILE; x++, tile += 4) {
-                tile[0] = GS4I_C(x) * tile[3] - tile[0];
-                tile[1] = GS4I_C(y) * tile[3] - tile[1];
-                tile[2] = GS4I_C(z) * tile[3] - tile[2];
-            }
-}
-
 /* |C| dt is bounded by 1/4: the factor that makes it so. */
 GS4I_INLINE void gs4i_affine_bound(gs4i_gradient C, gs4_real dt, gs4i_lanes bound)
 {
@@ -15859,8 +15806,7 @@ enum {
 enum {
     GS4I_IMAGE_MOMENTUM,
     GS4I_IMAGE_AFFINE,
-    GS4I_IMAGE_FORCE,
-    GS4I_IMAGE_PLACE
+    GS4I_IMAGE_FORCE
 };
 
 /* --- surfaces: how far particles are from them ------------------------------------------------- *
@@ -17077,8 +17023,6 @@ static void gs4i_scatter_image_block(const gs4i_pass *pass, int index, int what)
             if (what != GS4I_IMAGE_FORCE) g[b]->whole = complete || gs4i_is_whole(&t, s.base[b]);
             if (what == GS4I_IMAGE_MOMENTUM)
                 gs4i_scatter_quad(tile, &s, b, from[0]);
-            else if (what == GS4I_IMAGE_PLACE)
-                gs4i_scatter_place(tile, &s, b, from[0][3]);
             else if (what == GS4I_IMAGE_FORCE) {
                 memcpy(f.x + 4 * b, from[0], four);
                 memcpy(f.y + 4 * b, from[1], four);
@@ -17098,11 +17042,8 @@ static void gs4i_scatter_image_block(const gs4i_pass *pass, int index, int what)
             }
         }
     }
-    if (what == GS4I_IMAGE_PLACE) gs4i_finish_places(tile);
     gs4i_add_to_surroundings(&sim->grid, &t, rows, tile,
-                             what == GS4I_IMAGE_FORCE   ? sim->grid.force
-                             : what == GS4I_IMAGE_PLACE ? sim->grid.places
-                                                        : sim->grid.momentum);
+                             what == GS4I_IMAGE_FORCE ? sim->grid.force : sim->grid.momentum);
 }
 
 static void gs4i_scatter_image_momentum(int index, void *context)
@@ -17113,11 +17054,6 @@ static void gs4i_scatter_image_momentum(int index, void *context)
 static void gs4i_scatter_image_affine(int index, void *context)
 {
     gs4i_scatter_image_block((const gs4i_pass *)context, index, GS4I_IMAGE_AFFINE);
-}
-
-static void gs4i_scatter_image_place(int index, void *context)
-{
-    gs4i_scatter_image_block((const gs4i_pass *)context, index, GS4I_IMAGE_PLACE);
 }
 
 static void gs4i_scatter_image_force(int index, void *context)
@@ -17400,7 +17336,6 @@ static void gs4i_clear_nodes(int index, void *context)
     const size_t bytes = (size_t)(end - begin) * GS4I_NODE_REALS * sizeof(gs4_real);
     memset(gs4i_of_slot(g->momentum, begin), 0, bytes);
     memset(gs4i_of_slot(g->force, begin), 0, bytes);
-    if (g->places) memset(gs4i_of_slot(g->places, begin), 0, bytes);
     if (sim->particles.with_heat) memset(gs4i_of_slot(sim->conduction.heat_nodes, begin), 0, bytes);
     if (sim->conduction.heat_sources)
         memset(gs4i_of_slot(sim->conduction.heat_sources, begin), 0, bytes);
@@ -17579,313 +17514,31 @@ static void gs4i_deconvolve_velocities(int index, void *context)
         gs4i_deconvolve_block(g, s, g->momentum, 0);
 }
 
-/* Of the forces of stress. */
+/* Forces of stress, and the weight of what is on the nodes. */
 static void gs4i_deconvolve_forces(int index, void *context)
 {
-    const gs4i_grid *g = &((const gs4i_node_pass *)context)->sim->grid;
-    int s;
-    for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++)
+    const gs4_sim *sim = ((const gs4i_node_pass *)context)->sim;
+    const gs4i_grid *g = &sim->grid;
+    const gs4i_quad gravity = { GS4I_LANES(sim->desc.gravity.x, sim->desc.gravity.y,
+                                           sim->desc.gravity.z, 0) };
+    int s, i;
+    for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
+        gs4_real *f = gs4i_of_slot(g->deconvolved, s);
         gs4i_deconvolve_block(g, s, g->force, 1);
-}
-
-/* Nodes get the velocity of the centre of mass x' of what they see, which at surfaces is up to a
- * cell away. So they lean on others: with sums over the 26 nodes around, d = x'_j - x'_i,
- *     K v_i = v_i + G (x_i - x'_i),   G = sum m_j (v_j - v_i) d^T A^-1,   A = e + sum m_j d d^T,
- * which is v where they are where v is linear. K v_i = v_i + sum c_ij (v_j - v_i), where
- *     c_ij = m_j d.b_i,   b_i = w A^-1 (x_i - x'_i),
- * w smoothly from 0 where a node is empty to 1 at 20 % of a full one, and from 60 % to 0 at 80 %:
- * the lightest would need steps half as long, the fullest have no need. None where bodies or walls
- * met a node. Forces take the transpose of K, so that no energy comes of it.
- * Lengths are in cells. */
-
-/* Of the mass of a full node so much holds the gradient of a node whose neighbours lie in a plane
- * or on a line, in h^2 (chosen). */
-#define GS4I_LEVER_STIFFNESS 1e-3
-
-/* The fields around a slot. */
-typedef struct gs4i_lean_tiles {
-    gs4_real field[GS4I_TILE_REALS], places[GS4I_TILE_REALS], levers[GS4I_TILE_REALS];
-} gs4i_lean_tiles;
-
-/* x - x' and mass, 0 where there is none. */
-static void gs4i_load_places(const gs4i_grid *g, const gs4i_surroundings *t, gs4_real lightest,
-                             gs4_real *places)
-{
-    int i;
-    gs4i_load_surroundings(t, g->places, places);
-    for (i = 0; i < 4 * GS4I_TILE * GS4I_TILE * GS4I_TILE; i += 4) {
-        const int there = places[i + 3] > lightest;
-        const gs4_real by = there ? 1 / places[i + 3] : GS4I_C(0);
-        gs4i_quad q;
-        GS4I_LOAD(q, places + i);
-        GS4I_SPLAT_MUL(q, by, q);
-        GS4I_LANE(q, 3) = there ? places[i + 3] : GS4I_C(0);
-        GS4I_STORE(places + i, q);
-    }
-}
-
-/* Where node i of a block is in its tile. */
-GS4I_INLINE int gs4i_in_tile(int i)
-{
-    return 4 * (GS4I_TILE * (GS4I_TILE * (2 + (i >> 4)) + 2 + (i >> 2 & 3)) + 2 + (i & 3));
-}
-
-/* How much farther in a tile the node beside another is, number j of 27, and its d. */
-GS4I_INLINE int gs4i_beside(int j)
-{
-    return 4 * (GS4I_TILE * (GS4I_TILE * (j / 9 - 1) + j / 3 % 3 - 1) + j % 3 - 1);
-}
-
-GS4I_INLINE void gs4i_apart(const gs4_real *place, int j, gs4i_quad *d)
-{
-    const gs4i_quad straight = { GS4I_LANES(GS4I_C(j % 3 - 1), GS4I_C(j / 3 % 3 - 1),
-                                            GS4I_C(j / 9 - 1), 0) };
-    gs4i_quad own, other;
-    GS4I_LOAD(own, place);
-    GS4I_LOAD(other, place + gs4i_beside(j));
-    GS4I_DIFFERENCE(own, own, other);
-    GS4I_SUM(*d, straight, own);
-}
-
-GS4I_INLINE gs4_real gs4i_lever_along(const gs4i_quad *d, const gs4_real *b)
-{
-    return (GS4I_LANE(*d, 0) * b[0] + GS4I_LANE(*d, 1) * b[1]) + GS4I_LANE(*d, 2) * b[2];
-}
-
-/* Of a symmetric 3 x 3 matrix. */
-GS4I_INLINE gs4_real gs4i_cofactor(const gs4i_quad A[3], int a, int c)
-{
-    const int a1 = (a + 1) % 3, a2 = (a + 2) % 3, c1 = (c + 1) % 3, c2 = (c + 2) % 3;
-    return GS4I_LANE(A[a1], c1) * GS4I_LANE(A[a2], c2)
-           - GS4I_LANE(A[a1], c2) * GS4I_LANE(A[a2], c1);
-}
-
-/* b of a node, w given. */
-static void gs4i_lever_of_node(const gs4_real *place, gs4_real full, gs4_real w, gs4_real b[3])
-{
-    const gs4i_quad zero = { GS4I_LANES(0, 0, 0, 0) };
-    gs4i_quad A[3] = { zero, zero, zero };
-    gs4_real by;
-    int j, a, c;
-    for (a = 0; a < 3; a++) GS4I_LANE(A[a], a) = GS4I_C(GS4I_LEVER_STIFFNESS) * full;
-    for (j = 0; j < 27; j++) {
-        const gs4_real m = place[gs4i_beside(j) + 3];
-        gs4i_quad d;
-        gs4i_apart(place, j, &d);
-        for (a = 0; a < 3; a++) GS4I_SPLAT_MAD(A[a], m * GS4I_LANE(d, a), d);
-    }
-    by =
-        w
-        / (gs4i_cofactor(A, 0, 0) * GS4I_LANE(A[0], 0) + gs4i_cofactor(A, 0, 1) * GS4I_LANE(A[0], 1)
-           + gs4i_cofactor(A, 0, 2) * GS4I_LANE(A[0], 2));
-    for (a = 0; a < 3; a++)
-        for (b[a] = 0, c = 0; c < 3; c++) b[a] += by * gs4i_cofactor(A, a, c) * place[c];
-}
-
-/* w of a node that is filled so much. */
-GS4I_INLINE gs4_real gs4i_lever_weight(gs4_real filled)
-{
-    const gs4_real a = gs4i_min(1, 5 * filled),
-                   b = gs4i_max(0, gs4i_min(1, 5 * (GS4I_C(0.8) - filled)));
-    return (a * a * (3 - 2 * a)) * (b * b * (3 - 2 * b));
-}
-
-/* w of node i of a slot. */
-static gs4_real gs4i_lever_weight_of(const gs4i_node_pass *pass, int s, int i)
-{
-    const gs4i_grid *g = &pass->sim->grid;
-    const gs4_real mass = gs4i_of_slot(g->momentum, s)[4 * i + 3],
-                   *jump = gs4i_has_jumps(g, s) ? gs4i_jumps_of(g, s) + 4 * i : NULL;
-    if (jump && (jump[0] != 0 || jump[1] != 0 || jump[2] != 0 || jump[3] != 0)) return 0;
-    return mass > pass->lightest
-               ? gs4i_lever_weight(mass * pass->sim->integrator.inv_densest_node_mass)
-               : 0;
-}
-
-/* Beside b of the first node of a block: does any of the block lean on others? */
-static void gs4i_find_leaning(int index, void *context)
-{
-    const gs4i_node_pass *pass = (const gs4i_node_pass *)context;
-    const gs4i_grid *g = &pass->sim->grid;
-    int s, i;
-    for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
-        gs4_real *levers = gs4i_of_slot(g->levers, s);
-        memset(levers, 0, GS4I_NODE_REALS * sizeof *levers);
-        for (i = 0; i < GS4I_BLOCK_NODES && !(levers[3] > 0); i++)
-            levers[3] = gs4i_lever_weight_of(pass, s, i) > 0;
-    }
-}
-
-static int gs4i_is_leaning(const gs4i_grid *g, const int slots[27])
-{
-    int i;
-    for (i = 0; i < 27; i++)
-        if (slots[i] >= 0 && gs4i_of_slot(g->levers, slots[i])[3] > 0) return 1;
-    return 0;
-}
-
-/* b of the nodes of a group. */
-static void gs4i_find_levers(int index, void *context)
-{
-    const gs4i_node_pass *pass = (const gs4i_node_pass *)context;
-    const gs4i_grid *g = &pass->sim->grid;
-    const gs4_real full = 1 / pass->sim->integrator.inv_densest_node_mass;
-    int s, i;
-    for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
-        gs4_real *levers = gs4i_of_slot(g->levers, s), places[GS4I_TILE_REALS];
-        gs4i_surroundings t;
-        if (!(levers[3] > 0)) continue;
-        gs4i_surroundings_of(g, s, &t);
-        gs4i_load_places(g, &t, pass->lightest, places);
-        for (i = 0; i < GS4I_BLOCK_NODES; i++) {
-            const gs4_real w = gs4i_lever_weight_of(pass, s, i);
-            if (w > 0) gs4i_lever_of_node(places + gs4i_in_tile(i), full, w, levers + 4 * i);
+        for (i = 0; i < GS4I_NODE_REALS; i += 4) {
+            gs4i_quad sum;
+            GS4I_LOAD(sum, f + i);
+            GS4I_SPLAT_MAD(sum, f[i + 3], gravity);
+            GS4I_STORE(f + i, sum);
         }
     }
 }
 
-/* K v - v of the nodes of a group. */
-static void gs4i_lean_velocities(int index, void *context)
-{
-    const gs4i_node_pass *pass = (const gs4i_node_pass *)context;
-    const gs4i_grid *g = &pass->sim->grid;
-    const gs4i_quad zero = { GS4I_LANES(0, 0, 0, 0) };
-    gs4i_lean_tiles tiles;
-    int s, i, j;
-    for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
-        const gs4_real *levers = gs4i_of_slot(g->levers, s);
-        gs4_real *lean = gs4i_of_slot(g->lean, s);
-        gs4i_surroundings t;
-        memset(lean, 0, GS4I_NODE_REALS * sizeof *lean);
-        if (!(levers[3] > 0)) continue;
-        gs4i_surroundings_of(g, s, &t);
-        gs4i_load_places(g, &t, pass->lightest, tiles.places);
-        gs4i_load_surroundings(&t, g->momentum, tiles.field);
-        for (i = 0; i < GS4I_BLOCK_NODES; i++) {
-            const gs4_real *place = tiles.places + gs4i_in_tile(i), *b = levers + 4 * i,
-                           *v = tiles.field + gs4i_in_tile(i);
-            gs4i_quad own, sum = zero;
-            if (b[0] == 0 && b[1] == 0 && b[2] == 0) continue;
-            GS4I_LOAD(own, v);
-            for (j = 0; j < 27; j++) {
-                const int to = gs4i_beside(j);
-                gs4i_quad d, dv;
-                gs4i_apart(place, j, &d);
-                GS4I_LOAD(dv, v + to);
-                GS4I_DIFFERENCE(dv, dv, own);
-                GS4I_SPLAT_MAD(sum, place[to + 3] * gs4i_lever_along(&d, b), dv);
-            }
-            GS4I_LANE(sum, 3) = 0;
-            GS4I_STORE(lean + 4 * i, sum);
-        }
-    }
-}
-
-/* The transpose of K on forces, and weight: into `deconvolved`. */
-static void gs4i_lean_forces(int index, void *context)
-{
-    const gs4i_node_pass *pass = (const gs4i_node_pass *)context;
-    const gs4i_grid *g = &pass->sim->grid;
-    const gs4_vec3 gravity = pass->sim->desc.gravity;
-    const gs4i_quad weight = { GS4I_LANES(gravity.x, gravity.y, gravity.z, 0) };
-    gs4i_lean_tiles tiles;
-    uint8_t leans[GS4I_TILE_REALS / 4];
-    int s, i, j;
-    for (s = index * GS4I_GROUP; s < gs4i_group_end(g, index); s++) {
-        const gs4_real *force = gs4i_of_slot(g->force, s);
-        gs4_real *out = gs4i_of_slot(g->deconvolved, s);
-        gs4i_surroundings t;
-        int any;
-        gs4i_surroundings_of(g, s, &t);
-        any = gs4i_is_leaning(g, t.slot);
-        if (any) {
-            gs4i_load_places(g, &t, pass->lightest, tiles.places);
-            gs4i_load_surroundings(&t, g->levers, tiles.levers);
-            gs4i_load_surroundings(&t, g->force, tiles.field);
-            for (i = 0; i < GS4I_TILE * GS4I_TILE * GS4I_TILE; i++)
-                leans[i] = tiles.levers[4 * i] != 0 || tiles.levers[4 * i + 1] != 0
-                           || tiles.levers[4 * i + 2] != 0;
-        }
-        for (i = 0; i < GS4I_BLOCK_NODES; i++) {
-            const int at = gs4i_in_tile(i), there = any && tiles.places[at + 3] > 0;
-            const gs4_real *place = tiles.places + at, *b = tiles.levers + at;
-            gs4_real leaves = 0;
-            gs4i_quad own, all;
-            GS4I_LOAD(own, force + 4 * i);
-            all = own;
-            for (j = 0; j < 27 && there; j++) {
-                const int to = gs4i_beside(j);
-                gs4i_quad d, other;
-                if (!(leans[at / 4] | leans[(at + to) / 4])) continue;
-                gs4i_apart(place, j, &d);
-                GS4I_LOAD(other, tiles.field + at + to);
-                GS4I_SPLAT_MAD(all, -place[3] * gs4i_lever_along(&d, b + to), other);
-                leaves += place[to + 3] * gs4i_lever_along(&d, b);
-            }
-            GS4I_SPLAT_MAD(all, -leaves, own);
-            GS4I_SPLAT_MAD(all, force[4 * i + 3], weight);
-            GS4I_LANE(all, 3) = force[4 * i + 3];
-            GS4I_STORE(out + 4 * i, all);
-        }
-    }
-}
-
-/* S K v_i or S K u_i, mirror nodes included. */
+/* S v_i or S u_i, mirror nodes included. */
 static void gs4i_deconvolve(gs4_sim *sim, gs4i_node_pass *nodes)
 {
-    gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_lean_velocities, nodes);
-    gs4i_fill_mirror_nodes(&sim->boundary, &sim->grid, sim->grid.lean);
     gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_deconvolve_velocities, nodes);
     gs4i_fill_mirror_nodes(&sim->boundary, &sim->grid, sim->grid.deconvolved);
-}
-
-/* Particles of a block give their mass, and how far nodes are from them, where any node leans. */
-static void gs4i_scatter_places(int index, void *context)
-{
-    const gs4i_pass *pass = (const gs4i_pass *)context;
-    gs4_sim *sim = pass->sim;
-    const int o = pass->blocks[index];
-    const gs4i_frame frame = gs4i_tile_frame(&sim->grid, sim->grid.occupied_block[o]);
-    gs4_real tile[GS4I_TILE_REALS];
-    size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
-    int n;
-    if (!gs4i_is_leaning(&sim->grid, sim->grid.neighbour + 27 * (size_t)o)) return;
-    memset(tile, 0, sizeof tile);
-    for (; i < end; i += (size_t)n) {
-        gs4i_batch q;
-        gs4i_stencils s;
-        gs4i_lanes place[4];
-        int b, a;
-        n = (int)sim->particles.order[i];
-        gs4i_stage_batch(&sim->particles, i, n, sim->integrator.prediction, &frame, &q, &s);
-        gs4i_live_mass(&q, n, place[3]);
-        for (a = 0; a < 3; a++) {
-            const gs4_real cell = GS4I_C((s.base[0] >> 3 * a & 7) + 1);
-            GS4I_BATCH_LOOP(b) place[a][b] = place[3][b] * (cell + s.xi[a][b]);
-        }
-        gs4i_scatter_cell(tile + 4 * s.base[0], &s, place);
-    }
-    gs4i_finish_places(tile);
-    gs4i_tile_add(&sim->grid, o, sim->reports[o].rows, tile, sim->grid.places);
-}
-
-/* What nodes lean on, behind walls as mirrors have it. */
-static void gs4i_place_nodes(gs4_sim *sim, gs4i_node_pass *nodes)
-{
-    gs4i_parity parity[6];
-    int wall, c;
-    gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_find_leaning, nodes);
-    gs4i_scatter(sim, gs4i_scatter_places);
-    gs4i_scatter_image_particles(sim, gs4i_scatter_image_place);
-    gs4i_vector_parity(&sim->boundary, 4, parity);
-    for (wall = 0; wall < 6; wall++)
-        for (c = 0; c < 3 && sim->boundary.walls[wall] == GS4_WALL_STICK; c++)
-            parity[wall].sign[c] = GS4I_C(c == wall / 2 ? -1 : 1);
-    gs4i_fold(&sim->boundary, &sim->grid, sim->grid.places, parity);
-    gs4i_fill(&sim->boundary, &sim->grid, sim->grid.places, parity);
-    gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_find_levers, nodes);
-    for (wall = 0; wall < 6; wall++) parity[wall].reals = 3; /* whether any leans stays */
-    gs4i_fill(&sim->boundary, &sim->grid, sim->grid.levers, parity);
 }
 
 /* Nothing on the nodes yet; image particles where they are now. */
@@ -17912,7 +17565,6 @@ static int gs4i_set_velocities(gs4_sim *sim, gs4i_node_pass *nodes)
     if (sim->grid.with_deconvolution) {
         gs4i_parallel_for(&sim->tasks, groups, gs4i_find_fill_fractions, nodes);
         gs4i_fill_mirror_fractions(&sim->boundary, &sim->grid);
-        gs4i_place_nodes(sim, nodes);
         gs4i_deconvolve(sim, nodes);
     }
     gs4i_gather_image_particles(sim, gs4i_gather_image_velocity);
@@ -17938,9 +17590,6 @@ static void gs4i_finish_forces(gs4_sim *sim, gs4i_node_pass *nodes)
     if (!g->with_deconvolution) return;
     gs4i_fill_mirror_nodes(&sim->boundary, g, g->force);
     gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_deconvolve_forces, nodes);
-    gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_copy_deconvolved, nodes);
-    gs4i_fill_mirror_nodes(&sim->boundary, g, g->force);
-    gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_lean_forces, nodes);
     gs4i_parallel_for(&sim->tasks, gs4i_groups(sim), gs4i_copy_deconvolved, nodes);
     gs4i_weigh_mirror_nodes(&sim->boundary, g, sim->desc.gravity);
     gs4i_vector_parity(&sim->boundary, 3, parity);
@@ -31748,7 +31397,6 @@ GS4_API GS4I_COLD int gs4_estimate(const gs4_sim *sim, gs4_scheme scheme, gs4_in
 #undef GS4I_COLD
 #undef GS4I_CONDUCTS
 #undef GS4I_COST_OF_CELL
-#undef GS4I_LEVER_STIFFNESS
 #undef GS4I_DECONVOLVED_EIGENVALUES
 #undef GS4I_DEFAULT_ITERATIONS
 #undef GS4I_DEFAULT_TOLERANCE
@@ -31997,6 +31645,4 @@ GS4_API GS4I_COLD int gs4_estimate(const gs4_sim *sim, gs4_scheme scheme, gs4_in
  * gs4_estimate. GS4_NO_SOLIDS and the like leave parts out.
  * The explicit schemes work on eight particles of a cell side by side: a step takes 0.74 to 0.87 of
  * the time it took. So each step may change the order of particles, not only one that sorts. What
- * turns or shears needs no trial pass.
- * sharp_gradients take the error out of surfaces, too: that of modes of viscous spheres is a
- * quarter to a sixth of before, of drops that breathe and columns that collapse .57 to .78. */
+ * turns or shears needs no trial pass. */

@@ -51,7 +51,6 @@ static gs4_sim *surface_sphere(const gs4_material *m, gs4_scheme scheme, int R, 
     gs4_edit v;
     int i, k;
     d.scheme = scheme;
-    d.sharp_gradients = scene_sharp;
     d.cell_size = (gs4_real)(1.0 / R);
     for (i = 0; i < 6; i++) d.walls[i] = GS4_WALL_OPEN;
     CHECK_RESULT(NULL, gs4_create(&d, &sim), GS4_OK);
@@ -125,22 +124,6 @@ static void test_partitioned_surface_decay(void)
         CHECK_BETWEEN((1 - fine) / (1 - coarse), -0.5, 0.5);
     }
     if (test_full) CHECK_CLOSE(surface_decay(GS4_EXPLICIT, 8, 0, 2, 0.5), 0.925, 0.01);
-}
-
-/* Sharpened gradients know that nodes at a surface see material on one side alone: what decays too
- * slowly there is less than without, along each axis, and converges. */
-static void test_partitioned_surface_sharp(void)
-{
-    int a;
-    for (a = test_full ? 0 : 2; a < 3; a++) {
-        double plain = surface_decay(GS4_EXPLICIT, 6, 0, a, 0.5), coarse, fine;
-        scene_sharp = 1;
-        coarse = surface_decay(GS4_EXPLICIT, 6, 0, a, 0.5);
-        fine = surface_decay(GS4_EXPLICIT, test_full ? 12 : 8, 0, a, 0.5);
-        scene_sharp = 0;
-        CHECK_BETWEEN((1 - coarse) / (1 - plain), -0.25, 0.25);
-        CHECK_CLOSE(fine, 1, test_full ? 0.005 : 0.02);
-    }
 }
 
 /* What is left of both modes after the time of e^-1/2, in n, 2 n, 4 n steps: order in time. */
@@ -291,7 +274,6 @@ static void test_partitioned_surface_momentum(void)
 static void run_partitioned_surface(void)
 {
     RUN_FULL_ONCE(test_partitioned_surface_decay);
-    RUN(test_partitioned_surface_sharp);
     if (sizeof(gs4_real) == 8) RUN_FULL(test_partitioned_surface_order);
     RUN_FULL_ONCE(test_partitioned_surface_ring);
     RUN_ONCE(test_partitioned_surface_momentum);

@@ -38,11 +38,11 @@ static const struct {
                              { "shear modulus", 1 },
                              { "relaxation time", 0.01 },
                              { "stretch time", 0.005 },
-                             { "anisotropy", 0.15 },
+                             { "anisotropy", 0.1 },
                              { "arms", 4 },
                              { "conductivity", 1 },
                              { "latent heat", 1 },
-                             { "flux time", 0.15 },
+                             { "flux time", 0.1 },
                              { "density ratio", 10 },
                              { "speed", 1e-3 },
                              { "flip_decay_time", 100 },
@@ -113,7 +113,7 @@ static int is_elastic(int scene)
 static int is_thermal(int scene) { return scene == HEAT || scene == CATTANEO || scene == MELT; }
 static int remembers(int scene) { return scene == WAVE_OLDROYD || scene == WAVE_POM_POM; }
 
-/* What of each scene is varied, with which schemes; its bound. */
+/* What of each scene is varied, with which schemes; its bound, twice that with symplectic Euler. */
 #define BIT(p) (1u << (p))
 #define UNITS (BIT(UNIT_LENGTH) | BIT(UNIT_TIME) | BIT(UNIT_MASS))
 #define COMMON (BIT(BULK) | BIT(DT) | BIT(ORIGIN) | BIT(CELL) | UNITS)
@@ -127,7 +127,7 @@ static const struct {
     { "shear wave Newton",
       COMMON | BIT(VISCOSITY) | BIT(DENSITY) | BIT(SPEED) | BIT(TIME) | BIT(DECAY), ALL_VARIANTS,
       0.155 },
-    { "shear wave Oldroyd-B", BIT(VISCOSITY) | BIT(RELAXATION) | BIT(DT) | BIT(BULK) | UNITS,
+    { "shear wave Oldroyd-B", BIT(VISCOSITY) | BIT(RELAXATION) | BIT(DT) | BIT(BULK),
       SECOND_ORDER | BIT(EULER), 0.15 },
     { "shear wave Pom-Pom",
       BIT(VISCOSITY) | BIT(RELAXATION) | BIT(STRETCH) | BIT(ANISOTROPY) | BIT(ARMS) | BIT(DT),
@@ -135,14 +135,14 @@ static const struct {
     { "shear wave neo-Hookean", COMMON | BIT(SHEAR) | BIT(DENSITY) | BIT(SPEED) | BIT(TIME),
       ALL_VARIANTS, 0.155 },
     { "shear wave corotated", BIT(SHEAR) | BIT(BULK) | BIT(SPEED) | BIT(DT), SECOND_ORDER, 0.15 },
-    { "free sphere Newton", BIT(VISCOSITY) | BIT(BULK) | BIT(DT), SECOND_ORDER | BIT(EULER), 0.2 },
-    { "free sphere neo-Hookean", BIT(SHEAR) | BIT(BULK) | BIT(DT), SECOND_ORDER | BIT(EULER), 0.2 },
+    { "free sphere Newton", BIT(VISCOSITY) | BIT(BULK) | BIT(DT), SECOND_ORDER | BIT(EULER), 0.25 },
+    { "free sphere neo-Hookean", BIT(SHEAR) | BIT(BULK) | BIT(DT), SECOND_ORDER | BIT(EULER),
+      0.25 },
     { "heat", BIT(CONDUCTIVITY) | BIT(DT) | BIT(ORIGIN) | BIT(CELL) | UNITS | BIT(UNIT_TEMPERATURE),
       SECOND_ORDER | BIT(EULER), 0.05 },
     { "heat Cattaneo", BIT(CONDUCTIVITY) | BIT(FLUX_TIME) | BIT(DT), SECOND_ORDER, 0.05 },
-    { "melting", BIT(CONDUCTIVITY) | BIT(LATENT) | BIT(DT) | UNITS | BIT(UNIT_TEMPERATURE),
-      SECOND_ORDER | BIT(EULER), 0.02 },
-    { "pool of two densities", BIT(RATIO) | BIT(VISCOSITY) | BIT(BULK) | BIT(DT) | UNITS,
+    { "melting", BIT(CONDUCTIVITY) | BIT(LATENT) | BIT(DT), SECOND_ORDER | BIT(EULER), 0.02 },
+    { "pool of two densities", BIT(RATIO) | BIT(VISCOSITY) | BIT(BULK) | BIT(DT),
       SECOND_ORDER | BIT(EULER), 0.03 }
 };
 
@@ -208,8 +208,8 @@ static void times(trial *s)
 {
     const int scene = s->j->scene;
     s->k = is_sphere(scene) ? SPHERE_K : is_thermal(scene) ? PI : 2 * PI;
-    s->T = is_elastic(scene) ? 1 / s->k : scene == POOL ? 0.5 : 0.5 / (s->k * s->k);
-    if (scene == MELT) s->T = 1;
+    s->T = is_elastic(scene) ? 1 / s->k : scene == POOL ? 0.3 : 0.5 / (s->k * s->k);
+    if (scene == MELT) s->T = 0.5;
     if (is_elastic(scene)) s->T /= sqrt(s->j->factor[SHEAR] / s->j->factor[DENSITY]);
     s->dt = s->T / 16 * s->j->factor[DT];
     s->T *= s->j->factor[TIME];
@@ -280,7 +280,7 @@ static void describe(trial *s)
                         : is_sphere(scene) ? GS4_WALL_OPEN
                                            : GS4_WALL_SLIP;
     if (scene == POOL) s->d.gravity = at(0, -s->L / (s->t * s->t), 0);
-    s->d.flip_decay_time = (gs4_real)(s->t * value(s, DECAY));
+    if (s->j->variant != EULER) s->d.flip_decay_time = (gs4_real)(s->t * value(s, DECAY));
     s->d.max_dt = (gs4_real)(s->t * s->dt);
     s->speed = s->L / s->t * value(s, SPEED);
 }
@@ -458,7 +458,7 @@ static void follow(trial *s, outcome *o)
         if (bench_now(NULL) - before > 5) return wrong(o, "a step of more than 5 s");
         if (!is_good(now.kinetic_energy) || !is_good(now.max_speed) || !is_good(now.volume))
             return wrong(o, "not finite");
-        if (i > 2 * most) {
+        if (i > most + 16) {
             o->sign = '$';
             strcpy(o->why, "steps that are refused and tried again");
             return;
@@ -533,7 +533,7 @@ static outcome run(const job *j)
             o.error = j->scene == POOL   ? judge_pool(&s, start)
                       : j->scene == MELT ? judge_melt(&s, first)
                                          : judge(&s, first);
-            o.sign = o.error <= scenes[j->scene].bound ? '.' : '~';
+            o.sign = o.error <= scenes[j->scene].bound * (j->variant == EULER ? 2 : 1) ? '.' : '~';
             if (!is_good(o.error)) wrong(&o, "the answer is not finite");
         }
     }

@@ -311,8 +311,8 @@
  * stiffer (bench/stokes.c); a coil four cells thick and a hundred times as long, whose turns touch
  * here and there at single cells, takes 110 at s mu/(rho h^2) = 1e4, and at 1e7 does not converge.
  * A step that does not converge is refused. Where a step changes velocity by less than
- * solver_tolerance of it, the solve goes on to a hundredth of that change, down to rounding: what is
- * within the tolerance would be no brake at all (tests: semi_extremes_braked).
+ * solver_tolerance of it, the solve goes on to a hundredth of that change, down to rounding: what
+ * is within the tolerance would be no brake at all (tests: semi_extremes_braked).
  *     Thin bodies need both in one solve: of the bending stiffness mu d^3/3 of an incompressible
  * sheet half is due to its pressure. One that solves viscosity first, then pressure, has sheets
  * bend 1.98 times as fast as they should once flow is steady, whatever dt. Together a sheet of 6

@@ -5,7 +5,7 @@
  *   ./extremes [word of a line, as "heat" or "semi-implicit"]        CSV on standard output
  * Signs: . right   ~ it ran, the error is above the bound   - refused with a sentence, state kept
  *        $ more steps than the bench takes   ! not finite, state of a refused step lost, or slow
- * The map of a line has decades -12, -9, -6, -4 to 4, 6, 9 and 12, the normal value between bars. */
+ * The map of a line has decades -12, -9, -6, -4 to 4, 6, 9, 12, the normal value between bars. */
 #define _POSIX_C_SOURCE 200112L
 #define GS4MPM_IMPLEMENTATION
 #include "gs4mpm.h"

@@ -138,8 +138,8 @@ static void test_semi_extremes_relaxed(void)
 }
 
 /* A shear wave, 12 cells long, that viscosity brakes by 1e-5 in a step, at rest and carried along:
- * what it loses in 16 steps. Within the tolerance of all momentum, 1e-4 in float, the solve kept its
- * guess, which has no viscosity: it lost nothing at all. */
+ * what it loses in 16 steps. Within the tolerance of all momentum, 1e-4 in float, the solve kept
+ * its guess, which has no viscosity: it lost nothing at all. */
 static void test_semi_extremes_braked(void)
 {
     const double k = 2 * acos(-1.0);

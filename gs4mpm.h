@@ -310,7 +310,9 @@
  * 40 in ropes, coils, folded sheets, porous matter and spray, 90 in pools with inclusions 1e6 times
  * stiffer (bench/stokes.c); a coil four cells thick and a hundred times as long, whose turns touch
  * here and there at single cells, takes 110 at s mu/(rho h^2) = 1e4, and at 1e7 does not converge.
- * A step that does not converge is refused.
+ * A step that does not converge is refused. Where a step changes velocity by less than
+ * solver_tolerance of it, the solve goes on to a hundredth of that change, down to rounding: what
+ * is within the tolerance would be no brake at all (tests: semi_extremes_braked).
  *     Thin bodies need both in one solve: of the bending stiffness mu d^3/3 of an incompressible
  * sheet half is due to its pressure. One that solves viscosity first, then pressure, has sheets
  * bend 1.98 times as fast as they should once flow is steady, whatever dt. Together a sheet of 6
@@ -6930,6 +6932,9 @@ typedef struct gs4i_stokes {
     void *context;
     double law_rounding; /* of b, so much is not known: size of the residual that will do */
     double tolerance;    /* relative residual */
+    /* Share of the residual of the guess that is asked for where that is less than the tolerance;
+     * what is within the tolerance will still do. 0: nothing of the kind. */
+    double guess_share;
     int max_iterations;
     int threads;   /* how finely work is cut: as in gs4_poisson_desc */
     int is_graded; /* mu varies within a liquid, see gs4i_stokes_fluidity */
@@ -9391,6 +9396,17 @@ static gs4i_outcome gs4i_stokes_iterate(gs4i_stokes *s, double goal, double *nor
     return GS4I_CONVERGED;
 }
 
+/* The residual to go for. Within the tolerance of all momentum a liquid that moves with next to no
+ * strain in a step would keep the guess, and so never be braked by its viscosity. What is asked for
+ * of the guess is not below 1e-4 of the tolerance, nor rounding. */
+static double gs4i_stokes_aim(const gs4i_stokes *s, double goal, double size, double norm)
+{
+    const double least = fmax(1e-4 * goal, 4 * (double)GS4I_EPSILON * size),
+                 rounding = s->law ? s->law_rounding / s->system.mass_unit : 0;
+    if (!(s->guess_share > 0)) return goal;
+    return fmin(goal, fmax(s->guess_share * norm, fmax(least, rounding)));
+}
+
 /* For the matrix that was set up: GS4_OK, or GS4_ERROR_NOT_CONVERGED with the best iterate there
  * was, or GS4_ERROR_ARGUMENT where a right-hand side or a guess is not finite. */
 static int gs4i_stokes_find(gs4i_stokes *s)
@@ -9407,7 +9423,7 @@ static int gs4i_stokes_find(gs4i_stokes *s)
         return gs4i_stokes_fault(s, "the size of the right-hand side is ", size,
                                  "; rhs, rhs_p and what is given of u must be finite");
     goal = s->tolerance * size;
-    end = gs4i_stokes_iterate(s, goal, &norm);
+    end = gs4i_stokes_iterate(s, gs4i_stokes_aim(s, goal, size, norm), &norm);
     if (s->law) goal = fmax(goal, s->law_rounding / y->mass_unit);
     gs4i_stokes_take_means(y, y->x + y->faces);
     gs4i_parallel_for(s->tasks, s->box->size[2] + 1, gs4i_stokes_store_plane, s);
@@ -22762,6 +22778,7 @@ static void gs4i_describe_stokes(gs4_sim *sim)
     k->rhs_p = f->rhs;
     k->p = f->pressure;
     k->tolerance = (double)sim->desc.solver_tolerance;
+    k->guess_share = 0.01; /* of what stress and pressure do in the step: chosen */
     k->max_iterations = sim->desc.solver_max_iterations;
     k->threads = sim->desc.threads;
     k->is_graded = 0;

@@ -12920,13 +12920,20 @@ GS4I_INLINE gs4_real *gs4i_deformation_of(const gs4i_response *r)
     return r->p->deformation + (size_t)r->p->deformation_reals * r->i;
 }
 
-/* Squared speed of elastic waves, and particles where it is no number. */
+/* 1 of lanes in use, 0 of others: n of a batch from GS4I_BATCH - n on. */
+static const gs4_real gs4i_lane_is_live[2 * GS4I_BATCH] = { 1, 1, 1, 1, 1, 1, 1, 1,
+                                                            0, 0, 0, 0, 0, 0, 0, 0 };
+
+/* Squared speed of elastic waves, and particles where it is no number. Lanes beyond n are left out:
+ * what is followed one by one has no stress there. */
 static void gs4i_see_stiffness(gs4i_response *r, gs4i_lanes stiffness)
 {
+    gs4i_lanes live;
     int b, good = 1;
+    memcpy(live, gs4i_lane_is_live + GS4I_BATCH - r->n, sizeof live);
     GS4I_BATCH_LOOP(b) {
         const gs4i_wide_mask fine = stiffness[b] < GS4I_HUGE;
-        const gs4i_wide speed2 = stiffness[b] * r->constants.wave_volume[b];
+        const gs4i_wide speed2 = live[b] * (stiffness[b] * r->constants.wave_volume[b]);
         GS4I_WIDE_MAX(r->seen.max_stiffness[b], r->seen.max_stiffness[b], speed2);
         good &= gs4i_all(&fine);
     }
@@ -15629,10 +15636,6 @@ static void gs4i_scatter_cell_force(gs4_real *at, const gs4i_stencils *s, gs4i_s
         }
     }
 }
-
-/* 1 of lanes in use, 0 of others: n of a batch from GS4I_BATCH - n on. */
-static const gs4_real gs4i_lane_is_live[2 * GS4I_BATCH] = { 1, 1, 1, 1, 1, 1, 1, 1,
-                                                            0, 0, 0, 0, 0, 0, 0, 0 };
 
 /* Mass that a batch of n gives to nodes. */
 GS4I_INLINE void gs4i_live_mass(const gs4i_batch *q, int n, gs4i_lanes mass)

@@ -1495,8 +1495,7 @@ static uint64_t err_fast_pom_pom(double size, int *particles)
         sim, gs4_box(at(0.25, 0.25, 0.25), at(0.25 + size, 0.25 + size, 0.25 + size)), &f);
     e = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
     for (i = 0; i < e.count; i++) {
-        const gs4_real *x = gs4_particles(sim, GS4_FIELD_POSITION).data + 3 * i;
-        e.data[i * e.stride] = 5 * x[1];
+        e.data[i * e.stride] = (gs4_real)(3 * (i * 7 % 5 - 2));
     }
     ERR_REFUSED(sim, gs4_step(sim, gs4_stable_dt(sim) / 2), GS4_ERROR_UNSTABLE,
                 "takes more than 30 times the work");
@@ -1514,7 +1513,9 @@ static void test_errors_fast_pom_pom(void)
     if (test_filter[0])
         printf("%d particles %lu, %d %lu\n", few, (unsigned long)one, many, (unsigned long)all);
     CHECK(few == 8 && many == 512);
-    CHECK(one > 500 && one < 8000 && all < GS4I_MEAN_WORK * 512);
+    /* each of eight blocks may be over by a batch whose particles take all they may */
+    CHECK(one > 500 && one < 8000);
+    CHECK(all < GS4I_MEAN_WORK * 512 + 8 * (GS4I_SPARE_WORK + GS4I_BATCH * GS4I_WORK));
 }
 
 static void test_errors_no_end(void)

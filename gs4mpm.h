@@ -418,7 +418,7 @@
  *     give h |div u| <= 2 max |u_i - r|_1, lighter ones 27 sqrt(2)/14 max q_i |u_i - r|_1. So
  *     h |div u| <= 4.7 max q_i |u_i - r|_1 over the nodes around the block.
  * A block is safe where that bound gives |div u| dt < 0.2, the mean velocity moves less than a
- * cell, 1/4 < J < 4, and no particle needed the split; or where the nodes of its tile move less
+ * cell, 1/4 < J < 4, and no particle needed substeps; or where the nodes of its tile move less
  * than a cell and sum_a max |u_a(next along a) - u_a| dt < 0.2 h, as slopes of quadratic splines
  * are means of such differences.
  *

@@ -289,19 +289,6 @@ static void describe(trial *s)
 
 /* --- modes and what is exact ------------------------------------------------------------------ */
 
-/* j_l(x)/x^l, j_l the spherical Bessel function. */
-static double bessel(int l, double x)
-{
-    double term = 1, sum = 0;
-    int k;
-    for (k = 1; k <= l; k++) term /= 2 * k + 1;
-    for (k = 1; k < 16; k++) {
-        sum += term;
-        term *= -x * x / (2.0 * k * (2 * (l + k) + 1));
-    }
-    return sum;
-}
-
 /* What the mode is at a particle, of three components; of temperature the first. */
 static void mode(const trial *s, const gs4_real *position, double u[3])
 {
@@ -316,8 +303,8 @@ static void mode(const trial *s, const gs4_real *position, double u[3])
     for (i = 0; i < 3; i++) x[i] -= 0.5 * n / SPHERE_CELLS;
     u[0] = 3 * x[1] * x[2];
     u[1] = -3 * x[0] * x[2];
-    u[0] *= bessel(2, SPHERE_K * sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]));
-    u[1] *= bessel(2, SPHERE_K * sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]));
+    u[0] *= scene_bessel(2, SPHERE_K * sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]));
+    u[1] *= scene_bessel(2, SPHERE_K * sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]));
 }
 
 /* a(T), a' = -F r a - b, tau b' = (1 - F) r a - b, a(0) = 1, b(0) = 0; tau 0: b = (1 - F) r a. */

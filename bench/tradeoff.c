@@ -188,14 +188,8 @@ static void drop_observe(const gs4_sim *sim, double time, double y[QUANTITIES])
 
 static void mode(const double x[3], double v[3])
 {
-    const double s = MODE_NUMBER * sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]);
-    double term = 1.0 / 15, f = 0;
-    int k;
-    for (k = 1; k < 16; k++) {
-        f += term;
-        term *= -s * s / (2.0 * k * (2 * k + 5));
-    }
-    f *= 15 * MODE_SPEED;
+    const double s = MODE_NUMBER * sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]),
+                 f = 15 * MODE_SPEED * scene_bessel(2, s);
     v[0] = 3 * f * x[1] * x[2];
     v[1] = -3 * f * x[0] * x[2];
     v[2] = 0;

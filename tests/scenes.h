@@ -56,4 +56,17 @@ static void scene_by_id(const gs4_sim *sim, gs4_field field, double *out)
             out[(size_t)id[i] * (size_t)v.components + (size_t)c] =
                 (double)v.data[(size_t)i * (size_t)v.stride + (size_t)c];
 }
+
+/* j_l(x)/x^l, j_l the spherical Bessel function; its derivative by x is -x times that of l + 1. */
+static double scene_bessel(int l, double x)
+{
+    double term = 1, sum = 0;
+    int k;
+    for (k = 1; k <= l; k++) term /= 2 * k + 1;
+    for (k = 1; k < 16; k++) {
+        sum += term;
+        term *= -x * x / (2.0 * k * (2 * (l + k) + 1));
+    }
+    return sum;
+}
 #endif

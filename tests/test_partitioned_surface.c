@@ -2,19 +2,6 @@
 
 /* --- natural modes of a free sphere ----------------------------------------------------------- */
 
-/* j_l(x)/x^l, j_l the spherical Bessel function; its derivative by x is -x times that of l + 1. */
-static double surface_bessel(int l, double x)
-{
-    double term = 1, sum = 0;
-    int k;
-    for (k = 1; k <= l; k++) term /= 2 * k + 1;
-    for (k = 1; k < 16; k++) {
-        sum += term;
-        term *= -x * x / (2.0 * k * (2 * (l + k) + 1));
-    }
-    return sum;
-}
-
 /* Modes of an incompressible sphere of radius 1 without traction, of degree 2 about the z axis.
  * P = z^2 - (x^2 + y^2)/2, f = j2(k r)/(k r)^2. Torsional: v = f r x grad P, where d(j2/r)/dr = 0.
  * Spheroidal: v = curl curl (r f P) + b grad P, whose second part has the pressure k^2 nu rho b P;
@@ -27,9 +14,8 @@ static void surface_mode(int spheroidal, const double x[3], double v[3])
     const double k = surface_wave_number[spheroidal], r2 = x[0] * x[0] + x[1] * x[1] + x[2] * x[2],
                  P = x[2] * x[2] - (x[0] * x[0] + x[1] * x[1]) / 2,
                  grad[3] = { -x[0], -x[1], 2 * x[2] };
-    const double f = surface_bessel(2, k * sqrt(r2)), df = -k * k * surface_bessel(3, k * sqrt(r2)),
-                 ddf =
-                     k * k * k * k * surface_bessel(4, k * sqrt(r2)); /* (d/dr)/r, once and twice */
+    const double f = scene_bessel(2, k * sqrt(r2)), df = -k * k * scene_bessel(3, k * sqrt(r2)),
+                 ddf = k * k * k * k * scene_bessel(4, k * sqrt(r2)); /* (d/dr)/r, once and twice */
     int i;
     for (i = 0; i < 3; i++) /* curl curl (r f P) = grad((3 f + r f') P) + k^2 f P r */
         v[i] = spheroidal

@@ -983,6 +983,9 @@ typedef struct gs4_sim_desc {
      * at 32 cells a wave instead of 1.1 %; the error of a drop that breathes halves. A step takes
      * 1.2 times as long, and there are 1.5 (sound) to 2.3 (viscosity) times as many. */
     int sharp_gradients;
+    /* 1: with explicit GS4, particles carry their velocity gradient as well as their velocity, and
+     * give momentum affinely, see AFFINE; the other schemes and symplectic Euler always do. */
+    int affine;
 } gs4_sim_desc;
 
 GS4_API int gs4_create(const gs4_sim_desc *desc, gs4_sim **sim);
@@ -5058,6 +5061,18 @@ typedef struct gs4i_stencils {
     /* number of its first node in the tile, or -1: outside of it */
     int32_t base[GS4I_BATCH];
 } gs4i_stencils;
+
+/* Weights of first moments for those of derivatives: 4/h^2 sum w u_i (x) (x_i - x) is grad u of
+ * fields that are linear, too; and of no field is the energy of velocity and moment together more
+ * than that of the nodes, as 1 and 2 (x_i - x)/h are orthonormal under w. */
+GS4I_INLINE void gs4i_moments(gs4i_stencils *s, gs4_real inv_h)
+{
+    int a, i, b;
+    for (a = 0; a < 3; a++)
+        for (i = 0; i < 3; i++)
+            GS4I_BATCH_LOOP(b)
+                s->d[a][i][b] = 4 * inv_h * s->w[a][i][b] * (GS4I_C(i - 1) - s->xi[a][b]);
+}
 
 /* From the domain to tile coordinates: (x - origin) / h - first; a particle there is in the cell
  * of node floor(x). */
@@ -9548,10 +9563,13 @@ typedef struct gs4i_particles {
      * gs4i_elastic; 6 for Euler; 0: the scene has none */
     gs4_real *elastic;
     int elastic_reals;
-    /* 24, see [[solid]]: F, row-major, M (1/s), spin (rad/s) and its rate; 9 for Euler; 0:
-     * none */
+    /* 24, see [[solid]]: F, row-major, M (1/s), spin (rad/s) and its rate; 18 with `gradient`; 9
+     * for Euler; 0: none */
     gs4_real *deformation;
     int deformation_reals;
+    /* 18, explicit GS4 with `affine`: C, row-major (1/s), and its rate; NULL: the scene has none */
+    gs4_real *gradient;
+    int with_gradient;
     /* 4: temperature, liquid fraction, rate of enthalpy over heat capacity, what rounding still
      * owes the temperature; 0: the scene has none */
     gs4_real *heat;
@@ -9573,8 +9591,9 @@ typedef struct gs4i_particles {
 
 /* Those of the state come first, then scratch. */
 enum {
-    GS4I_ARRAYS = 20,
-    GS4I_STATE_ARRAYS = 18
+    GS4I_ARRAYS = 21,
+    GS4I_STATE_ARRAYS = 19,
+    GS4I_GRADIENT_REALS = 18
 };
 typedef struct gs4i_array {
     void **data;
@@ -9619,10 +9638,12 @@ static void gs4i_particle_arrays(gs4i_particles *p, gs4i_array out[GS4I_ARRAYS])
         out[15 + i].data = (void **)&p->affine_before[i];
         out[15 + i].size = 4 * sizeof(gs4_real);
     }
-    out[18].data = (void **)&p->order;
-    out[18].size = sizeof(uint32_t);
-    out[19].data = (void **)&p->subgrid;
-    out[19].size = 4 * sizeof(gs4_real);
+    out[18].data = (void **)&p->gradient;
+    out[18].size = GS4I_GRADIENT_REALS * sizeof(gs4_real);
+    out[19].data = (void **)&p->order;
+    out[19].size = sizeof(uint32_t);
+    out[20].data = (void **)&p->subgrid;
+    out[20].size = 4 * sizeof(gs4_real);
     for (i = 0; i < GS4I_ARRAYS; i++)
         out[i].wanted = i < 3                ? p->with_affine
                         : i >= 15 && i <= 17 ? p->with_affine_before
@@ -9631,7 +9652,8 @@ static void gs4i_particle_arrays(gs4i_particles *p, gs4i_array out[GS4I_ARRAYS])
     out[14].wanted = p->deformation_reals > 0;
     out[10].wanted = out[13].wanted = p->with_heat;
     out[11].wanted = out[12].wanted = p->with_flux;
-    out[19].wanted = p->with_subgrid;
+    out[18].wanted = p->with_gradient;
+    out[20].wanted = p->with_subgrid;
 }
 
 static void gs4i_particles_free(gs4i_memory *m, gs4i_particles *p)
@@ -9719,7 +9741,9 @@ static void gs4i_permute_task(int index, void *context)
     if (!data) return;
     switch (a[index].size) {
     case 192: gs4i_permute_sized(data, 192, p->order, p->count); break;
+    case 144: gs4i_permute_sized(data, 144, p->order, p->count); break;
     case 96: gs4i_permute_sized(data, 96, p->order, p->count); break;
+    case 72: gs4i_permute_sized(data, 72, p->order, p->count); break;
     case 48: gs4i_permute_sized(data, 48, p->order, p->count); break;
     case 36: gs4i_permute_sized(data, 36, p->order, p->count); break;
     case 32: gs4i_permute_sized(data, 32, p->order, p->count); break;
@@ -9780,6 +9804,8 @@ GS4I_INLINE void gs4i_prefetch_particles(const gs4i_particles *p, size_t i)
         GS4I_PREFETCH(p->elastic + (size_t)p->elastic_reals * i + b);
     for (b = 0; b < p->deformation_reals * GS4I_BATCH; b += 16)
         GS4I_PREFETCH(p->deformation + (size_t)p->deformation_reals * i + b);
+    for (b = 0; b < GS4I_GRADIENT_REALS * GS4I_BATCH && p->with_gradient; b += 16)
+        GS4I_PREFETCH(p->gradient + GS4I_GRADIENT_REALS * i + b);
     for (b = 0; b < 4 * GS4I_BATCH && p->heat; b += 16) GS4I_PREFETCH(p->heat + 4 * i + b);
     for (b = 0; b < 4 * GS4I_BATCH && p->with_subgrid; b += 16)
         GS4I_PREFETCH(p->subgrid + 4 * i + b);
@@ -12266,16 +12292,18 @@ static void gs4i_correct_spin(const gs4i_solid_constants *l, gs4i_deformation *e
     }
 }
 
-/* F, M, w and dw/dt of n particles from memory, F alone where there are no rates. */
+/* F, M, w and dw/dt of n particles from memory; F alone where there are no rates, F and M where
+ * particles carry a velocity gradient. */
 static void gs4i_load_deformation(const gs4_real *from, int reals, int n, gs4i_deformation *e)
 {
     gs4i_lanes *l = (gs4i_lanes *)(void *)e; /* 24 in the order of its fields */
     if (reals == 24)
         gs4i_numbers_to_lanes(from, 24, n, l);
-    else {
+    else if (reals == 18)
+        gs4i_numbers_to_lanes(from, 18, n, l);
+    else
         gs4i_numbers_to_lanes(from, 9, n, l);
-        memset(l + 9, 0, 15 * sizeof *l);
-    }
+    if (reals < 24) memset(l + reals, 0, (size_t)(24 - reals) * sizeof *l);
 }
 
 static void gs4i_store_deformation(gs4_real *to, int reals, int n, gs4i_deformation *e)
@@ -12283,6 +12311,8 @@ static void gs4i_store_deformation(gs4_real *to, int reals, int n, gs4i_deformat
     gs4i_lanes *l = (gs4i_lanes *)(void *)e;
     if (reals == 24)
         gs4i_lanes_to_numbers(l, 24, n, to);
+    else if (reals == 18)
+        gs4i_lanes_to_numbers(l, 18, n, to);
     else
         gs4i_lanes_to_numbers(l, 9, n, to);
 }
@@ -12298,7 +12328,7 @@ static void gs4i_undeform(const gs4i_particles *p, size_t i, gs4_real J)
 static void gs4i_set_spin(const gs4i_particles *p, size_t i, gs4_vec3 w)
 {
     gs4_real *spin = p->deformation + (size_t)p->deformation_reals * i + 18;
-    if (!p->with_rates) return;
+    if (p->deformation_reals < 24) return;
     spin[0] = w.x;
     spin[1] = w.y;
     spin[2] = w.z;
@@ -16822,7 +16852,7 @@ static void gs4i_place_image_particles(int index, void *context)
                 g->carried[0][c] =
                     g->x[3] * (2 * g->v[c] - GS4I_NTH(q.v[c], b) - ahead * GS4I_NTH(q.a[c], b));
             g->carried[0][3] = g->x[3];
-            if (p->with_rates && p->deformation_reals)
+            if (p->deformation_reals == 24)
                 gs4i_reflect_spin(
                     g, p->deformation + (size_t)p->deformation_reals * (i + (size_t)b) + 18, ahead,
                     sim->grid.h);
@@ -17112,6 +17142,12 @@ static int gs4i_next_odd_images(const gs4i_image_particle *all, const int32_t *o
 }
 
 /* What the nodes have of a field at the images, velocity (what 0) or acceleration (1). */
+/* Do particles of GS4 carry more of their motion than a velocity: a spin, or all its gradient? */
+GS4I_INLINE int gs4i_turns(const gs4i_particles *p)
+{
+    return p->deformation_reals || p->with_gradient;
+}
+
 static void gs4i_gather_image_block(const gs4i_pass *pass, int index, int what)
 {
     gs4_sim *sim = pass->sim;
@@ -17120,6 +17156,7 @@ static void gs4i_gather_image_block(const gs4i_pass *pass, int index, int what)
     const int32_t *first = (const int32_t *)sim->image_particles.first.data,
                   *order = (const int32_t *)sim->image_particles.order.data;
     const gs4_real *field = what ? sim->grid.force : gs4i_gradient_velocity(&sim->grid);
+    const int turns = gs4i_turns(&sim->particles);
     gs4_real tile[GS4I_TILE_REALS];
     gs4i_surroundings t;
     int32_t next[GS4I_BATCH];
@@ -17131,17 +17168,17 @@ static void gs4i_gather_image_block(const gs4i_pass *pass, int index, int what)
         gs4i_stencils s;
         gs4i_gathered u;
         gs4i_load_image_particles(all, next, n, &t, g, &s);
+        if (what && sim->particles.with_gradient) gs4i_moments(&s, sim->grid.inv_h);
         for (b = 0; b < n; b++) {
             gs4i_row w, d;
             if (s.base[b] < 0) continue;
             gs4i_x_weights(&s, b, &w, &d);
             if (what)
-                gs4i_gather_rate(sim->particles.deformation_reals, tile + 4 * s.base[b], &s, b, &w,
-                                 &d, &u);
+                gs4i_gather_rate(turns, tile + 4 * s.base[b], &s, b, &w, &d, &u);
             else
                 gs4i_gather_local(tile + 4 * s.base[b], &s, b, &w, &d, &u);
             memcpy(g[b]->seen[what][0], u.value + 4 * b, 4 * sizeof *tile);
-            if (what && !sim->particles.deformation_reals) continue;
+            if (what && !turns) continue;
             memcpy(g[b]->seen[what][1], u.dx + 4 * b, 4 * sizeof *tile);
             memcpy(g[b]->seen[what][2], u.dy + 4 * b, 4 * sizeof *tile);
             memcpy(g[b]->seen[what][3], u.dz + 4 * b, 4 * sizeof *tile);
@@ -17575,9 +17612,9 @@ static int gs4i_set_velocities(gs4_sim *sim, gs4i_node_pass *nodes)
         return gs4i_fail_memory(&sim->error);
     gs4i_parallel_for(&sim->tasks, groups, gs4i_clear_jumps, nodes);
     if (sim->image_particles.count) gs4i_scatter(sim, gs4i_mark_lacking_images);
-    gs4i_scatter_image_particles(sim, sim->particles.with_rates && !sim->particles.deformation_reals
-                                          ? gs4i_scatter_image_momentum
-                                          : gs4i_scatter_image_affine);
+    gs4i_scatter_image_particles(sim, gs4i_turns(&sim->particles) || !sim->particles.with_rates
+                                          ? gs4i_scatter_image_affine
+                                          : gs4i_scatter_image_momentum);
     gs4i_fold_momentum(&sim->boundary, &sim->grid);
     gs4i_parallel_for(&sim->tasks, groups, gs4i_node_velocities, nodes);
     gs4i_fill_mirror_nodes(&sim->boundary, &sim->grid, sim->grid.momentum);
@@ -17656,6 +17693,28 @@ static int gs4i_spin_momentum(const gs4_sim *sim, size_t i, int n, const gs4i_st
     return 1;
 }
 
+/* With `affine` all particles have a C: m v~ + m C~ (x_i - x~). */
+static void gs4i_gradient_momentum(const gs4_sim *sim, size_t i, int n, const gs4i_stencils *s,
+                                   const gs4i_wide *mass, gs4i_lanes mv[3], gs4i_gradient Q)
+{
+    const gs4_real ahead = sim->integrator.prediction.ahead;
+    gs4i_gradient carried[2];
+    gs4i_lanes bound;
+    int a, b, c;
+    gs4i_numbers_to_lanes(sim->particles.gradient + GS4I_GRADIENT_REALS * i, GS4I_GRADIENT_REALS, n,
+                          carried[0][0]);
+    for (a = 0; a < 9; a++)
+        GS4I_BATCH_LOOP(b)
+            Q[a / 3][a % 3][b] = carried[0][a / 3][a % 3][b] + ahead * carried[1][a / 3][a % 3][b];
+    gs4i_affine_bound(Q, sim->integrator.dt, bound);
+    for (a = 0; a < 9; a++)
+        GS4I_BATCH_LOOP(b) Q[a / 3][a % 3][b] *= bound[b] * (sim->grid.h * mass[b]);
+    for (c = 0; c < 3; c++)
+        GS4I_BATCH_LOOP(b)
+            mv[c][b] -=
+                Q[c][0][b] * s->xi[0][b] + Q[c][1][b] * s->xi[1][b] + Q[c][2][b] * s->xi[2][b];
+}
+
 /* S3: m_i = sum w m, m_i v_i = sum w m v~ with v~ = v + alpha_f dt a. */
 static void gs4i_scatter_momentum(int index, void *context)
 {
@@ -17667,6 +17726,7 @@ static void gs4i_scatter_momentum(int index, void *context)
     const gs4i_frame frame = gs4i_tile_frame(&sim->grid, sim->grid.occupied_block[o]);
     const size_t next = (size_t)sim->grid.first[gs4i_next_block(pass, index)];
     gs4_real tile[GS4I_TILE_REALS];
+    gs4i_near_particles near = gs4i_near_particles_of(sim, o);
     int row, n, left_tile = 0;
     size_t i = (size_t)sim->grid.first[o], end = (size_t)sim->grid.first[o + 1];
     uint64_t rows = 0;
@@ -17676,7 +17736,7 @@ static void gs4i_scatter_momentum(int index, void *context)
         gs4i_batch q;
         gs4i_stencils s;
         gs4i_lanes mv[4];
-        gs4i_gradient spin;
+        gs4i_gradient Q;
         int b, c;
         gs4i_tile_prefetch(&sim->grid, o, row, sim->grid.momentum);
         gs4i_prefetch_along(&p, i, end, next);
@@ -17692,14 +17752,37 @@ static void gs4i_scatter_momentum(int index, void *context)
         gs4i_live_mass(&q, n, mv[3]);
         for (c = 0; c < 3; c++)
             GS4I_BATCH_LOOP(b) mv[c][b] = mv[3][b] * (q.v[c][b] + prediction.ahead * q.a[c][b]);
-        if (p.deformation_reals && gs4i_spin_momentum(sim, i, n, &s, mv[3], mv, spin))
-            gs4i_scatter_cell_affine(tile + 4 * s.base[0], &s, mv, spin);
+        if (p.with_gradient) {
+            gs4i_gradient_momentum(sim, i, n, &s, mv[3], mv, Q);
+            gs4i_scatter_cell_affine(tile + 4 * s.base[0], &s, mv, Q);
+            if (near.particle) {
+                gs4i_reflect_affine(&near, n, &s, mv, Q, sim->grid.h);
+                near.particle += n;
+            }
+        } else if (p.deformation_reals && gs4i_spin_momentum(sim, i, n, &s, mv[3], mv, Q))
+            gs4i_scatter_cell_affine(tile + 4 * s.base[0], &s, mv, Q);
         else
             gs4i_scatter_cell(tile + 4 * s.base[0], &s, mv);
     }
     sim->reports[o].left_tile = left_tile;
     sim->reports[o].rows = rows;
     gs4i_tile_add(&sim->grid, o, rows, tile, sim->grid.momentum);
+}
+
+/* C of a particle by the gradient that it gathered, or of a solid what turns of it. */
+static void gs4i_note_gradient(const gs4_sim *sim, size_t i, const gs4i_gathered *v, int b)
+{
+    const gs4i_particles *p = &sim->particles;
+    const gs4_real *const columns[3] = { v->dx + 4 * b, v->dy + 4 * b, v->dz + 4 * b };
+    gs4_real *C = p->gradient + GS4I_GRADIENT_REALS * i;
+    int c;
+    for (c = 0; c < 9 && p->with_gradient; c++) C[c] = columns[c % 3][c / 3];
+    if (p->deformation_reals == 24 && gs4i_constants_of(sim, i)->shear_modulus > 0)
+        gs4i_set_spin(
+            p, i,
+            gs4i_scale(gs4i_vec3(columns[1][2] - columns[2][1], columns[2][0] - columns[0][2],
+                                 columns[0][1] - columns[1][0]),
+                       GS4I_C(0.5)));
 }
 
 /* How particles turn, by the velocities of the nodes: see gs4i_find_spin. */
@@ -17722,14 +17805,9 @@ static void gs4i_find_spin_task(int index, void *context)
         gs4i_stage_batch(&p, i, n, sim->integrator.prediction, &frame, &q, &s);
         for (b = 0; b < n; b++) {
             gs4i_row w, d;
-            if (!(gs4i_constants_of(sim, i + (size_t)b)->shear_modulus > 0)) continue;
             gs4i_x_weights(&s, b, &w, &d);
             gs4i_gather_local(nodes + 4 * s.base[b], &s, b, &w, &d, &v);
-            gs4i_set_spin(
-                &p, i + (size_t)b,
-                gs4i_scale(gs4i_vec3(v.dy[4 * b + 2] - v.dz[4 * b + 1],
-                                     v.dz[4 * b] - v.dx[4 * b + 2], v.dx[4 * b + 1] - v.dy[4 * b]),
-                           GS4I_C(0.5)));
+            gs4i_note_gradient(sim, i + (size_t)b, &v, b);
         }
     }
 }
@@ -18294,31 +18372,73 @@ static int gs4i_may_be_safe(const gs4_sim *sim, int o)
 typedef struct gs4i_correction_tiles {
     gs4_real velocity[GS4I_TILE_REALS], acceleration[GS4I_TILE_REALS], jumps[GS4I_TILE_REALS];
     int with_jumps, edge, sticks; /* may contact be here, and with sticky bodies? */
+    gs4_real moments;             /* 1/h where particles carry a gradient, else 0 */
     uint64_t clear_nodes[GS4I_TILE];
     const uint64_t *clear; /* these, or NULL: see gs4i_correct_contact */
 } gs4i_correction_tiles;
 
-/* Gather for n particles. A batch with solids wants the gradients of all. */
-GS4I_INLINE void gs4i_gather_corrections(const gs4i_correction_tiles *t, const gs4i_stencils *s,
-                                         int n, int solids, const gs4i_near_particles *near,
+/* Gather for n particles. A batch that turns wants the gradients of all: solids, or moments. */
+GS4I_INLINE void gs4i_gather_corrections(const gs4i_correction_tiles *t, gs4i_stencils s, int n,
+                                         int turns, const gs4i_near_particles *near,
                                          gs4i_corrections *k)
 {
-    const int at = 4 * s->base[0];
+    const int at = 4 * s.base[0];
     gs4i_local u, acc, jump;
-    gs4i_gather_cell(t->velocity + at, s, 1, &u);
-    gs4i_gather_cell_rate(solids, t->acceleration + at, s, &acc);
-    if (t->with_jumps) gs4i_gather_cell_rate(solids, t->jumps + at, s, &jump);
-    if (near->particle) gs4i_make_odd(near, n, solids, &u, &acc);
+    gs4i_gather_cell(t->velocity + at, &s, 1, &u);
+    if (t->moments > 0) gs4i_moments(&s, t->moments);
+    gs4i_gather_cell_rate(turns, t->acceleration + at, &s, &acc);
+    if (t->with_jumps) gs4i_gather_cell_rate(turns, t->jumps + at, &s, &jump);
+    if (near->particle) gs4i_make_odd(near, n, turns, &u, &acc);
     memcpy(k->U, u.value, sizeof k->U);
     memcpy(k->L, u.L, sizeof k->L);
     memcpy(k->A, acc.value, sizeof k->A);
     if (t->with_jumps) memcpy(k->jump, jump.value, sizeof k->jump);
-    if (!solids) return;
+    if (!turns) return;
     memcpy(k->rates.acc, acc.L, sizeof k->rates.acc);
     if (t->with_jumps)
         memcpy(k->rates.jump, jump.L, sizeof k->rates.jump);
     else
         memset(k->rates.jump, 0, sizeof k->rates.jump);
+}
+
+/* S7 of the velocity gradient C of n particles, none of those `held`, a bit each: its rate is grad
+ * acc - L L, and what the grid does not see of it decays as the sub-grid velocity does, near walls
+ * and in spray too, implicit in itself. Contact changes it at once. */
+static void gs4i_correct_gradient(const gs4i_particles *p, size_t i, int n, unsigned held,
+                                  const gs4i_integrator *r, gs4i_corrections *k)
+{
+    gs4_real *at = p->gradient + GS4I_GRADIENT_REALS * i;
+    gs4i_gradient carried[2];
+    gs4i_lanes decay, damped;
+    int b, c, d;
+    gs4i_numbers_to_lanes(at, GS4I_GRADIENT_REALS, n, carried[0][0]);
+    GS4I_BATCH_LOOP(b) {
+        const gs4i_wide filled = k->U[3][b] * r->inv_node_mass;
+        gs4i_wide weight;
+        gs4i_decay_weight(&filled, &weight);
+        decay[b] = k->rates.decay[b] + (weight + k->jump[3][b]) * r->fast_decay;
+        damped[b] = GS4I_C(1) / (GS4I_C(1) + r->s * decay[b]);
+    }
+    for (c = 0; c < 3; c++)
+        for (d = 0; d < 3; d++)
+            GS4I_BATCH_LOOP(b) {
+                const gs4i_wide C = carried[0][c][d][b], rate = carried[1][c][d][b],
+                                seen = k->L[c][d][b];
+                const gs4i_wide LL = k->L[c][0][b] * k->L[0][d][b] + k->L[c][1][b] * k->L[1][d][b]
+                                     + k->L[c][2][b] * k->L[2][d][b];
+                const gs4i_wide stage =
+                    (k->rates.acc[c][d][b] - LL + decay[b] * (seen - (C + r->before * rate)))
+                    * damped[b];
+                const gs4i_wide change = (stage - rate) * r->inv_alpha_m;
+                carried[0][c][d][b] =
+                    ((C + r->dt * rate) + r->gamma * r->dt * change) + k->rates.jump[c][d][b]
+                    - r->decayed_at_once * (C + r->before * rate + r->s * stage - seen);
+                carried[1][c][d][b] = rate + change;
+            }
+    gs4i_lanes_to_numbers(carried[0][0], GS4I_GRADIENT_REALS, n, at);
+    for (b = 0; b < n && held; b++)
+        if (held >> b & 1)
+            memset(at + GS4I_GRADIENT_REALS * (size_t)b, 0, GS4I_GRADIENT_REALS * sizeof *at);
 }
 
 /* Keys of n particles for gs4i_order_by_cell: where they are at the stage of the next step if that
@@ -18339,7 +18459,7 @@ GS4I_INLINE void gs4i_note_cells(const gs4i_particles *p, size_t i, int n, const
 }
 
 /* What S7 needs for the decay of what the grid does not see. */
-GS4I_INLINE void gs4i_prepare_decay(gs4i_response *r, size_t i, int n, int solids, int sticks,
+GS4I_INLINE void gs4i_prepare_decay(gs4i_response *r, size_t i, int n, int turns, int sticks,
                                     gs4i_corrections *k)
 {
     const gs4i_integrator *integrator = r->integrator;
@@ -18348,7 +18468,7 @@ GS4I_INLINE void gs4i_prepare_decay(gs4i_response *r, size_t i, int n, int solid
         gs4i_to_lanes(r->p->subgrid + 4 * i, n, k->subgrid);
         if (sticks) gs4i_limit_jumps(k);
     }
-    if (solids)
+    if (turns)
         GS4I_BATCH_LOOP(b) k->rates.decay[b] = integrator->decay + k->subgrid[3][b];
     if (!(integrator->volume_crossing > 0)) return;
     gs4i_turn_to_batch(r, i, n);
@@ -18370,6 +18490,7 @@ GS4I_INLINE void gs4i_load_corrections(const gs4_sim *sim, int o, gs4i_correctio
     tiles->with_jumps = gs4i_load_jumps(g, o, rows, tiles->jumps);
     tiles->edge = tiles->with_jumps || gs4i_at_edge(g, o);
     tiles->sticks = tiles->with_jumps && gs4i_sticks_near(sim, o);
+    tiles->moments = sim->particles.with_gradient ? g->inv_h : GS4I_C(0);
     tiles->clear = tiles->edge ? gs4i_find_clear_nodes(sim, o, tiles->clear_nodes) : NULL;
     gs4i_tile_load(g, o, rows, gs4i_gradient_velocity(g), tiles->velocity);
     gs4i_tile_load(g, o, rows, gs4i_acceleration(g), tiles->acceleration);
@@ -18405,28 +18526,31 @@ static void gs4i_correct(int index, void *context)
         gs4i_batch q;
         gs4i_stencils s;
         gs4i_stored out;
-        int solids = 0;
+        unsigned held = 0;
+        int turns = p.with_gradient;
         n = gs4i_cell_batch_size(&p, i);
         gs4i_prefetch_along(&p, i, end, (size_t)g->first[next]);
         gs4i_tile_prefetch(g, next, row, gs4i_gradient_velocity(g));
         gs4i_tile_prefetch(g, next, row, gs4i_acceleration(g));
         if (GS4I_WITH_SOLIDS && p.deformation_reals) {
             gs4i_turn_to_batch(&r, i, n);
-            solids = gs4i_load_solid_constants(&r.constants, &r.solid);
+            turns |= gs4i_load_solid_constants(&r.constants, &r.solid);
         }
         gs4i_stage_batch(&p, i, n, integrator.prediction, &frame, &q, &s);
-        gs4i_gather_corrections(&tiles, &s, n, solids, &near, &k);
+        gs4i_gather_corrections(&tiles, s, n, turns, &near, &k);
         if (near.particle) near.particle += n;
-        gs4i_prepare_decay(&r, i, n, solids, tiles.sticks, &k);
+        gs4i_prepare_decay(&r, i, n, turns, tiles.sticks, &k);
         gs4i_correct_batch(integrator, &k, &q);
-        gs4i_advance_response(&r, i, n, k.L, &k.rates, q.v[3], pass->commit);
+        gs4i_advance_response(&r, i, n, k.L, p.with_gradient ? NULL : &k.rates, q.v[3],
+                              pass->commit);
         if (!pass->commit) {
             gs4i_validate_batch(&q, k.L, p.position + 4 * i, n, g->h, p.id + i, report);
             continue;
         }
         if (heat) gs4i_gather_heat(&r, &s, k.L, heat);
         gs4i_pack_batch(&q, 1, &out);
-        if (tiles.edge) gs4i_correct_contact(sim, o, tiles.clear, i, n, &out, report);
+        if (tiles.edge) held = gs4i_correct_contact(sim, o, tiles.clear, i, n, &out, report);
+        if (p.with_gradient) gs4i_correct_gradient(&p, i, n, held, &integrator, &k);
         gs4i_see_motion(&r.seen, q.v, k.L);
         gs4i_store_batch(&p, i, n, &out);
         gs4i_note_cells(&p, i, n, &frame, &integrator, &q);
@@ -18459,6 +18583,8 @@ static int gs4i_accelerate_explicitly(gs4_sim *sim, gs4i_node_pass *nodes)
 #define GS4I_VISCOUS_EIGENVALUE 2.5
 /* so many times as large with deconvolved gradients; measured there too */
 #define GS4I_DECONVOLVED_EIGENVALUES 2.3
+/* the same with `affine`, of sound alone, for members (r, s) */
+#define GS4I_AFFINE_EIGENVALUES(r, s) (1.3 + 2.7 * (r) * (1 - (s)))
 
 /* (w dt)^2 + d dt (3 + r + s - r s)/2 <= 2 (1 - r s), r and s the two rho, w the frequency of the
  * fastest wave that the grid holds and d its fastest viscous rate. */
@@ -18469,7 +18595,8 @@ static double gs4i_stable_explicit_dt(const gs4_sim *sim, const gs4i_waves *of)
     const double sharper =
         sim->desc.sharp_gradients ? (double)GS4I_C(GS4I_DECONVOLVED_EIGENVALUES) : 1;
     const double a = 2 * (1 - r * s), b = (3 + r + s - r * s) / 2;
-    const double w = sqrt(sharper * GS4I_SOUND_EIGENVALUE) * of->c / h;
+    const double affine = sim->desc.affine ? GS4I_AFFINE_EIGENVALUES(r, s) : 1;
+    const double w = sqrt(affine * sharper * GS4I_SOUND_EIGENVALUE) * of->c / h;
     const double d = sharper * b * GS4I_VISCOUS_EIGENVALUE * of->nu / (h * h);
     return d + w > 0 ? 2 * a / (d + sqrt(d * d + 4 * w * w * a)) : (double)GS4I_HUGE;
 }
@@ -24119,7 +24246,7 @@ static int gs4i_make_heat(gs4_sim *sim, const gs4_material *material)
 static int gs4i_make_deformation(gs4_sim *sim)
 {
     gs4i_particles *p = &sim->particles;
-    const int reals = p->with_rates ? 24 : 9;
+    const int reals = p->with_gradient ? 18 : p->with_rates ? 24 : 9;
     int i;
     if (p->deformation_reals) return GS4_OK;
     if (p->capacity
@@ -24261,6 +24388,8 @@ static int gs4i_add_particle(gs4_sim *sim, gs4_vec3 x, gs4_vec3 v, gs4_real mass
     if (p->elastic_reals)
         memset(p->elastic + (size_t)p->elastic_reals * i, 0, (size_t)p->elastic_reals * real);
     if (p->deformation_reals) gs4i_undeform(p, i, 1);
+    if (p->with_gradient)
+        memset(p->gradient + GS4I_GRADIENT_REALS * i, 0, GS4I_GRADIENT_REALS * real);
     if (GS4I_WITH_HEAT && p->with_heat)
         gs4i_begin_heat(p, i, &sim->constants[f->material], f->temperature);
     p->id[i] = sim->next_id++;
@@ -24287,6 +24416,8 @@ static void gs4i_fill_one(gs4_sim *sim, const gs4_real at[3], gs4_vec3 centre, c
         memcpy(sim->particles.affine[k] + 4 * i, C[k], sizeof C[k]);
     for (k = 0; k < 3 && sim->particles.affine_before[k] && !is_found; k++)
         memcpy(sim->particles.affine_before[k] + 4 * i, C[k], sizeof C[k]);
+    for (k = 0; k < 9 && sim->particles.with_gradient && !sim->needs_spin; k++)
+        sim->particles.gradient[GS4I_GRADIENT_REALS * i + (size_t)k] = C[k % 3][k / 3];
     if (sim->particles.deformation_reals && !sim->needs_spin)
         gs4i_set_spin(&sim->particles, i,
                       gs4i_constants_of(sim, i)->shear_modulus > 0 ? w : gs4i_vec3(0, 0, 0));
@@ -24391,9 +24522,11 @@ static void gs4i_restart(gs4_sim *sim)
         for (i = 0; i < n && p->elastic_reals; i++)
             memset(p->elastic + (size_t)p->elastic_reals * i + 6, 0,
                    (size_t)(p->elastic_reals - 6) * sizeof *p->elastic);
-        for (i = 0; i < n && p->deformation_reals; i++)
+        for (i = 0; i < n && p->deformation_reals == 24; i++)
             memset(p->deformation + (size_t)p->deformation_reals * i + 21, 0,
                    3 * sizeof *p->deformation);
+        for (i = 0; i < n && p->with_gradient; i++)
+            memset(p->gradient + GS4I_GRADIENT_REALS * i + 9, 0, 9 * sizeof *p->gradient);
     }
     sim->restart = GS4I_RESTART;
     sim->needs_sort = sim->limits_stale = 1;
@@ -25856,8 +25989,8 @@ static void gs4i_finish(gs4_sim *sim)
                   "counted as outside there");
 }
 
-/* How solids turn whose velocities were set by hand: by the grid, which sees less of it at their
- * surface than there is, hence again with what it saw (kinetic energy that a stiff cube keeps in
+/* How solids turn, or with `affine` how all moves, whose velocities were set by hand: by the grid,
+ * which sees less of it at a surface than there is, hence again with what it saw (kinetic energy that a stiff cube keeps in
  * a quarter of a turn: 0.996 after three times, 0.9999 after ten). A step that is refused
  * forgets it again. */
 static void gs4i_forget_spin(gs4_sim *sim)
@@ -25872,6 +26005,8 @@ static void gs4i_forget_spin(gs4_sim *sim)
         }
     for (i = 0; i < (size_t)p->count && p->deformation_reals; i++)
         gs4i_set_spin(&sim->particles, i, gs4i_vec3(0, 0, 0));
+    for (i = 0; i < (size_t)p->count && p->with_gradient; i++)
+        memset(p->gradient + GS4I_GRADIENT_REALS * i, 0, 9 * sizeof *p->gradient);
 }
 
 static int gs4i_find_spin(gs4_sim *sim, gs4i_node_pass *nodes)
@@ -25879,7 +26014,7 @@ static int gs4i_find_spin(gs4_sim *sim, gs4i_node_pass *nodes)
     const gs4_real ahead = sim->integrator.prediction.ahead;
     int pass, result = GS4_OK;
     sim->integrator.prediction.ahead = 0; /* as it is now, whatever dt is */
-    for (pass = 0; pass < 10 && result == GS4_OK; pass++) {
+    for (pass = 0; pass < (sim->particles.with_gradient ? 16 : 10) && result == GS4_OK; pass++) {
         result = gs4i_scatter_momenta(sim, nodes);
         if (result == GS4_OK) gs4i_gather(sim, gs4i_find_spin_task, 1);
     }
@@ -25930,8 +26065,8 @@ static int gs4i_scatter_state(gs4_sim *sim, gs4i_node_pass *nodes)
     if (sim->needs_sort) GS4I_TRY(gs4i_bin(sim));
     if (sim->needs_spin && sim->particles.with_rates)
         GS4I_TRY(GS4I_WITH_IMPLICIT && sim->particles.with_affine ? gs4i_find_affine(sim, nodes)
-                 : GS4I_WITH_SOLIDS && sim->particles.deformation_reals ? gs4i_find_spin(sim, nodes)
-                                                                        : GS4_OK);
+                 : gs4i_turns(&sim->particles)                    ? gs4i_find_spin(sim, nodes)
+                                                                  : GS4_OK);
     return gs4i_scatter_momenta(sim, nodes);
 }
 
@@ -26361,7 +26496,7 @@ typedef struct gs4i_head {
     uint32_t version, real_size, byte_order, head_size, material_size, collider_size, emitter_size;
     int32_t cells[3], scheme, integrator, walls[6];
     double cell_size, origin[3], gravity[3], rho[2], decay, heat[7];
-    int32_t isothermal[7], deconvolved; /* walls, air */
+    int32_t isothermal[7], deconvolved, affine; /* walls, air */
     double time, last_dt;
     uint64_t steps;
     uint32_t next_id;
@@ -26391,6 +26526,7 @@ static GS4I_COLD void gs4i_head_of(const gs4_sim *sim, gs4i_head *h)
     h->scheme = (int32_t)d->scheme;
     h->integrator = (int32_t)d->integrator;
     h->deconvolved = d->sharp_gradients != 0;
+    h->affine = d->affine != 0;
     h->cell_size = (double)d->cell_size;
     h->origin[0] = (double)d->origin.x;
     h->origin[1] = (double)d->origin.y;
@@ -26489,7 +26625,7 @@ static int gs4i_check_head(gs4_sim *sim, const gs4i_head *h)
                          "or platform)");
     if (memcmp(h->cells, own.cells, sizeof h->cells) || memcmp(h->walls, own.walls, sizeof h->walls)
         || h->scheme != own.scheme || h->integrator != own.integrator
-        || h->deconvolved != own.deconvolved
+        || h->deconvolved != own.deconvolved || h->affine != own.affine
         || memcmp(&h->cell_size, &own.cell_size, sizeof h->cell_size)
         || memcmp(h->origin, own.origin, sizeof h->origin)
         || memcmp(h->gravity, own.gravity, sizeof h->gravity)
@@ -26732,6 +26868,8 @@ static int gs4i_particle_is_sound(const gs4_sim *sim, const gs4i_head *h, size_t
                  && gs4i_are_sane(p->deformation + (size_t)p->deformation_reals * i, 9)
                  && gs4i_are_rates(p->deformation + (size_t)p->deformation_reals * i,
                                    p->deformation_reals);
+    if (p->with_gradient)
+        sound &= gs4i_are_rates(p->gradient + GS4I_GRADIENT_REALS * i, GS4I_GRADIENT_REALS);
     if (p->with_heat)
         sound &= gs4i_are_sane(p->heat + 4 * i, 1) && gs4i_are_rates(p->heat + 4 * i, 4)
                  && p->heat[4 * i + 1] >= 0 && p->heat[4 * i + 1] <= 1 && p->liquid[i] <= 1;
@@ -26829,6 +26967,7 @@ static void gs4i_copy_without_state(const gs4_sim *sim, const gs4i_head *h, gs4_
     next->particles.with_subgrid = p->with_subgrid;
     next->particles.with_affine = p->with_affine;
     next->particles.with_affine_before = p->with_affine_before;
+    next->particles.with_gradient = p->with_gradient;
     next->particles.elastic_reals = h->elastic_reals;
     next->particles.deformation_reals = h->deformation_reals;
     next->particles.with_heat = p->with_heat;
@@ -28481,6 +28620,7 @@ static int gs4i_check_euler(gs4i_error *e, const gs4_sim_desc *d)
     GS4I_TRY(gs4i_require(e, !d->sharp_gradients,
                           "sharp_gradients: symplectic Euler has no use for them, its error is of "
                           "first order; leave it 0"));
+    GS4I_TRY(gs4i_require(e, !d->affine, "affine: symplectic Euler always is, leave it 0"));
     return gs4i_check_absent(e, "flip_decay_time", d->flip_decay_time,
                              "symplectic Euler carries an affine velocity that the grid sees whole "
                              "(APIC), leave it 0");
@@ -28494,6 +28634,7 @@ static int gs4i_check_partitioned(gs4i_error *e, const gs4_sim_desc *d)
                           "GS4_INTEGRATOR_GS4 or GS4_INTEGRATOR_BACKWARD_EULER"));
     GS4I_TRY(gs4i_require(e, !d->sharp_gradients,
                           "sharp_gradients: the implicit schemes have none, leave it 0"));
+    GS4I_TRY(gs4i_require(e, !d->affine, "affine: the implicit schemes always are, leave it 0"));
     if (d->integrator == GS4_INTEGRATOR_BACKWARD_EULER)
         GS4I_TRY(gs4i_check_absent(e, "rho_inf", d->rho_inf,
                                    "backward Euler has no such parameter, leave it 0"));
@@ -28522,6 +28663,11 @@ static int gs4i_check_numerics(gs4i_error *e, const gs4_sim_desc *d)
                           "rho_inf_spurious: with both rho near 1 (Crank-Nicolson) the explicit "
                           "scheme has no stable step; rho_inf * rho_inf_spurious must not be above "
                           "0.98"));
+    GS4I_TRY(gs4i_require_between(e, 0, 1, "affine is ", d->affine, "; it must be 0 or 1"));
+    GS4I_TRY(
+        gs4i_require(e, !d->affine || !d->sharp_gradients,
+                     "affine: what sharp_gradients take out is not what affine transfers leave; "
+                     "use one of them"));
     if (d->scheme != GS4_EXPLICIT) GS4I_TRY(gs4i_check_partitioned(e, d));
     if (d->integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER) GS4I_TRY(gs4i_check_euler(e, d));
     /* infinity is welcome */
@@ -29010,6 +29156,7 @@ static int gs4i_init(gs4_sim *sim)
     memcpy(sim->boundary.walls, d->walls, sizeof d->walls);
     sim->particles.with_rates = d->integrator != GS4_INTEGRATOR_SYMPLECTIC_EULER;
     sim->particles.with_affine = !sim->particles.with_rates || d->scheme != GS4_EXPLICIT;
+    sim->particles.with_gradient = d->affine != 0;
     sim->particles.with_affine_before =
         d->scheme != GS4_EXPLICIT && d->integrator == GS4_INTEGRATOR_GS4;
     sim->particles.with_subgrid =
@@ -30082,6 +30229,9 @@ GS4_API uint64_t gs4_state_hash(const gs4_sim *sim)
         if (p->deformation_reals)
             h = gs4i_hash_bytes(h, p->deformation + (size_t)p->deformation_reals * i,
                                 (size_t)p->deformation_reals * sizeof(gs4_real));
+        if (p->with_gradient)
+            h = gs4i_hash_bytes(h, p->gradient + GS4I_GRADIENT_REALS * i,
+                                GS4I_GRADIENT_REALS * sizeof(gs4_real));
         if (p->with_heat)
             h = gs4i_hash_bytes(h ^ p->liquid[i], p->heat + 4 * i, 4 * sizeof(gs4_real));
         if (p->with_flux) {
@@ -30612,7 +30762,8 @@ static gs4_sim_desc gs4i_desc_with(const gs4_sim *of, gs4_scheme scheme, gs4_int
     d.integrator = integrator;
     if (integrator != GS4_INTEGRATOR_GS4) d.rho_inf = d.rho_inf_spurious = 0;
     if (integrator == GS4_INTEGRATOR_SYMPLECTIC_EULER) d.flip_decay_time = 0;
-    if (scheme != GS4_EXPLICIT || integrator != GS4_INTEGRATOR_GS4) d.sharp_gradients = 0;
+    if (scheme != GS4_EXPLICIT || integrator != GS4_INTEGRATOR_GS4)
+        d.sharp_gradients = d.affine = 0;
     d.log = NULL;
     d.max_particles = 0;
     return d;

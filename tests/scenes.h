@@ -11,7 +11,8 @@ static gs4_vec3 at(double x, double y, double z)
     return v;
 }
 
-static int scene_sharp; /* the next cubes have sharpened gradients */
+static int scene_sharp;  /* the next cubes have sharpened gradients */
+static int scene_affine; /* particles in the next cubes carry their velocity gradient */
 
 /* A cube of n^3 cells, side 1, all walls slip, no gravity. */
 static gs4_sim_desc scene_cube(int n)
@@ -22,6 +23,7 @@ static gs4_sim_desc scene_cube(int n)
     d.cells[0] = d.cells[1] = d.cells[2] = n;
     d.cell_size = (gs4_real)(1.0 / n);
     d.sharp_gradients = scene_sharp;
+    d.affine = scene_affine;
     for (w = 0; w < 6; w++) d.walls[w] = GS4_WALL_SLIP;
     return d;
 }

@@ -32,7 +32,7 @@ static double density_energy(gs4_sim *sim, const double c[2])
     const gs4_view J = gs4_particles(sim, GS4_FIELD_VOLUME_RATIO),
                    m = gs4_particles(sim, GS4_FIELD_MASS);
     const uint8_t *material = gs4_particle_materials(sim);
-    double sum = gs4_get_stats(sim).kinetic_energy;
+    double sum = gs4_get_stats(sim).kinetic_energy + stability_gradient_energy(sim);
     int i;
     for (i = 0; i < J.count; i++) {
         const double j = (double)J.data[(size_t)i * (size_t)J.stride], own = c[material[i]];
@@ -79,6 +79,7 @@ static double density_growth(double ratio, double share, int wide, double rho, i
         free(x[k]);
     }
     stability_stir(sim, 0.01, 1);
+    stability_settle(sim);
     start = density_energy(sim, c);
     for (i = 0; i < 300 && most < 100; i++) {
         CHECK_RESULT(sim, gs4_step(sim, (gs4_real)(0.95 * (double)gs4_stable_dt(sim))), GS4_OK);

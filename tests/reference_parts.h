@@ -12,7 +12,7 @@ typedef struct ref_particle {
     double s[3][3], ds[3][3];          /* Oldroyd-B: non-local stress and its rate */
     double sub_grid[3], noise;         /* V - v~ of this step; how much faster it decays, 1/s */
     double fades;                      /* of dJ/dt the decay, in the last step */
-    double C[3][3];                    /* symplectic Euler: velocity gradient */
+    double C[3][3], dC[3][3];          /* symplectic Euler, affine GS4: velocity gradient; rate */
 } ref_particle;
 
 typedef struct ref_node {
@@ -455,6 +455,26 @@ static void ref_correct_stress(const ref_sim *s, ref_particle *p, double L[3][3]
 
 /* S7 for solids: dw/dt = curl(A - L L)/2 - k (w - curl u/2), the last implicit in w; k that
  * of the sub-grid velocity. */
+/* The same of the whole velocity gradient C, where the grid sees little at once `near` faster; and
+ * accelerations by their first moments, 4/h^2 sum w acc_i (x) (x_i - x). */
+static void ref_correct_affine(const ref_sim *s, ref_particle *p, const ref_stencil *t, double near,
+                               double L[3][3])
+{
+    double at_once;
+    const double k = ref_decay(s, &at_once) + p->noise + near;
+    int i, c, a;
+    for (c = 0; c < 3; c++)
+        for (a = 0; a < 3; a++) {
+            const double before = p->C[c][a] + s->before * p->dC[c][a];
+            double R = -ref_product(L, L, c, a) - k * (before - L[c][a]);
+            for (i = 0; i < 27; i++)
+                R += 4 / (s->h * s->h) * t->w[i] * t->node[i]->f[c] * t->r[i][a];
+            R /= 1 + s->s * k;
+            ref_correct(s, R, &p->C[c][a], &p->dC[c][a]);
+            p->C[c][a] -= at_once * (before + s->s * R - L[c][a]);
+        }
+}
+
 static void ref_correct_spin(const ref_sim *s, ref_particle *p, double grad_acc[3][3],
                              double L[3][3])
 {
@@ -495,6 +515,7 @@ static void ref_restart(ref_sim *s)
         memset(p->lag, 0, sizeof p->lag);
         memset(p->M, 0, sizeof p->M);
         memset(p->dw, 0, sizeof p->dw);
+        memset(p->dC, 0, sizeof p->dC);
         memset(p->ds, 0, sizeof p->ds);
     }
 }

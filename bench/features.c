@@ -16,6 +16,7 @@ typedef enum feature {
     BULK_MODULUS,
     FLIP,
     SHARP,
+    AFFINE,
     EULER,
     OLDROYD,
     SOLID,
@@ -36,6 +37,7 @@ static const char *const names[FEATURES] = { "Newtonian, explicit, GS4",
                                              "bulk modulus given",
                                              "flip_decay_time INFINITY",
                                              "sharp gradients",
+                                             "affine",
                                              "symplectic Euler",
                                              "stress: Oldroyd-B",
                                              "solid: neo-Hookean",
@@ -57,6 +59,7 @@ static gs4_sim_desc describe(feature what, int cells)
     d.gravity = at(0, -9.81, 0);
     if (what == FLIP) d.flip_decay_time = (gs4_real)INFINITY;
     if (what == SHARP) d.sharp_gradients = 1;
+    if (what == AFFINE) d.affine = 1;
     if (what == EULER) d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER;
     if (what >= PROJECTION) d.scheme = what >= SPLIT ? GS4_SEMI_IMPLICIT : GS4_PARTITIONED;
     if (what == PROJECTION_EULER) d.integrator = GS4_INTEGRATOR_BACKWARD_EULER;

@@ -229,6 +229,7 @@ static gs4_sim *create(gs4_integrator integrator, const options *o, unsigned *ca
         d.rho_inf = (gs4_real)0.8;
         d.rho_inf_spurious = (gs4_real)0.2;
         d.sharp_gradients = o->elastic;
+        d.affine = o->heat;
     }
     d.threads = o->threads;
     if (o->shuffle) {

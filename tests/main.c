@@ -42,6 +42,7 @@
 #include "test_semi_extremes.c"
 #include "test_film.c"
 #include "test_mesh.c"
+#include "test_affine.c"
 #include "test_estimate.c"
 #include "test_reference.c"
 
@@ -145,6 +146,7 @@ int main(int count, char **values)
     run_semi_extremes();
     run_film();
     run_mesh();
+    run_affine();
     run_estimate();
     RUN_ONCE(test_reference);
     RUN_FULL(test_stability);

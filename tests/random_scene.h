@@ -210,6 +210,7 @@ static void make_desc(scene *s, gs4_sim_desc *d, int threads)
     if (a == 0) d->flip_decay_time = (gs4_real)INFINITY;
     if (a == 1) d->flip_decay_time = number(1, 100, 1000);
     d->sharp_gradients = one_in(4);
+    d->affine = !d->sharp_gradients && one_in(3);
 }
 
 static void make_liquid(gs4_material *m, int with_heat)
@@ -313,7 +314,7 @@ static void make_partitioned(gs4_sim_desc *d)
     d->scheme = GS4_PARTITIONED;
     d->integrator = one_in(3) ? GS4_INTEGRATOR_BACKWARD_EULER : GS4_INTEGRATOR_GS4;
     if (d->integrator != GS4_INTEGRATOR_GS4) d->rho_inf = d->rho_inf_spurious = 0;
-    d->sharp_gradients = 0;
+    d->sharp_gradients = d->affine = 0;
 }
 
 static void make_incompressible(gs4_material *m)

@@ -271,7 +271,8 @@ static void test_errors_desc(void)
         ERR_FIELD(gs4_sim_desc, solver_max_iterations, "solver_max_iterations", ERR_INT),
         ERR_FIELD(gs4_sim_desc, max_particles, "max_particles", ERR_INT),
         ERR_FIELD(gs4_sim_desc, threads, "threads", ERR_INT),
-        ERR_FIELD(gs4_sim_desc, sharp_gradients, "sharp_gradients", ERR_INT)
+        ERR_FIELD(gs4_sim_desc, sharp_gradients, "sharp_gradients", ERR_INT),
+        ERR_FIELD(gs4_sim_desc, affine, "affine", ERR_INT)
     };
     static const err_field integrator[] = { ERR_FIELD(gs4_sim_desc, integrator, "integrator",
                                                       ERR_INT) };
@@ -738,7 +739,15 @@ static void test_errors_half_hooks(void)
     d = err_desc();
     d.rho_inf = 0;
     d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER;
+    d.affine = 1;
+    CHECK(gs4_create(&d, &sim) == GS4_ERROR_ARGUMENT && strstr(gs4_last_error(NULL), "affine"));
+    d.integrator = GS4_INTEGRATOR_GS4;
     d.sharp_gradients = 1;
+    CHECK(gs4_create(&d, &sim) == GS4_ERROR_ARGUMENT && strstr(gs4_last_error(NULL), "affine"));
+    d.affine = 2;
+    CHECK(gs4_create(&d, &sim) == GS4_ERROR_ARGUMENT && strstr(gs4_last_error(NULL), "affine is 2"));
+    d.affine = 0;
+    d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER;
     CHECK(gs4_create(&d, &sim) == GS4_ERROR_ARGUMENT
           && strstr(gs4_last_error(NULL), "sharp_gradients"));
     d.integrator = GS4_INTEGRATOR_GS4;

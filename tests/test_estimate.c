@@ -276,6 +276,7 @@ static const estimate_feature estimate_features[] = {
     { "flux", { GS4_EXPLICIT, GS4_INTEGRATOR_GS4 }, 12, 1 },
     { "sharp", { GS4_EXPLICIT, GS4_INTEGRATOR_GS4 }, 0, 0 },
     { "flip", { GS4_EXPLICIT, GS4_INTEGRATOR_GS4 }, -4, 0 },
+    { "affine", { GS4_EXPLICIT, GS4_INTEGRATOR_GS4 }, 18, 0 },
     { "projection", { GS4_PARTITIONED, GS4_INTEGRATOR_GS4 }, 20, 0 },
     { "projection, K", { GS4_PARTITIONED, GS4_INTEGRATOR_GS4 }, 20, 0 },
     { "one solve", { GS4_SEMI_IMPLICIT, GS4_INTEGRATOR_GS4 }, 20, 0 }
@@ -294,6 +295,7 @@ static gs4_sim *estimate_with(const estimate_feature *e)
     d.scheme = e->mode.scheme;
     d.integrator = e->mode.integrator;
     d.sharp_gradients = strcmp(is, "sharp") == 0;
+    d.affine = strcmp(is, "affine") == 0;
     if (strcmp(is, "flip") == 0) d.flip_decay_time = (gs4_real)INFINITY;
     if (strcmp(is, "bulk modulus") == 0) m.bulk_modulus = (gs4_real)1e6;
     if (strcmp(is, "stress") == 0) {

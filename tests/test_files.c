@@ -209,6 +209,7 @@ static gs4_sim_desc files_desc(int euler)
         d.rho_inf = (gs4_real)0.6;
         d.rho_inf_spurious = (gs4_real)0.2;
         d.sharp_gradients = !files_warm;
+        d.affine = files_warm;
     }
     if (files_warm) {
         d.wall_is_isothermal[0] = d.air_is_isothermal = 1;
@@ -1418,7 +1419,7 @@ static void test_files_other_desc(void)
         case 11: o.wall_is_isothermal[4] = 1; break;
         case 12: o.ambient_temperature = 1; break;
         case 13: o.air_is_isothermal = 1; break;
-        case 14: o.sharp_gradients = 0; break;
+        case 14: o.sharp_gradients = o.affine = 0; break;
         default: o = files_desc(1); break; /* the other integrator */
         }
         sim = files_scene(&o);

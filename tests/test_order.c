@@ -76,9 +76,9 @@ static void order_case(double rho, double spurious, double decay)
     v = order_of(run[0].v, run[1].v, run[2].v, 3 * run[0].count);
     J = order_of(run[0].J, run[1].J, run[2].J, run[0].count);
     if (test_filter[0])
-        printf("rho %g %g decay %g, sharpened %d: order x %.3f v %.3f J %.3f; last changes %.1e "
+        printf("rho %g %g decay %g, sharpened %d, affine %d: order x %.3f v %.3f J %.3f; last changes %.1e "
                "%.1e %.1e\n",
-               rho, spurious, decay, scene_sharp, x, v, J,
+               rho, spurious, decay, scene_sharp, scene_affine, x, v, J,
                order_difference(run[1].x, run[2].x, 3 * run[0].count),
                order_difference(run[1].v, run[2].v, 3 * run[0].count),
                order_difference(run[1].J, run[2].J, run[0].count));
@@ -104,6 +104,12 @@ static void test_order_in_time(void)
             if (test_full || i == 3) order_case(members[i][0], members[i][1], 0);
             scene_sharp = 0;
         }
+    scene_affine = 1;
+    for (i = 0; i < (test_full ? 7 : 1); i++) {
+        order_case(members[i][0], members[i][1], i % 2 ? 0.2 : (double)INFINITY);
+        if (test_full) order_case(members[i][0], members[i][1], 0);
+    }
+    scene_affine = 0;
 }
 
 /* Why rates live on particles: the algorithm as printed in 2021 does not converge in time, pure

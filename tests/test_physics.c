@@ -413,6 +413,9 @@ static void test_sound_speed(void)
     scene_sharp = 1;
     CHECK_CLOSE(sound_speed(GS4_INTEGRATOR_GS4), 1, 0.001);
     scene_sharp = 0;
+    scene_affine = 1;
+    CHECK_CLOSE(sound_speed(GS4_INTEGRATOR_GS4), 0.994, 0.0005);
+    scene_affine = 0;
 }
 
 /* The drop of test_sharp_mirrors, moved by `by` of the periodic box: its velocities, by id. */

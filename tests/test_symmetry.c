@@ -185,6 +185,7 @@ static void symmetry_walls(symmetry_world *w, int n)
         d.sharp_gradients = 1;
     }
     if (n % 6 == 1 && n / 6 < 2) d.flip_decay_time = INFINITY;
+    d.affine = n / 6 == 3;
     symmetry_create(w, &d);
     symmetry_material(w, &m);
     symmetry_fill_box(w, 0, 6, 5, 4);
@@ -194,7 +195,7 @@ static void symmetry_walls(symmetry_world *w, int n)
 static void test_symmetry_walls(void)
 {
     int n;
-    for (n = 0; n < 18; n++) symmetry_check("walls", symmetry_walls, n, 6);
+    for (n = 0; n < 24; n++) symmetry_check("walls", symmetry_walls, n, 6);
 }
 
 /* --- bodies ----------------------------------------------------------------------------------- */
@@ -259,6 +260,7 @@ static void symmetry_bodies(symmetry_world *w, int n)
     gs4_sim_desc d = symmetry_box(8, 7, 7, physics_integrators[euler]);
     gs4_collider c;
     memset(&c, 0, sizeof c);
+    d.affine = !euler && (n + n / 8) % 2;
     c.shape = symmetry_body(kind);
     c.contact = (gs4_wall)contact;
     c.friction = (gs4_real)(contact == GS4_WALL_SEPARATE ? 0.3 : 0);
@@ -291,6 +293,7 @@ static void symmetry_solids(symmetry_world *w, int n)
     gs4_sim_desc d = symmetry_box(7, 6, 5, physics_integrators[n & 1]);
     gs4_collider c;
     memset(&c, 0, sizeof c);
+    d.affine = !(n & 1) && n / 2 % 2;
     c.shape = gs4_sphere(symmetry_place(2.4, 0.6, 1.7), (gs4_real)0.16);
     c.contact = n & 2 ? GS4_WALL_SEPARATE : GS4_WALL_STICK;
     c.friction = (gs4_real)(n & 2 ? 0.4 : 0);

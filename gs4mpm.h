@@ -257,6 +257,20 @@
  * a velocity where a solid turns. What is missing strains it: without spin a stiff cube lost 20 %
  * of its kinetic energy in a quarter of a turn, with it 0.02 %.
  *
+ * AFFINE. With desc.affine particles carry all of their velocity gradient, C, not a spin alone:
+ *     S3  m_i v_i = sum w m (v~ + C~ (x_i - x~)),   |C~| dt by at most 1/4
+ *     S7  dC/dt = (4/h^2) sum w acc_i (x) (x_i - x~) - L L - (decays of v) (C - L),   L = grad u
+ * Without it nodes at a surface have the velocity of the centre of what they see on one side of
+ * them, so strain rates and motion are off there by an error of first order in h. With it linear
+ * motion is exact there, too. (Moments of acc_i, as of no field have v and C together more energy
+ * than nodes have.) Modes of a free viscous sphere of 4, 6 and 8 cells are within 5.9, 2.6 and
+ * 1.6 % (8.9, 5.1 and 3.6 without), of order 1.9 in h; a ball of liquid that spreads as it turns
+ * keeps 96 % of its angular momentum (68), the rest is that of C, which h^2/4 has too small an
+ * arm; sound is 0.994 of c0 at 32 cells a wave (0.989), a film of 2 cells flows 1.05 times as fast
+ * as it should (1.17), tests: affine, film; a dam break of 16 cells is off by 1.6 % (7.8),
+ * bench/tradeoff.c. It is for liquids, solids and both, not with sharp_gradients. S6 counts s
+ * (acc_i - ag_i) from nodes filled by 3 % on, in full from 13 %; no spin is kept.
+ *
  * THE PARTITIONED SCHEME has pressure from a solve, so that no step follows sound: for liquids of
  * any bulk modulus, `incompressible` too. Velocities are on faces of cells, one component each, and
  * particles give momentum affinely, m (v~ + C (x_f - x~)), C = grad u~ extrapolated to the stage;
@@ -491,7 +505,7 @@
  *                           c^2: of sound and of elastic waves, 2 c_max G0/rho of liquids,
  *                           G b_max/rho0 of solids (b_max of B; fixed-corotated
  *                           b_max (2 - 1/sqrt(b_max)));
- *                           sharp_gradients: om^2 and d 2.3 times as large;
+ *                           sharp_gradients: om^2 and d 2.3 times as large; affine: 1.2 and 2;
  *                           symplectic Euler: (om dt)^2 + 2 d dt <= 4, om = 3.5 c/h,
  *                           d = 16 F_v mu/(rho h^2);
  *                           GS4: om^2 of a material is 4/(1 + 3 x) times as large where that is
@@ -605,13 +619,13 @@
  *
  * MEMORY. GS4: 65 bytes a particle in float (position, velocity, J and their rates, mass, id,
  * material, and 4 for sorting), 16 more unless flip_decay_time is INFINITY, 49 a cell near material
- * (sharp_gradients: 69), 16 more near walls and colliders, 4 per 64 cells of the domain; 40
- * (double: 72) more for each particle within 8 cells of a sticky collider, 264 (double: 516) for
- * each with an image, within three cells, and 20 (double: 40) a cell where such a collider is not
- * flat. Symplectic Euler: 89 and 33. A scene with a viscoelastic liquid: 48 more a particle (Euler
- * 24). With a solid: 96 more (Euler 36). With heat: 17 more a particle, 32 more with a
- * flux_relaxation_time, 16 (or 32) a cell near material, and about 100 a cell of the box around all
- * material, where the solver works; 150 where an axis is periodic.
+ * (sharp_gradients: 69), with affine 72 a particle, 16 more near walls and colliders, 4 per 64
+ * cells of the domain; 40 (double: 72) more for each particle within 8 cells of a sticky collider,
+ * 264 (double: 516) for each with an image, within three cells, and 20 (double: 40) a cell where
+ * such a collider is not flat. Symplectic Euler: 89 and 33. A scene with a viscoelastic liquid: 48
+ * more a particle (Euler 24). With a solid: 96 more (Euler 36). With heat: 17 more a particle, 32
+ * more with a flux_relaxation_time, 16 (or 32) a cell near material, and about 100 a cell of the
+ * box around all material, where the solver works; 150 where an axis is periodic.
  * Partitioned: 161 a particle, and about 320 a cell of the box around all material (double 313 and
  * 530), blocks and solver included; measured where it fills 64^3 cells. With viscosity or
  * elasticity about 120 more for each face within three cells of a free surface; with solids 65
@@ -983,8 +997,9 @@ typedef struct gs4_sim_desc {
      * at 32 cells a wave instead of 1.1 %; the error of a drop that breathes halves. A step takes
      * 1.2 times as long, and there are 1.5 (sound) to 2.3 (viscosity) times as many. */
     int sharp_gradients;
-    /* 1: with explicit GS4, particles carry their velocity gradient as well as their velocity, and
-     * give momentum affinely, see AFFINE; the other schemes and symplectic Euler always do. */
+    /* 1: with explicit GS4 particles carry their velocity gradient beside their velocity, see
+     * AFFINE: a third to a fifth of the error at free surfaces, for 1.5 times the time a step. Other
+     * schemes and symplectic Euler give momentum affinely anyway. */
     int affine;
 } gs4_sim_desc;
 
@@ -31820,7 +31835,7 @@ GS4_API GS4I_COLD int gs4_estimate(const gs4_sim *sim, gs4_scheme scheme, gs4_in
  * Pom-pom that relaxes faster than a step: that costs at most 30 others, before 5000, or is
  * refused. With anisotropy above 1 results in the bounds differ from before, and stress_bounded
  * counts all particles that came to them. The warning of many substeps is gone.
- * gs4_estimate. GS4_NO_SOLIDS and the like leave parts out.
+ * gs4_estimate. GS4_NO_SOLIDS and the like leave parts out. New: desc.affine.
  * The explicit schemes work on eight particles of a cell side by side: a step takes 0.74 to 0.87 of
  * the time it took. So each step may change the order of particles, not only one that sorts. What
  * turns or shears needs no trial pass. */

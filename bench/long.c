@@ -1,7 +1,7 @@
 /* A million steps each of small scenes that should go on for ever: a pool at rest, a cup that a
  * paddle stirs, a jelly ball that rings. What drifts, at decades of steps.
  *   cc -O3 -march=native bench/long.c -I. -lm -o long        (-DGS4_DOUBLE for double)
- *   ./long [--steps 1000000] [--scene pool|cup|ball] [--euler]        CSV on standard output
+ *   ./long [--steps 1000000] [--scene pool|cup|ball] [--affine|--euler]  CSV on standard output
  * mass, volume (by how densely particles lie, and by J), height of the centre of mass: over those
  * at first. kinetic: over rho V g H (pool, cup; H the depth) or that at first (ball). momentum: its
  * size over mass and the speed of sound; spin: angular momentum about the axis of the ball over
@@ -35,7 +35,14 @@ static void twist(gs4_sim *sim, double middle)
     }
 }
 
-static gs4_sim *scene(int which, int euler)
+enum {
+    GS4,
+    AFFINE,
+    EULER
+};
+static const char *const how_names[3] = { "GS4", "affine GS4", "symplectic Euler" };
+
+static gs4_sim *scene(int which, int how)
 {
     gs4_sim_desc d = scene_cube(which == BALL ? 14 : 8);
     gs4_material m = scene_liquid(density, which == CUP ? 0.1 : 0.001, sound);
@@ -46,7 +53,8 @@ static gs4_sim *scene(int which, int euler)
     d.cell_size = (gs4_real)h;
     if (which == POOL) d.cells[2] = 4;
     if (which != BALL) d.gravity = at(0, -g, 0);
-    if (euler) d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER;
+    if (how == EULER) d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER;
+    d.affine = how == AFFINE;
     if (which == BALL) {
         m.viscosity = 0;
         m.solid = GS4_NEO_HOOKEAN;
@@ -98,14 +106,13 @@ static void print(gs4_sim *sim, int which, const gs4_stats *first, double first_
 }
 
 /* Steps to each power of ten, as long as gs4_advance takes them. */
-static void follow(int which, int euler, double steps)
+static void follow(int which, int how, double steps)
 {
-    gs4_sim *sim = scene(which, euler);
+    gs4_sim *sim = scene(which, how);
     const gs4_stats first = gs4_get_stats(sim);
     const double first_height = height(sim), start = bench_now(NULL);
     double next = 1;
-    printf("# %s, %s, %d particles\n", names[which], euler ? "symplectic Euler" : "GS4",
-           first.particles);
+    printf("# %s, %s, %d particles\n", names[which], how_names[how], first.particles);
     puts("steps,time,particles,mass off,occupied volume,volume,least J,largest J,height,kinetic,"
          "max speed,momentum,spin,bytes");
     while (next <= steps) {
@@ -121,9 +128,10 @@ static void follow(int which, int euler, double steps)
 int main(int count, char **values)
 {
     double steps = 1e6;
-    int euler = 0, only = SCENES, i, k;
+    int how = GS4, only = SCENES, i, k;
     for (i = 1; i < count; i++) {
-        if (!strcmp(values[i], "--euler")) euler = 1;
+        if (!strcmp(values[i], "--euler")) how = EULER;
+        if (!strcmp(values[i], "--affine")) how = AFFINE;
         if (!strcmp(values[i], "--steps") && i + 1 < count) steps = atof(values[i + 1]);
         for (k = 0; k < SCENES; k++)
             if (!strcmp(values[i], names[k])) only = k;
@@ -131,6 +139,6 @@ int main(int count, char **values)
     bench_machine(stdout);
     printf("# bytes of gs4_real %d\n", (int)sizeof(gs4_real));
     for (k = 0; k < SCENES; k++)
-        if (only == SCENES || only == k) follow(k, euler, steps);
+        if (only == SCENES || only == k) follow(k, how, steps);
     return 0;
 }

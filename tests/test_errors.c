@@ -745,7 +745,8 @@ static void test_errors_half_hooks(void)
     d.sharp_gradients = 1;
     CHECK(gs4_create(&d, &sim) == GS4_ERROR_ARGUMENT && strstr(gs4_last_error(NULL), "affine"));
     d.affine = 2;
-    CHECK(gs4_create(&d, &sim) == GS4_ERROR_ARGUMENT && strstr(gs4_last_error(NULL), "affine is 2"));
+    CHECK(gs4_create(&d, &sim) == GS4_ERROR_ARGUMENT
+          && strstr(gs4_last_error(NULL), "affine is 2"));
     d.affine = 0;
     d.integrator = GS4_INTEGRATOR_SYMPLECTIC_EULER;
     CHECK(gs4_create(&d, &sim) == GS4_ERROR_ARGUMENT

@@ -76,7 +76,8 @@ static void order_case(double rho, double spurious, double decay)
     v = order_of(run[0].v, run[1].v, run[2].v, 3 * run[0].count);
     J = order_of(run[0].J, run[1].J, run[2].J, run[0].count);
     if (test_filter[0])
-        printf("rho %g %g decay %g, sharpened %d, affine %d: order x %.3f v %.3f J %.3f; last changes %.1e "
+        printf("rho %g %g decay %g, sharpened %d, affine %d: order x %.3f v %.3f J %.3f; last "
+               "changes %.1e "
                "%.1e %.1e\n",
                rho, spurious, decay, scene_sharp, scene_affine, x, v, J,
                order_difference(run[1].x, run[2].x, 3 * run[0].count),

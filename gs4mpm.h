@@ -10761,10 +10761,22 @@ static void gs4i_convect(double E[3][3], double m[6])
             m[gs4i_place[i][j]] = T[i][0] * E[j][0] + T[i][1] * E[j][1] + T[i][2] * E[j][2];
 }
 
+/* Neither underflown to 0 nor overflown? */
+static int gs4i_is_something(double A[3][3])
+{
+    double size = 0;
+    int i, j;
+    for (i = 0; i < 3; i++)
+        for (j = 0; j < 3; j++) size += fabs(A[i][j]);
+    return size > 0 && size < 1e300;
+}
+
 /* UCM and Oldroyd-B are linear: dS/dt = K S + S K^T + L + L^T, K = L - I/(2 lambda_b). So
  * S <- A S A^T + H, A = exp(K dt), exact for constant L. Both come by series over dt / 2^n, entries
- * of K dt / 2^n at most 1/64, and are doubled n times. Eight terms leave about 1e-14 of H. */
-static void gs4i_linear_map(const gs4i_split *p, double dt, double A[3][3], double H[6])
+ * of K dt / 2^n at most 1/64, and are doubled n times, or until A is nothing and H steady: where a
+ * step strains by at most 1, 18 times, however fast all relaxes. Eight terms leave about 1e-14 of
+ * H. Returns how often. */
+static int gs4i_linear_map(const gs4i_split *p, double dt, double A[3][3], double H[6])
 {
     double K[3][3], M[3][3], T[3][3], size = 0, factor;
     int i, j, k, n = 0;
@@ -10789,13 +10801,14 @@ static void gs4i_linear_map(const gs4i_split *p, double dt, double A[3][3], doub
         for (i = 0; i < 3; i++)
             for (j = 0; j < 3; j++) M[i][j] = T[i][j] + T[j][i];
     }
-    for (k = 0; k < n; k++) {
+    for (k = 0; k < n && gs4i_is_something(A); k++) {
         double later[6];
         memcpy(later, H, sizeof later);
         gs4i_convect(A, later);
         for (i = 0; i < 6; i++) H[i] += later[i];
         gs4i_multiply3(A, A, A);
     }
+    return k;
 }
 
 static void gs4i_linear_advance(const gs4i_split *p, double c[6], double dt)

@@ -833,6 +833,32 @@ static void test_stress_work(void)
     }
 }
 
+/* UCM and Oldroyd-B: doublings of the map of a step that strains by up to 1, however fast all
+ * relaxes; 30 other steps of a particle would be some 800. What has relaxed is S of steady flow,
+ * 2 lambda_b D. */
+static void test_stress_linear_work(void)
+{
+    const int draws = test_slow ? 100000 : 1000;
+    int i, j, most = 0;
+    stress_seed = 8;
+    for (i = 0; i < draws; i++) {
+        const double dt = stress_log(1e-3, 1e290), rate = stress_log(1e-3, 1) / dt;
+        gs4i_split p = stress_draw_work(dt, 0);
+        double A[3][3], H[6];
+        int doublings;
+        p.stretch = 0;
+        for (j = 0; j < 9; j++) p.L[j / 3][j % 3] = rate * stress_random() / 3;
+        doublings = gs4i_linear_map(&p, dt, A, H);
+        most = doublings > most ? doublings : most;
+        for (j = 0; j < 6 && dt > 1e20; j++) {
+            const int a = j < 3 ? j : j < 5 ? 0 : 1, b = j < 3 ? j : j == 3 ? 1 : 2;
+            CHECK_CLOSE(H[j] * dt, (p.L[a][b] + p.L[b][a]) * dt, 1e-12);
+        }
+    }
+    CHECK_BETWEEN(most, 10, 18);
+    if (test_filter[0]) printf("at most %d doublings\n", most);
+}
+
 /* --- bad arguments ---------------------------------------------------------------------------- */
 
 static void stress_refused(const gs4_material *m, const gs4_point *p, const gs4_real *L, double dt,
@@ -962,5 +988,6 @@ static void run_stress(void)
     RUN(test_stress_thin);
     RUN(test_stress_bounded);
     RUN_ONCE(test_stress_work);
+    RUN_ONCE(test_stress_linear_work);
     RUN(test_stress_bad_arguments);
 }

@@ -11479,8 +11479,20 @@ static void gs4i_correct_elastic(const gs4i_elastic_constants *l, gs4i_elastic *
  *
  *     2 eta = 2 weight G0 alpha_f dt (1 - exp(-alpha_f z))/(alpha_f z)                        (VE2)
  *
- * which the solve has as viscosity; what is left, q = S~(L*) - 2 eta D*, is known before it, with
- * L* of what particles gave. For small stress q does not depend on L*. That of S~ on D~ as a
+ * which the solve has as viscosity. Of pom-pom that is so without the trace: where stretch relaxes
+ * more slowly than the rest, z_s < z,
+ *
+ *     d(Lam^2)/dt = 2/3 c:D - (2 r/lambda_b) exp(nu (Lam - 1)) (Lam^2 - Lam),
+ *
+ * swelling has a stress of its own, beside that of K. The solve has it with its pressure, as
+ *
+ *     kappa = (2/3) weight G0 alpha_f dt [(1 - exp(-alpha_f z_s))/(alpha_f z_s)
+ *                                         - (1 - exp(-alpha_f z))/(alpha_f z)]               (VE3)
+ *     p + (s K + kappa) div u~ = -K (J** - 1).
+ *
+ * Where K was far below G0, steps beyond c dt = h/2 of what the solve did not know gained energy.
+ * What is left, q = S~(L*) - 2 eta D* - kappa div v* I, is known before it, with L* of what
+ * particles gave. For small stress q does not depend on L*. That of S~ on D~ as a
  * transfer function has no negative real part on the unit circle: elastic waves are stable at any
  * dt. In the place of rates particles keep L'. */
 typedef struct gs4i_solved_elastic {
@@ -11489,6 +11501,7 @@ typedef struct gs4i_solved_elastic {
     const gs4i_integrator *integrator;
     double share;                 /* of the step: alpha_f to its stage, or 1 */
     gs4i_lanes weight, eta, left; /* (VE1), (VE2); share of S that is left of its growth */
+    gs4i_lanes swelling;          /* (VE3) */
     int n;
 } gs4i_solved_elastic;
 
@@ -11498,6 +11511,29 @@ static double gs4i_left_of_growth(double z)
     return z > 1e-3 ? -expm1(-z) / z : 1 - z * (0.5 - z / 6);
 }
 
+/* z of particle n, and the same of Lam^2, from those of lambda_b. */
+static void gs4i_relaxation_of(const gs4i_solved_elastic *k, const gs4i_elastic *e, int n,
+                               double *z, double *swelling)
+{
+    const gs4i_elastic_constants *l = k->constants;
+    const double G = (double)GS4I_NTH_CONST(k->G, n),
+                 stretch = (double)GS4I_NTH_CONST(l->stretch, n),
+                 nu = (double)GS4I_NTH_CONST(l->nu, n);
+    double trace3 = 0, squares = 0, f1, stiff, Lam;
+    int i;
+    if (!(stretch > 0)) return;
+    for (i = 0; i < 6; i++) {
+        const double s = (double)GS4I_NTH_CONST(e->s[i], n) / G;
+        trace3 += i < 3 ? s / 3 : 0;
+        squares += (i < 3 ? 1 : 2) * s * s;
+    }
+    gs4i_pom_pom(stretch, nu, (double)GS4I_NTH_CONST(l->alpha, n), trace3, squares, &f1, &stiff);
+    *z *= fmax(1 + f1, 0);
+    Lam = sqrt(fmax(1 + trace3, 0.25)); /* below, Lam^2 grows: taken as slow */
+    *swelling *= stretch * exp(fmin(nu * (Lam - 1), 300)) * (1 - 0.5 / Lam + 0.5 * nu * (Lam - 1));
+    *swelling = fmax(*swelling, 0);
+}
+
 static void gs4i_weigh_stage(gs4i_solved_elastic *k, const gs4i_elastic *e)
 {
     const gs4i_elastic_constants *l = k->constants;
@@ -11505,31 +11541,26 @@ static void gs4i_weigh_stage(gs4i_solved_elastic *k, const gs4i_elastic *e)
     const double dt = (double)r->dt, ratio = (double)r->affine_ratio, ahead = (double)r->alpha_f,
                  past = ratio > 0 ? (1 - ahead) / ratio : 0,
                  aged = k->share < 1 ? 2 * ahead - 1 : 1; /* by how much of the age */
-    int n, i;
+    int n;
     memset(k->weight, 0, sizeof k->weight);
     memset(k->eta, 0, sizeof k->eta);
     memset(k->left, 0, sizeof k->left);
+    memset(k->swelling, 0, sizeof k->swelling);
     for (n = 0; n < k->n; n++) {
         const double G = (double)GS4I_NTH_CONST(k->G, n);
-        double z = (double)GS4I_NTH_CONST(l->inv_lambda, n) * dt, age, weight = 1;
+        double z = (double)GS4I_NTH_CONST(l->inv_lambda, n) * dt, swelling = z, age, weight = 1;
         if (!(G > (double)GS4I_TINY)) continue;
-        if (GS4I_NTH_CONST(l->stretch, n) > 0) {
-            double trace3 = 0, squares = 0, f1, stiff;
-            for (i = 0; i < 6; i++) {
-                const double s = (double)GS4I_NTH_CONST(e->s[i], n) / G;
-                trace3 += i < 3 ? s / 3 : 0;
-                squares += (i < 3 ? 1 : 2) * s * s;
-            }
-            gs4i_pom_pom((double)GS4I_NTH_CONST(l->stretch, n), (double)GS4I_NTH_CONST(l->nu, n),
-                         (double)GS4I_NTH_CONST(l->alpha, n), trace3, squares, &f1, &stiff);
-            z *= fmax(1 + f1, 0);
-        }
+        gs4i_relaxation_of(k, e, n, &z, &swelling);
         age = z > 1e-3 ? 1 / z - 1 / expm1(z) : 0.5 - z / 12;
         if (ratio > 0) weight = (k->share - aged * age + past) / (ahead + past);
         GS4I_NTH(k->weight, n) = GS4I_C(weight);
         GS4I_NTH(k->left, n) = GS4I_C(gs4i_left_of_growth(z));
         GS4I_NTH(k->eta, n) =
             GS4I_C(k->share * weight * G * dt * gs4i_left_of_growth(k->share * z));
+        if (swelling < z)
+            GS4I_NTH(k->swelling, n) = GS4I_C(
+                2.0 / 3 * k->share * weight * G * dt
+                * (gs4i_left_of_growth(k->share * swelling) - gs4i_left_of_growth(k->share * z)));
     }
 }
 
@@ -11622,7 +11653,10 @@ static void gs4i_known_stress(const gs4i_solved_elastic *k, const gs4i_elastic *
     gs4i_follow_flow(k, e, L, stage, count);
     gs4i_strain_rate(L, D);
     for (c = 0; c < 6; c++)
-        GS4I_BATCH_LOOP(b) q[c][b] = stage[c][b] - 2 * k->eta[b] * D[c][b];
+        GS4I_BATCH_LOOP(b) {
+            q[c][b] = stage[c][b] - 2 * k->eta[b] * D[c][b];
+            if (c < 3) q[c][b] -= k->swelling[b] * (D[0][b] + D[1][b] + D[2][b]);
+        }
 }
 
 /* Density times the squared speed of elastic waves of each particle, Pa: 2 G0 c_max at most. The
@@ -12903,6 +12937,7 @@ typedef struct gs4i_response {
     gs4i_elastic_constants elastic;
     gs4i_solid_constants solid;
     gs4i_seen seen;
+    gs4i_lanes swelling; /* (VE3) of the batch */
 } gs4i_response;
 
 /* Turn to particles i to i + n: constants, and the temperature at the stage (Euler: now), which
@@ -13086,11 +13121,13 @@ static void gs4i_stress_to_solve(gs4i_response *r, gs4i_gradient L, const gs4i_w
     gs4i_see_thinnest(&r->seen, &r->constants, mu);
     memset(eta, 0, sizeof(gs4i_lanes));
     memset(solid, 0, sizeof(gs4i_lanes));
+    memset(r->swelling, 0, sizeof r->swelling);
     if (GS4I_WITH_SOLIDS && r->p->deformation_reals) gs4i_tangent_of_solid(r, L, J, solid);
     if (!GS4I_WITH_VISCOELASTIC || !r->p->elastic_reals || r->report->bad) return;
     k = gs4i_begin_solved(r, L, (double)r->integrator->alpha_f, G, &e, &count);
     gs4i_known_stress(&k, &e, L, q, stage, &count);
     memcpy(eta, k.eta, sizeof k.eta);
+    memcpy(r->swelling, k.swelling, sizeof k.swelling);
     gs4i_see_elastic(G, stage, stiffness);
     GS4I_BATCH_LOOP(b) stiffness[b] = (GS4I_C(0.5) * stiffness[b] - G[b]) * k.left[b];
     gs4i_see_elastic_count(r, &count);
@@ -15156,6 +15193,7 @@ typedef struct gs4i_staggered {
     gs4_real *force[3], *reach[3]; /* of stress; c of [[poisson]] at faces */
     /* where viscosity is in the solve, for [[stokes]]; NULL else */
     gs4_real *viscosity;                        /* of cells, Pa s */
+    gs4_real *swelling;                         /* (VE3) of cells, Pa s; NULL else */
     gs4_real *mass[3], *impulse[3], *solved[3]; /* its M, b and u */
     gs4_real *edge[3];                          /* what rows of edges count */
     /* where stress is, too: q of cells along axis a, of edges along e, and volume there; then
@@ -19038,12 +19076,13 @@ static void gs4i_fit_staggered(gs4i_staggered *f, const gs4i_grid *g, const gs4_
     }
 }
 
-/* Fields of viscosity in the solve: 13 numbers; of stress 9 more, of bodies 3. */
+/* Fields of viscosity in the solve: 13 numbers; of stress 10 more, of bodies 3. */
 static void gs4i_take_implicit(gs4i_staggered *f, int stress, int bodies)
 {
     const size_t real = sizeof(gs4_real);
     int a;
     f->viscosity = (gs4_real *)gs4i_box_take(&f->box, real);
+    f->swelling = stress ? (gs4_real *)gs4i_box_take(&f->box, real) : NULL;
     for (a = 0; a < 3; a++) {
         f->mass[a] = (gs4_real *)gs4i_box_take(&f->box, real);
         f->impulse[a] = (gs4_real *)gs4i_box_take(&f->box, real);
@@ -19152,6 +19191,8 @@ static void gs4i_clear_staggered(int z, void *context)
         memset(field + 4 * from, 0, 4 * n * sizeof *field);
         if (c < 3 && f->force[c]) memset(f->force[c] + from, 0, n * sizeof *field);
         if (c == 3 && f->is_implicit) memset(f->viscosity + from, 0, n * sizeof *field);
+        if (c == 3 && f->is_implicit && f->swelling)
+            memset(f->swelling + from, 0, n * sizeof *field);
     }
     if (f->is_implicit && f->normal[0]) gs4i_clear_stress(f, z);
 }
@@ -19189,7 +19230,7 @@ static int gs4i_begin_staggered(gs4_sim *sim)
     f->is_fitted = sim->particles.deformation_reals > 0;
     if (f->is_implicit)
         bytes +=
-            (size_t)((elastic ? 22 : 13) + (bodies && !f->is_fitted ? 3 : 0)) * sizeof(gs4_real) + 6
+            (size_t)((elastic ? 23 : 13) + (bodies && !f->is_fitted ? 3 : 0)) * sizeof(gs4_real) + 6
             + (f->is_fitted ? 3 * sizeof(double) : 0);
     if (stress && (!f->is_implicit || f->is_fitted)) bytes += 3 * sizeof(gs4_real);
     gs4i_fit_staggered(f, &sim->grid, sim->desc.walls);
@@ -20000,6 +20041,11 @@ static void gs4i_classify_cells(int z, void *context)
         f->kind[i] = q[GS4I_CELL_FILL] > GS4I_C(GS4I_LIQUID_FILL) ? GS4_CELL_LIQUID : GS4_CELL_AIR;
         if (q[GS4I_CELL_SOLID] > GS4I_C(0.95)) f->kind[i] = GS4_CELL_SOLID;
         f->diagonal[i] = q[GS4I_CELL_COMPLIANCE] / pass->sim->integrator.s;
+        if (f->is_implicit && f->swelling) { /* 1/(s K + kappa), and what that makes of J** - 1 */
+            const gs4_real share = 1 / (1 + f->swelling[i] * f->diagonal[i]);
+            f->diagonal[i] *= share;
+            q[GS4I_CELL_DILATION] *= share;
+        }
         if (!f->is_revised) f->pressure[i] = 0;
         for (a = 0; a < 3; a++)
             if (at[a] < f->from[a] || at[a] >= f->to[a])
@@ -22543,14 +22589,18 @@ static void gs4i_take_trace(gs4i_gradient L)
  * for q its mean weighed by 1/mu. Weighed by volume q of a stiff one would pull at cells that have
  * the viscosity of a thin one to bear it. */
 typedef struct gs4i_stress_tiles {
-    gs4i_number_tile resistance, normal[3], shear[3], weight[3];
+    gs4i_number_tile resistance, swelling, normal[3], shear[3], weight[3];
 } gs4i_stress_tiles;
 
 static void gs4i_scatter_known_stress(gs4i_stress_tiles *t, const gs4i_stencils s[4], int n,
-                                      const gs4i_wide *give, gs4i_symmetric q)
+                                      const gs4i_wide *give, gs4i_symmetric q,
+                                      const gs4i_wide *swelling)
 {
     gs4i_stencils edge;
     int b, e;
+    for (b = 0; b < n; b++)
+        gs4i_scatter_single(t->swelling, &s[0], b,
+                            GS4I_NTH_CONST(give, b) * GS4I_NTH_CONST(swelling, b));
     for (e = 0; e < 3; e++) {
         const int across = gs4i_place[(e + 1) % 3][(e + 2) % 3];
         gs4i_edge_stencil(s, e, &edge);
@@ -22627,9 +22677,10 @@ static void gs4i_scatter_viscosity(int index, void *context)
             give[b] = f->is_fitted ? volume[b] * counts : volume[b] / counts;
         }
         for (b = 0; b < n; b++) gs4i_scatter_single(tiles.resistance, &s[0], b, GS4I_NTH(give, b));
-        if (known) gs4i_scatter_known_stress(&tiles, s, n, give, sigma);
+        if (known) gs4i_scatter_known_stress(&tiles, s, n, give, sigma, r.swelling);
     }
     gs4i_add_face_tile(sim, o, GS4I_AT_CELL, 1, tiles.resistance, f->viscosity);
+    if (known) gs4i_add_face_tile(sim, o, GS4I_AT_CELL, 1, tiles.swelling, f->swelling);
     for (c = 0; c < 3 && known; c++) {
         gs4i_add_face_tile(sim, o, GS4I_AT_CELL, 1, tiles.normal[c], f->normal[c]);
         gs4i_add_face_tile(sim, o, 7 ^ 1 << c, 1, tiles.shear[c], f->shear[c]);
@@ -22676,6 +22727,7 @@ static void gs4i_find_viscosities(int z, void *context)
             f->viscosity[i] = !(V > 0 && sum > 0) ? GS4I_C(0) : f->is_fitted ? sum / V : V / sum;
             f->viscosity[i] *= gs4i_open_share_of_cell(f, i);
             for (a = 0; a < 3 && elastic; a++) f->normal[a][i] /= gs4i_max(sum, GS4I_TINY);
+            if (elastic) f->swelling[i] /= gs4i_max(sum, GS4I_TINY);
         }
     for (a = 0; a < 3 && elastic; a++)
         if (z < gs4i_box_length(&f->box, 7 ^ 1 << a, 2))
@@ -22688,6 +22740,8 @@ static void gs4i_fold_known_stress(gs4_sim *sim)
 {
     gs4i_staggered *f = &sim->staggered;
     int a;
+    gs4i_each_mirror(sim, GS4I_AT_CELL, f->swelling, gs4i_fold_number);
+    gs4i_wrap_cells(sim, f->swelling, 1);
     for (a = 0; a < 3; a++) {
         gs4i_each_mirror(sim, GS4I_AT_CELL, f->normal[a], gs4i_fold_number);
         gs4i_each_mirror(sim, 7 ^ 1 << a, f->shear[a], gs4i_fold_number);

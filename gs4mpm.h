@@ -368,12 +368,13 @@
  * Pom-Pom, so it stays positive definite at any dt; w is such that L is that of the mean age of
  * what a step gives to S. Stress of the stage goes on from S over alpha_f dt likewise, so it is
  * 2 mu_p D~ where dt is far above lambda_b, whatever the member; mixed cells weigh what is known of
- * it by 1/mu, as they do mu. Order in time 1.9 to 2.1 in x, v and S; shear waves at 32 cells a wave
- * within 1 % in steps ten times those of the explicit scheme. L~ is by the solve's own differences;
- * at sticky walls of the domain L and q go on straight (at sticky colliders the nearest of L is
- * taken: to first order). Poiseuille flow of Oldroyd-B and UCM in steps of 100 times the explicit
- * limit has the error of Newton's liquid within 20 % of it, stress within .5 %. All work of S heats
- * at once.
+ * it by 1/mu, as they do mu. Where stretch of Pom-Pom outlasts the step, and all else relaxes
+ * within it, swelling has up to 2/3 G0 beside K; the solve has that, too. Order in time 1.9 to 2.1
+ * in x, v and S; shear waves at 32 cells a wave within 1 % in steps ten times those of the explicit
+ * scheme. L~ is by the solve's own differences; at sticky walls of the domain L and q go on
+ * straight (at sticky colliders the nearest of L is taken: to first order). Poiseuille flow of
+ * Oldroyd-B and UCM in steps of 100 times the explicit limit has the error of Newton's liquid
+ * within 20 % of it, stress within .5 %. All work of S heats at once.
  *
  *     In scenes with solids all stress is that of particles, as in the partitioned scheme, at the
  * stage that u~ leads to:
@@ -510,8 +511,7 @@
  *     flow                  one cell a step along each axis, the fall within the step included,
  *                           semi-implicit: at the largest acceleration of the last step instead;
  *                           and the rim of a collider that turns, where the domain can meet it
- *     strain, relaxation    |grad v| dt <= 1, of colliders too (sqrt(2) |w|),  dt <= 1000 lambda_b
- *                           (semi-implicit: of Pom-Pom alone)
+ *     strain                |grad v| dt <= 1, of colliders too (sqrt(2) |w|)
  * and gs4_step refuses more; gs4_limit_name says which it is. gs4_advance takes the fraction `cfl`
  * of it, and half of that again, up to 7 times, where a step is refused, by an implicit scheme
  * also one whose solve did not converge; the semi-implicit scheme less each time, 2^-22 in all.
@@ -1102,7 +1102,7 @@ GS4_API int gs4_advance_within(gs4_sim *sim, gs4_real duration, const gs4_budget
  * this asked: gs4_last_error says which. */
 GS4_API gs4_real gs4_stable_dt(const gs4_sim *sim);
 
-/* What sets it: "sound", "viscosity", "elasticity", "surface", "flow", "strain", "relaxation" or
+/* What sets it: "sound", "viscosity", "elasticity", "surface", "flow", "strain" or
  * "none"; "max_dt" where that is less than gs4_advance would take. */
 GS4_API const char *gs4_limit_name(const gs4_sim *sim);
 
@@ -10689,14 +10689,16 @@ static void gs4i_eigen(const double m[6], double values[3], double Q[3][3])
 }
 
 /* Is the smallest eigenvalue more than what rounding of the largest makes of it? By det / (sum of
- * principal minors), which is a third of it to all of it. 1e-11, chosen, is 1e5 roundings. */
+ * principal minors), which is a third of it to all of it. 1e-11, chosen, is 1e5 roundings. Where
+ * two are small det itself may be rounding, of the cube of the largest: 1e-14 of that is 50. */
 static int gs4i_is_round(const double m[6])
 {
     const double minors =
         (m[0] * m[1] - m[3] * m[3]) + (m[0] * m[2] - m[4] * m[4]) + (m[1] * m[2] - m[5] * m[5]);
     const double det = m[0] * (m[1] * m[2] - m[5] * m[5]) - m[3] * (m[3] * m[2] - m[5] * m[4])
                        + m[4] * (m[3] * m[5] - m[1] * m[4]);
-    return minors > 0 && det > 1e-11 * (m[0] + m[1] + m[2]) * minors;
+    const double sum = m[0] + m[1] + m[2];
+    return minors > 0 && det > 1e-11 * sum * minors && det > 1e-14 * sum * sum * sum;
 }
 
 /* Q diag(values) Q^T */
@@ -10811,20 +10813,21 @@ static int gs4i_linear_map(const gs4i_split *p, double dt, double A[3][3], doubl
     return k;
 }
 
-static void gs4i_linear_advance(const gs4i_split *p, double c[6], double dt)
+static void gs4i_linear_advance(const gs4i_split *p, double S[6], double dt)
 {
-    double A[3][3], T[3][3], H[6], values[3];
+    double A[3][3], T[3][3], H[6], c[6], values[3];
     int i;
+    for (i = 0; i < 6; i++) c[i] = S[i] + (i < 3);
     gs4i_linear_map(p, dt, A, H);
     /* what rounding made negative of a thin ellipsoid: flow would draw it out */
     if (!gs4i_is_round(c)) {
         gs4i_eigen(c, values, T);
         for (i = 0; i < 3; i++) values[i] = values[i] > 0 ? values[i] : 0;
         gs4i_recompose(T, values, c);
+        for (i = 0; i < 6; i++) S[i] = c[i] - (i < 3);
     }
-    for (i = 0; i < 3; i++) c[i] -= 1;
-    gs4i_convect(A, c);
-    for (i = 0; i < 6; i++) c[i] += H[i] + (i < 3);
+    gs4i_convect(A, S);
+    for (i = 0; i < 6; i++) S[i] += H[i];
 }
 
 /* --- pom-pom ---------------------------------------------------------------------------------- *
@@ -11180,7 +11183,7 @@ static int gs4i_adaptive_substep(gs4i_split *p, const gs4i_unsplit *q, gs4i_doub
 }
 
 /* S after the time `left`; 0, or GS4_ERROR_UNSTABLE. */
-static int gs4i_unsplit_advance(gs4i_split *p, double c[6], double dt)
+static int gs4i_unsplit_advance(gs4i_split *p, double after[6], double dt)
 {
     double left = dt * p->inv_lambda, guess = left, S[8] = { 0, 0, 0, 0, 0, 0, 0, 0 };
     int i, j, outside;
@@ -11196,7 +11199,7 @@ static int gs4i_unsplit_advance(gs4i_split *p, double c[6], double dt)
             q.tilt += q.K[i][j] * q.K[i][j];
         }
     q.tilt = sqrt(q.tilt);
-    for (i = 0; i < 6; i++) S[i] = c[i] - (i < 3);
+    memcpy(S, after, 6 * sizeof *S);
     outside = !gs4i_is_smooth(&q, S);
     if (outside && !(q.alpha > 1)) {
         gs4i_bound(&q, S);
@@ -11216,44 +11219,41 @@ static int gs4i_unsplit_advance(gs4i_split *p, double c[6], double dt)
         gs4i_bounded_advance(p, &q, &w, S, left);
         left = 0;
     }
-    for (i = 0; i < 6; i++) {
-        c[i] = S[i] + (i < 3);
-        if (!(fabs(c[i]) < 1e290)) return GS4_ERROR_UNSTABLE;
-    }
+    memcpy(after, S, 6 * sizeof *S);
+    for (i = 0; i < 6; i++)
+        if (!(fabs(S[i]) < 1e290)) return GS4_ERROR_UNSTABLE;
     return left > 0 ? GS4_ERROR_UNSTABLE : GS4_OK;
 }
 
-/* Conformation after the time dt under constant L. 0, or GS4_ERROR_UNSTABLE where it overflows or
- * takes too much work. */
-static int gs4i_split_advance(gs4i_split *p, double c[6], double dt)
+/* S, which may be far below c, after the time dt under constant L. 0, or GS4_ERROR_UNSTABLE where
+ * it overflows or takes too much work. */
+static int gs4i_split_advance(gs4i_split *p, double S[6], double dt)
 {
     int i;
-    if (p->stretch > 0) return gs4i_unsplit_advance(p, c, dt);
-    gs4i_linear_advance(p, c, dt);
+    if (p->stretch > 0) return gs4i_unsplit_advance(p, S, dt);
+    gs4i_linear_advance(p, S, dt);
     for (i = 0; i < 6; i++)
-        if (!(fabs(c[i]) < 1e290)) return GS4_ERROR_UNSTABLE;
+        if (!(fabs(S[i]) < 1e290)) return GS4_ERROR_UNSTABLE;
     return GS4_OK;
 }
 
-/* dc/dt = L c + c L^T - [f c - I + alpha (c - I)^2] / lambda_b */
-static void gs4i_conformation_rate(const gs4i_split *p, const double c[6], double rate[6])
+/* dS/dt of (5), in G0 */
+static void gs4i_split_rate(const gs4i_split *p, const double S[6], double rate[6])
 {
-    double S[3][3], f1 = 0, stiff, squares = 0;
+    double f1 = 0, stiff;
     int i, j, k;
-    for (i = 0; i < 3; i++)
-        for (j = 0; j < 3; j++) {
-            S[i][j] = c[gs4i_place[i][j]] - (i == j);
-            squares += S[i][j] * S[i][j];
-        }
     if (p->stretch > 0)
-        gs4i_pom_pom(p->stretch, p->nu, p->alpha, (S[0][0] + S[1][1] + S[2][2]) / 3, squares, &f1,
-                     &stiff);
+        gs4i_pom_pom(p->stretch, p->nu, p->alpha, (S[0] + S[1] + S[2]) / 3,
+                     S[0] * S[0] + S[1] * S[1] + S[2] * S[2]
+                         + 2 * (S[3] * S[3] + S[4] * S[4] + S[5] * S[5]),
+                     &f1, &stiff);
     for (i = 0; i < 3; i++)
         for (j = i; j < 3; j++) {
-            double sum = -p->inv_lambda * ((f1 + 1) * S[i][j] + (i == j ? f1 : 0));
+            double sum = p->L[i][j] + p->L[j][i]
+                         - p->inv_lambda * ((f1 + 1) * S[gs4i_place[i][j]] + (i == j ? f1 : 0));
             for (k = 0; k < 3; k++) {
-                sum += p->L[i][k] * c[gs4i_place[k][j]] + p->L[j][k] * c[gs4i_place[k][i]]
-                       - p->inv_lambda * p->alpha * S[i][k] * S[k][j];
+                const double ik = S[gs4i_place[i][k]], kj = S[gs4i_place[k][j]];
+                sum += p->L[i][k] * kj + p->L[j][k] * ik - p->inv_lambda * p->alpha * ik * kj;
             }
             rate[gs4i_place[i][j]] = sum;
         }
@@ -11298,7 +11298,7 @@ static void gs4i_split_one(const gs4i_split_batch *batch, int n, gs4i_symmetric 
 {
     const gs4i_elastic_constants *l = batch->constants;
     const double modulus = (double)GS4I_NTH_CONST(batch->G, n), dt = batch->dt;
-    double c[6], before[6], end[6], fast = 0, gap = 1e-290, slope;
+    double S[6], before[6], end[6], fast = 0, gap = 1e-290, slope;
     gs4i_split p;
     int i, j;
     p.inv_lambda = (double)GS4I_NTH_CONST(l->inv_lambda, n);
@@ -11309,24 +11309,23 @@ static void gs4i_split_one(const gs4i_split_batch *batch, int n, gs4i_symmetric 
     p.patience = GS4I_PATIENCE;
     for (i = 0; i < 3; i++)
         for (j = 0; j < 3; j++) p.L[i][j] = (double)GS4I_NTH(batch->L[3 * i + j], n);
-    for (i = 0; i < 6; i++)
-        before[i] = c[i] = (double)GS4I_NTH_CONST(batch->e->s[i], n) / modulus + (i < 3);
+    for (i = 0; i < 6; i++) before[i] = S[i] = (double)GS4I_NTH_CONST(batch->e->s[i], n) / modulus;
     count->split++;
-    if (gs4i_split_advance(&p, c, dt) != GS4_OK) count->failed = n + 1;
-    for (i = 0; i < 6; i++) GS4I_NTH(after[i], n) = GS4I_C(modulus * (c[i] - (i < 3)));
+    if (gs4i_split_advance(&p, S, dt) != GS4_OK) count->failed = n + 1;
+    for (i = 0; i < 6; i++) GS4I_NTH(after[i], n) = GS4I_C(modulus * S[i]);
     count->bounded += p.bounded;
     count->work += p.work;
     if (!rate) return;
-    gs4i_conformation_rate(&p, c, end);
+    gs4i_split_rate(&p, S, end);
     for (i = 0; i < 6; i++) {
         fast = fmax(fast, fabs(end[i]));
-        gap = fmax(gap, fabs((c[i] - before[i]) / dt - end[i]));
+        gap = fmax(gap, fabs((S[i] - before[i]) / dt - end[i]));
     }
     /* a transient that is over is no part of the rate: there the slope at the end alone */
     slope = (2 * batch->gamma - 1) * fmin(1, fast / gap);
     for (i = 0; i < 6; i++)
         GS4I_NTH(rate[i], n) =
-            GS4I_C(modulus * (slope * (c[i] - before[i]) / dt + (1 - slope) * end[i]));
+            GS4I_C(modulus * (slope * (S[i] - before[i]) / dt + (1 - slope) * end[i]));
 }
 
 /* --- both together ---------------------------------------------------------------------------- */
@@ -11564,14 +11563,12 @@ static void gs4i_weigh_stage(gs4i_solved_elastic *k, const gs4i_elastic *e)
     }
 }
 
-/* S of particle n after its share of the step, from that before, in units of G0: UCM and Oldroyd-B
- * as S, which may be far below c. */
+/* S of particle n after its share of the step, from that before, in units of G0. */
 static void gs4i_follow_one(const gs4i_solved_elastic *k, const gs4i_elastic *e, double L[3][3],
                             int n, double S[6], gs4i_elastic_count *count)
 {
     const gs4i_elastic_constants *l = k->constants;
     const double G = (double)GS4I_NTH_CONST(k->G, n), dt = k->share * (double)k->integrator->dt;
-    double c[6], A[3][3], H[6];
     gs4i_split p;
     int i;
     p.inv_lambda = (double)GS4I_NTH_CONST(l->inv_lambda, n);
@@ -11581,21 +11578,8 @@ static void gs4i_follow_one(const gs4i_solved_elastic *k, const gs4i_elastic *e,
     p.bounded = p.substeps = p.work = 0;
     p.patience = GS4I_PATIENCE;
     memcpy(p.L, L, sizeof p.L);
-    for (i = 0; i < 6; i++) {
-        S[i] = (double)GS4I_NTH_CONST(e->s[i], n) / G;
-        c[i] = S[i] + (i < 3);
-    }
-    if (p.stretch > 0 || !gs4i_is_round(c)) {
-        if (gs4i_split_advance(&p, c, dt) != GS4_OK) count->failed = n + 1;
-        for (i = 0; i < 6; i++) S[i] = c[i] - (i < 3);
-    } else {
-        gs4i_linear_map(&p, dt, A, H);
-        gs4i_convect(A, S);
-        for (i = 0; i < 6; i++) {
-            S[i] += H[i];
-            if (!(fabs(S[i]) < 1e290)) count->failed = n + 1;
-        }
-    }
+    for (i = 0; i < 6; i++) S[i] = (double)GS4I_NTH_CONST(e->s[i], n) / G;
+    if (gs4i_split_advance(&p, S, dt) != GS4_OK) count->failed = n + 1;
     count->bounded += p.bounded;
     count->work += p.work;
 }
@@ -25467,9 +25451,8 @@ static void gs4i_lower(double *dt, double to, const char **by, const char *name)
 }
 
 /* Largest stable dt: what the scheme allows for waves and viscosity; one cell a step, the fall
- * within it included; a velocity gradient that turns or stretches by less than 1; and 1000
- * relaxation times, so that no particle needs more substeps than there may be. `by` is what sets
- * it. Steps of the semi-implicit scheme outlast a fall: what it holds falls no more. */
+ * within it included; and a velocity gradient that turns or stretches by less than 1. `by` is what
+ * sets it. Steps of the semi-implicit scheme outlast a fall: what it holds falls no more. */
 static gs4_real gs4i_stable_dt(const gs4_sim *sim, const gs4i_report *seen, const char **by)
 {
     const gs4i_report r = gs4i_with_both_phases(sim, *seen);
@@ -25478,7 +25461,6 @@ static gs4_real gs4i_stable_dt(const gs4_sim *sim, const gs4i_report *seen, cons
                                                                        : gs4i_fall_of(sim));
     gs4i_waves of;
     double dt;
-    int i;
     of.c = sqrt((double)r.max_sound * (double)r.max_sound + (double)r.max_stiffness);
     of.nu = (double)r.max_viscosity;
     of.least = (double)r.min_viscosity;
@@ -25487,13 +25469,6 @@ static gs4_real gs4i_stable_dt(const gs4_sim *sim, const gs4i_report *seen, cons
     if (speed * dt + 0.5 * fall * dt * dt > h)
         gs4i_lower(&dt, 2 * h / (speed + sqrt(speed * speed + 2 * fall * h)), by, "flow");
     if ((double)r.max_gradient > 0) gs4i_lower(&dt, 1 / (double)r.max_gradient, by, "strain");
-    for (i = 0; i < sim->material_count; i++) {
-        const gs4i_material_constants *l = &sim->constants[i];
-        /* in a solve only pom-pom takes substeps */
-        if (sim->desc.scheme == GS4_SEMI_IMPLICIT && !(l->stretch > 0)) continue;
-        if ((double)l->inv_lambda * dt > 1000)
-            gs4i_lower(&dt, 1000 / (double)l->inv_lambda, by, "relaxation");
-    }
     return GS4I_C(fmin(dt, (double)GS4I_HUGE));
 }
 
@@ -31729,6 +31704,9 @@ GS4_API GS4I_COLD int gs4_estimate(const gs4_sim *sim, gs4_scheme scheme, gs4_in
  * Pom-pom that relaxes faster than a step: that costs at most 30 others, before 5000, or is
  * refused. With anisotropy above 1 results in the bounds differ from before, and stress_bounded
  * counts all particles that came to them. The warning of many substeps is gone.
+ * No step is limited by relaxation times any more, which it was by 1000 of them; gs4_limit_name has
+ * no "relaxation". Semi-implicit: Pom-Pom whose stretch outlasts a step gains no energy where K is
+ * far below G0.
  * gs4_estimate. GS4_NO_SOLIDS and the like leave parts out.
  * The explicit schemes work on eight particles of a cell side by side: a step takes 0.74 to 0.87 of
  * the time it took. So each step may change the order of particles, not only one that sorts. What

@@ -469,8 +469,8 @@ static void test_semi_swelling_shear(void)
     }
 }
 
-/* Sound of it, at c = sqrt((K + 2/3 G0)/rho), of which K alone has 1/30, in steps of 0.6 and 1.8 h/c.
- * GS4 lets it decay, as what strain does within a step counts by its end. */
+/* Sound of it, at c = sqrt((K + 2/3 G0)/rho), of which K alone has 1/30, in steps of 0.6 and
+ * 1.8 h/c. GS4 lets it decay, as what strain does within a step counts by its end. */
 static void test_semi_swelling_sound(void)
 {
     const double G = 150, K = 0.1, w = 2 * acos(-1.0) * sqrt(K + 2.0 / 3 * G), step = 0.35 / w;

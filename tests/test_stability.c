@@ -726,7 +726,7 @@ static void test_stability_names(void)
         { GS4_EXPLICIT, 1000, 10, 0, 1, 0, 0, 0, "viscosity" },
         { GS4_EXPLICIT, 1, 10, 0, 1, 0, 0, 1e7, "elasticity" },
         { GS4_EXPLICIT, 0, 1e-3, 5, 1, 0, 0, 0, "flow" },
-        { GS4_EXPLICIT, 1e-3, 1, 0, 1, 0, 1e-7, 0, "relaxation" },
+        { GS4_EXPLICIT, 1e-3, 1, 0, 1, 0, 1e-7, 0, "elasticity" },
         { GS4_EXPLICIT, 0, 10, 0, 1, 1e-5, 0, 0, "max_dt" },
         { GS4_PARTITIONED, 0, 10, 0, 1, 0, 0, 0, "surface" },
         { GS4_PARTITIONED, 1000, 10, 0, 1, 0, 0, 0, "viscosity" },

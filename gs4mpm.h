@@ -22654,8 +22654,7 @@ static void gs4i_scatter_viscosity(int index, void *context)
         GS4I_BATCH_LOOP(b) {
             const gs4i_wide inv_density = r.constants.inv_density[b],
                             at_least = least / inv_density;
-            gs4i_wide counts;
-            counts = mu[b] + solid[b];
+            gs4i_wide counts = mu[b] + solid[b];
             GS4I_WIDE_MAX(counts, counts, at_least);
             volume[b] = q.x[3][b] * inv_density * J[b];
             give[b] = f->is_fitted ? volume[b] * counts : volume[b] / counts;

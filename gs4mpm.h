@@ -512,6 +512,8 @@
  *                           semi-implicit: at the largest acceleration of the last step instead;
  *                           and the rim of a collider that turns, where the domain can meet it
  *     strain                |grad v| dt <= 1, of colliders too (sqrt(2) |w|)
+ *     relaxation            semi-implicit: dt <= 1000 lambda_b, of Pom-Pom whose stretch_time is
+ *                           longer than that
  * and gs4_step refuses more; gs4_limit_name says which it is. gs4_advance takes the fraction `cfl`
  * of it, and half of that again, up to 7 times, where a step is refused, by an implicit scheme
  * also one whose solve did not converge; the semi-implicit scheme less each time, 2^-22 in all.
@@ -1102,7 +1104,7 @@ GS4_API int gs4_advance_within(gs4_sim *sim, gs4_real duration, const gs4_budget
  * this asked: gs4_last_error says which. */
 GS4_API gs4_real gs4_stable_dt(const gs4_sim *sim);
 
-/* What sets it: "sound", "viscosity", "elasticity", "surface", "flow", "strain" or
+/* What sets it: "sound", "viscosity", "elasticity", "surface", "flow", "strain", "relaxation" or
  * "none"; "max_dt" where that is less than gs4_advance would take. */
 GS4_API const char *gs4_limit_name(const gs4_sim *sim);
 
@@ -25451,7 +25453,10 @@ static void gs4i_lower(double *dt, double to, const char **by, const char *name)
 
 /* Largest stable dt: what the scheme allows for waves and viscosity; one cell a step, the fall
  * within it included; and a velocity gradient that turns or stretches by less than 1. `by` is what
- * sets it. Steps of the semi-implicit scheme outlast a fall: what it holds falls no more. */
+ * sets it. Steps of the semi-implicit scheme outlast a fall: what it holds falls no more. Of
+ * pom-pom whose stretch relaxes more slowly than the rest it strains by the tolerance of the solve,
+ * which G0 remembers while viscosity, G0 lambda_b, is all that stands against it: waves were wrong
+ * at dt/lambda_b of 3e8 in double, 1000 is chosen. */
 static gs4_real gs4i_stable_dt(const gs4_sim *sim, const gs4i_report *seen, const char **by)
 {
     const gs4i_report r = gs4i_with_both_phases(sim, *seen);
@@ -25460,6 +25465,7 @@ static gs4_real gs4i_stable_dt(const gs4_sim *sim, const gs4i_report *seen, cons
                                                                        : gs4i_fall_of(sim));
     gs4i_waves of;
     double dt;
+    int i;
     of.c = sqrt((double)r.max_sound * (double)r.max_sound + (double)r.max_stiffness);
     of.nu = (double)r.max_viscosity;
     of.least = (double)r.min_viscosity;
@@ -25468,6 +25474,11 @@ static gs4_real gs4i_stable_dt(const gs4_sim *sim, const gs4i_report *seen, cons
     if (speed * dt + 0.5 * fall * dt * dt > h)
         gs4i_lower(&dt, 2 * h / (speed + sqrt(speed * speed + 2 * fall * h)), by, "flow");
     if ((double)r.max_gradient > 0) gs4i_lower(&dt, 1 / (double)r.max_gradient, by, "strain");
+    for (i = 0; i < sim->material_count && sim->desc.scheme == GS4_SEMI_IMPLICIT; i++) {
+        const gs4i_material_constants *l = &sim->constants[i];
+        if (l->stretch > 0 && l->stretch < 2 && (double)l->inv_lambda * dt > 1000)
+            gs4i_lower(&dt, 1000 / (double)l->inv_lambda, by, "relaxation");
+    }
     return GS4I_C(fmin(dt, (double)GS4I_HUGE));
 }
 
@@ -31703,9 +31714,8 @@ GS4_API GS4I_COLD int gs4_estimate(const gs4_sim *sim, gs4_scheme scheme, gs4_in
  * Pom-pom that relaxes faster than a step: that costs at most 30 others, before 5000, or is
  * refused. With anisotropy above 1 results in the bounds differ from before, and stress_bounded
  * counts all particles that came to them. The warning of many substeps is gone.
- * No step is limited by relaxation times any more, which it was by 1000 of them; gs4_limit_name has
- * no "relaxation". Semi-implicit: Pom-Pom whose stretch outlasts a step gains no energy where K is
- * far below G0.
+ * Relaxation times limit steps no more, which they did to 1000 of them, but semi-implicit ones of
+ * Pom-Pom with a longer stretch_time. Such Pom-Pom gains no energy where K is far below G0.
  * gs4_estimate. GS4_NO_SOLIDS and the like leave parts out.
  * The explicit schemes work on eight particles of a cell side by side: a step takes 0.74 to 0.87 of
  * the time it took. So each step may change the order of particles, not only one that sorts. What

@@ -382,12 +382,13 @@
  * Pom-Pom, so it stays positive definite at any dt; w is such that L is that of the mean age of
  * what a step gives to S. Stress of the stage goes on from S over alpha_f dt likewise, so it is
  * 2 mu_p D~ where dt is far above lambda_b, whatever the member; mixed cells weigh what is known of
- * it by 1/mu, as they do mu. Order in time 1.9 to 2.1 in x, v and S; shear waves at 32 cells a wave
- * within 1 % in steps ten times those of the explicit scheme. L~ is by the solve's own differences;
- * at sticky walls of the domain L and q go on straight (at sticky colliders the nearest of L is
- * taken: to first order). Poiseuille flow of Oldroyd-B and UCM in steps of 100 times the explicit
- * limit has the error of Newton's liquid within 20 % of it, stress within .5 %. All work of S heats
- * at once.
+ * it by 1/mu, as they do mu. Where stretch of Pom-Pom outlasts the step, and all else relaxes
+ * within it, swelling has up to 2/3 G0 beside K; the solve has that, too. Order in time 1.9 to 2.1
+ * in x, v and S; shear waves at 32 cells a wave within 1 % in steps ten times those of the explicit
+ * scheme. L~ is by the solve's own differences; at sticky walls of the domain L and q go on
+ * straight (at sticky colliders the nearest of L is taken: to first order). Poiseuille flow of
+ * Oldroyd-B and UCM in steps of 100 times the explicit limit has the error of Newton's liquid
+ * within 20 % of it, stress within .5 %. All work of S heats at once.
  *
  *     In scenes with solids all stress is that of particles, as in the partitioned scheme, at the
  * stage that u~ leads to:
@@ -524,8 +525,9 @@
  *     flow                  one cell a step along each axis, the fall within the step included,
  *                           semi-implicit: at the largest acceleration of the last step instead;
  *                           and the rim of a collider that turns, where the domain can meet it
- *     strain, relaxation    |grad v| dt <= 1, of colliders too (sqrt(2) |w|),  dt <= 1000 lambda_b
- *                           (semi-implicit: of Pom-Pom alone)
+ *     strain                |grad v| dt <= 1, of colliders too (sqrt(2) |w|)
+ *     relaxation            semi-implicit: dt <= 1000 lambda_b, of Pom-Pom whose stretch_time is
+ *                           longer than that
  * and gs4_step refuses more; gs4_limit_name says which it is. gs4_advance takes the fraction `cfl`
  * of it, and half of that again, up to 7 times, where a step is refused, by an implicit scheme
  * also one whose solve did not converge; the semi-implicit scheme less each time, 2^-22 in all.
@@ -10731,14 +10733,16 @@ static void gs4i_eigen(const double m[6], double values[3], double Q[3][3])
 }
 
 /* Is the smallest eigenvalue more than what rounding of the largest makes of it? By det / (sum of
- * principal minors), which is a third of it to all of it. 1e-11, chosen, is 1e5 roundings. */
+ * principal minors), which is a third of it to all of it. 1e-11, chosen, is 1e5 roundings. Where
+ * two are small det itself may be rounding, of the cube of the largest: 1e-14 of that is 50. */
 static int gs4i_is_round(const double m[6])
 {
     const double minors =
         (m[0] * m[1] - m[3] * m[3]) + (m[0] * m[2] - m[4] * m[4]) + (m[1] * m[2] - m[5] * m[5]);
     const double det = m[0] * (m[1] * m[2] - m[5] * m[5]) - m[3] * (m[3] * m[2] - m[5] * m[4])
                        + m[4] * (m[3] * m[5] - m[1] * m[4]);
-    return minors > 0 && det > 1e-11 * (m[0] + m[1] + m[2]) * minors;
+    const double sum = m[0] + m[1] + m[2];
+    return minors > 0 && det > 1e-11 * sum * minors && det > 1e-14 * sum * sum * sum;
 }
 
 /* Q diag(values) Q^T */
@@ -10803,10 +10807,22 @@ static void gs4i_convect(double E[3][3], double m[6])
             m[gs4i_place[i][j]] = T[i][0] * E[j][0] + T[i][1] * E[j][1] + T[i][2] * E[j][2];
 }
 
+/* Neither underflown to 0 nor overflown? */
+static int gs4i_is_something(double A[3][3])
+{
+    double size = 0;
+    int i, j;
+    for (i = 0; i < 3; i++)
+        for (j = 0; j < 3; j++) size += fabs(A[i][j]);
+    return size > 0 && size < 1e300;
+}
+
 /* UCM and Oldroyd-B are linear: dS/dt = K S + S K^T + L + L^T, K = L - I/(2 lambda_b). So
  * S <- A S A^T + H, A = exp(K dt), exact for constant L. Both come by series over dt / 2^n, entries
- * of K dt / 2^n at most 1/64, and are doubled n times. Eight terms leave about 1e-14 of H. */
-static void gs4i_linear_map(const gs4i_split *p, double dt, double A[3][3], double H[6])
+ * of K dt / 2^n at most 1/64, and are doubled n times, or until A is nothing and H steady: where a
+ * step strains by at most 1, 18 times, however fast all relaxes. Eight terms leave about 1e-14 of
+ * H. Returns how often. */
+static int gs4i_linear_map(const gs4i_split *p, double dt, double A[3][3], double H[6])
 {
     double K[3][3], M[3][3], T[3][3], size = 0, factor;
     int i, j, k, n = 0;
@@ -10831,29 +10847,31 @@ static void gs4i_linear_map(const gs4i_split *p, double dt, double A[3][3], doub
         for (i = 0; i < 3; i++)
             for (j = 0; j < 3; j++) M[i][j] = T[i][j] + T[j][i];
     }
-    for (k = 0; k < n; k++) {
+    for (k = 0; k < n && gs4i_is_something(A); k++) {
         double later[6];
         memcpy(later, H, sizeof later);
         gs4i_convect(A, later);
         for (i = 0; i < 6; i++) H[i] += later[i];
         gs4i_multiply3(A, A, A);
     }
+    return k;
 }
 
-static void gs4i_linear_advance(const gs4i_split *p, double c[6], double dt)
+static void gs4i_linear_advance(const gs4i_split *p, double S[6], double dt)
 {
-    double A[3][3], T[3][3], H[6], values[3];
+    double A[3][3], T[3][3], H[6], c[6], values[3];
     int i;
+    for (i = 0; i < 6; i++) c[i] = S[i] + (i < 3);
     gs4i_linear_map(p, dt, A, H);
     /* what rounding made negative of a thin ellipsoid: flow would draw it out */
     if (!gs4i_is_round(c)) {
         gs4i_eigen(c, values, T);
         for (i = 0; i < 3; i++) values[i] = values[i] > 0 ? values[i] : 0;
         gs4i_recompose(T, values, c);
+        for (i = 0; i < 6; i++) S[i] = c[i] - (i < 3);
     }
-    for (i = 0; i < 3; i++) c[i] -= 1;
-    gs4i_convect(A, c);
-    for (i = 0; i < 6; i++) c[i] += H[i] + (i < 3);
+    gs4i_convect(A, S);
+    for (i = 0; i < 6; i++) S[i] += H[i];
 }
 
 /* --- pom-pom ---------------------------------------------------------------------------------- *
@@ -11209,7 +11227,7 @@ static int gs4i_adaptive_substep(gs4i_split *p, const gs4i_unsplit *q, gs4i_doub
 }
 
 /* S after the time `left`; 0, or GS4_ERROR_UNSTABLE. */
-static int gs4i_unsplit_advance(gs4i_split *p, double c[6], double dt)
+static int gs4i_unsplit_advance(gs4i_split *p, double after[6], double dt)
 {
     double left = dt * p->inv_lambda, guess = left, S[8] = { 0, 0, 0, 0, 0, 0, 0, 0 };
     int i, j, outside;
@@ -11225,7 +11243,7 @@ static int gs4i_unsplit_advance(gs4i_split *p, double c[6], double dt)
             q.tilt += q.K[i][j] * q.K[i][j];
         }
     q.tilt = sqrt(q.tilt);
-    for (i = 0; i < 6; i++) S[i] = c[i] - (i < 3);
+    memcpy(S, after, 6 * sizeof *S);
     outside = !gs4i_is_smooth(&q, S);
     if (outside && !(q.alpha > 1)) {
         gs4i_bound(&q, S);
@@ -11245,44 +11263,41 @@ static int gs4i_unsplit_advance(gs4i_split *p, double c[6], double dt)
         gs4i_bounded_advance(p, &q, &w, S, left);
         left = 0;
     }
-    for (i = 0; i < 6; i++) {
-        c[i] = S[i] + (i < 3);
-        if (!(fabs(c[i]) < 1e290)) return GS4_ERROR_UNSTABLE;
-    }
+    memcpy(after, S, 6 * sizeof *S);
+    for (i = 0; i < 6; i++)
+        if (!(fabs(S[i]) < 1e290)) return GS4_ERROR_UNSTABLE;
     return left > 0 ? GS4_ERROR_UNSTABLE : GS4_OK;
 }
 
-/* Conformation after the time dt under constant L. 0, or GS4_ERROR_UNSTABLE where it overflows or
- * takes too much work. */
-static int gs4i_split_advance(gs4i_split *p, double c[6], double dt)
+/* S, which may be far below c, after the time dt under constant L. 0, or GS4_ERROR_UNSTABLE where
+ * it overflows or takes too much work. */
+static int gs4i_split_advance(gs4i_split *p, double S[6], double dt)
 {
     int i;
-    if (p->stretch > 0) return gs4i_unsplit_advance(p, c, dt);
-    gs4i_linear_advance(p, c, dt);
+    if (p->stretch > 0) return gs4i_unsplit_advance(p, S, dt);
+    gs4i_linear_advance(p, S, dt);
     for (i = 0; i < 6; i++)
-        if (!(fabs(c[i]) < 1e290)) return GS4_ERROR_UNSTABLE;
+        if (!(fabs(S[i]) < 1e290)) return GS4_ERROR_UNSTABLE;
     return GS4_OK;
 }
 
-/* dc/dt = L c + c L^T - [f c - I + alpha (c - I)^2] / lambda_b */
-static void gs4i_conformation_rate(const gs4i_split *p, const double c[6], double rate[6])
+/* dS/dt of (5), in G0 */
+static void gs4i_split_rate(const gs4i_split *p, const double S[6], double rate[6])
 {
-    double S[3][3], f1 = 0, stiff, squares = 0;
+    double f1 = 0, stiff;
     int i, j, k;
-    for (i = 0; i < 3; i++)
-        for (j = 0; j < 3; j++) {
-            S[i][j] = c[gs4i_place[i][j]] - (i == j);
-            squares += S[i][j] * S[i][j];
-        }
     if (p->stretch > 0)
-        gs4i_pom_pom(p->stretch, p->nu, p->alpha, (S[0][0] + S[1][1] + S[2][2]) / 3, squares, &f1,
-                     &stiff);
+        gs4i_pom_pom(p->stretch, p->nu, p->alpha, (S[0] + S[1] + S[2]) / 3,
+                     S[0] * S[0] + S[1] * S[1] + S[2] * S[2]
+                         + 2 * (S[3] * S[3] + S[4] * S[4] + S[5] * S[5]),
+                     &f1, &stiff);
     for (i = 0; i < 3; i++)
         for (j = i; j < 3; j++) {
-            double sum = -p->inv_lambda * ((f1 + 1) * S[i][j] + (i == j ? f1 : 0));
+            double sum = p->L[i][j] + p->L[j][i]
+                         - p->inv_lambda * ((f1 + 1) * S[gs4i_place[i][j]] + (i == j ? f1 : 0));
             for (k = 0; k < 3; k++) {
-                sum += p->L[i][k] * c[gs4i_place[k][j]] + p->L[j][k] * c[gs4i_place[k][i]]
-                       - p->inv_lambda * p->alpha * S[i][k] * S[k][j];
+                const double ik = S[gs4i_place[i][k]], kj = S[gs4i_place[k][j]];
+                sum += p->L[i][k] * kj + p->L[j][k] * ik - p->inv_lambda * p->alpha * ik * kj;
             }
             rate[gs4i_place[i][j]] = sum;
         }
@@ -11327,7 +11342,7 @@ static void gs4i_split_one(const gs4i_split_batch *batch, int n, gs4i_symmetric 
 {
     const gs4i_elastic_constants *l = batch->constants;
     const double modulus = (double)GS4I_NTH_CONST(batch->G, n), dt = batch->dt;
-    double c[6], before[6], end[6], fast = 0, gap = 1e-290, slope;
+    double S[6], before[6], end[6], fast = 0, gap = 1e-290, slope;
     gs4i_split p;
     int i, j;
     p.inv_lambda = (double)GS4I_NTH_CONST(l->inv_lambda, n);
@@ -11338,24 +11353,23 @@ static void gs4i_split_one(const gs4i_split_batch *batch, int n, gs4i_symmetric 
     p.patience = GS4I_PATIENCE;
     for (i = 0; i < 3; i++)
         for (j = 0; j < 3; j++) p.L[i][j] = (double)GS4I_NTH(batch->L[3 * i + j], n);
-    for (i = 0; i < 6; i++)
-        before[i] = c[i] = (double)GS4I_NTH_CONST(batch->e->s[i], n) / modulus + (i < 3);
+    for (i = 0; i < 6; i++) before[i] = S[i] = (double)GS4I_NTH_CONST(batch->e->s[i], n) / modulus;
     count->split++;
-    if (gs4i_split_advance(&p, c, dt) != GS4_OK) count->failed = n + 1;
-    for (i = 0; i < 6; i++) GS4I_NTH(after[i], n) = GS4I_C(modulus * (c[i] - (i < 3)));
+    if (gs4i_split_advance(&p, S, dt) != GS4_OK) count->failed = n + 1;
+    for (i = 0; i < 6; i++) GS4I_NTH(after[i], n) = GS4I_C(modulus * S[i]);
     count->bounded += p.bounded;
     count->work += p.work;
     if (!rate) return;
-    gs4i_conformation_rate(&p, c, end);
+    gs4i_split_rate(&p, S, end);
     for (i = 0; i < 6; i++) {
         fast = fmax(fast, fabs(end[i]));
-        gap = fmax(gap, fabs((c[i] - before[i]) / dt - end[i]));
+        gap = fmax(gap, fabs((S[i] - before[i]) / dt - end[i]));
     }
     /* a transient that is over is no part of the rate: there the slope at the end alone */
     slope = (2 * batch->gamma - 1) * fmin(1, fast / gap);
     for (i = 0; i < 6; i++)
         GS4I_NTH(rate[i], n) =
-            GS4I_C(modulus * (slope * (c[i] - before[i]) / dt + (1 - slope) * end[i]));
+            GS4I_C(modulus * (slope * (S[i] - before[i]) / dt + (1 - slope) * end[i]));
 }
 
 /* --- both together ---------------------------------------------------------------------------- */
@@ -11508,8 +11522,20 @@ static void gs4i_correct_elastic(const gs4i_elastic_constants *l, gs4i_elastic *
  *
  *     2 eta = 2 weight G0 alpha_f dt (1 - exp(-alpha_f z))/(alpha_f z)                        (VE2)
  *
- * which the solve has as viscosity; what is left, q = S~(L*) - 2 eta D*, is known before it, with
- * L* of what particles gave. For small stress q does not depend on L*. That of S~ on D~ as a
+ * which the solve has as viscosity. Of pom-pom that is so without the trace: where stretch relaxes
+ * more slowly than the rest, z_s < z,
+ *
+ *     d(Lam^2)/dt = 2/3 c:D - (2 r/lambda_b) exp(nu (Lam - 1)) (Lam^2 - Lam),
+ *
+ * swelling has a stress of its own, beside that of K. The solve has it with its pressure, as
+ *
+ *     kappa = (2/3) weight G0 alpha_f dt [(1 - exp(-alpha_f z_s))/(alpha_f z_s)
+ *                                         - (1 - exp(-alpha_f z))/(alpha_f z)]               (VE3)
+ *     p + (s K + kappa) div u~ = -K (J** - 1).
+ *
+ * Where K was far below G0, steps beyond c dt = h/2 of what the solve did not know gained energy.
+ * What is left, q = S~(L*) - 2 eta D* - kappa div v* I, is known before it, with L* of what
+ * particles gave. For small stress q does not depend on L*. That of S~ on D~ as a
  * transfer function has no negative real part on the unit circle: elastic waves are stable at any
  * dt. In the place of rates particles keep L'. */
 typedef struct gs4i_solved_elastic {
@@ -11518,6 +11544,7 @@ typedef struct gs4i_solved_elastic {
     const gs4i_integrator *integrator;
     double share;                 /* of the step: alpha_f to its stage, or 1 */
     gs4i_lanes weight, eta, left; /* (VE1), (VE2); share of S that is left of its growth */
+    gs4i_lanes swelling;          /* (VE3) */
     int n;
 } gs4i_solved_elastic;
 
@@ -11527,6 +11554,29 @@ static double gs4i_left_of_growth(double z)
     return z > 1e-3 ? -expm1(-z) / z : 1 - z * (0.5 - z / 6);
 }
 
+/* z of particle n, and the same of Lam^2, from those of lambda_b. */
+static void gs4i_relaxation_of(const gs4i_solved_elastic *k, const gs4i_elastic *e, int n,
+                               double *z, double *swelling)
+{
+    const gs4i_elastic_constants *l = k->constants;
+    const double G = (double)GS4I_NTH_CONST(k->G, n),
+                 stretch = (double)GS4I_NTH_CONST(l->stretch, n),
+                 nu = (double)GS4I_NTH_CONST(l->nu, n);
+    double trace3 = 0, squares = 0, f1, stiff, Lam;
+    int i;
+    if (!(stretch > 0)) return;
+    for (i = 0; i < 6; i++) {
+        const double s = (double)GS4I_NTH_CONST(e->s[i], n) / G;
+        trace3 += i < 3 ? s / 3 : 0;
+        squares += (i < 3 ? 1 : 2) * s * s;
+    }
+    gs4i_pom_pom(stretch, nu, (double)GS4I_NTH_CONST(l->alpha, n), trace3, squares, &f1, &stiff);
+    *z *= fmax(1 + f1, 0);
+    Lam = sqrt(fmax(1 + trace3, 0.25)); /* below, Lam^2 grows: taken as slow */
+    *swelling *= stretch * exp(fmin(nu * (Lam - 1), 300)) * (1 - 0.5 / Lam + 0.5 * nu * (Lam - 1));
+    *swelling = fmax(*swelling, 0);
+}
+
 static void gs4i_weigh_stage(gs4i_solved_elastic *k, const gs4i_elastic *e)
 {
     const gs4i_elastic_constants *l = k->constants;
@@ -11534,42 +11584,35 @@ static void gs4i_weigh_stage(gs4i_solved_elastic *k, const gs4i_elastic *e)
     const double dt = (double)r->dt, ratio = (double)r->affine_ratio, ahead = (double)r->alpha_f,
                  past = ratio > 0 ? (1 - ahead) / ratio : 0,
                  aged = k->share < 1 ? 2 * ahead - 1 : 1; /* by how much of the age */
-    int n, i;
+    int n;
     memset(k->weight, 0, sizeof k->weight);
     memset(k->eta, 0, sizeof k->eta);
     memset(k->left, 0, sizeof k->left);
+    memset(k->swelling, 0, sizeof k->swelling);
     for (n = 0; n < k->n; n++) {
         const double G = (double)GS4I_NTH_CONST(k->G, n);
-        double z = (double)GS4I_NTH_CONST(l->inv_lambda, n) * dt, age, weight = 1;
+        double z = (double)GS4I_NTH_CONST(l->inv_lambda, n) * dt, swelling = z, age, weight = 1;
         if (!(G > (double)GS4I_TINY)) continue;
-        if (GS4I_NTH_CONST(l->stretch, n) > 0) {
-            double trace3 = 0, squares = 0, f1, stiff;
-            for (i = 0; i < 6; i++) {
-                const double s = (double)GS4I_NTH_CONST(e->s[i], n) / G;
-                trace3 += i < 3 ? s / 3 : 0;
-                squares += (i < 3 ? 1 : 2) * s * s;
-            }
-            gs4i_pom_pom((double)GS4I_NTH_CONST(l->stretch, n), (double)GS4I_NTH_CONST(l->nu, n),
-                         (double)GS4I_NTH_CONST(l->alpha, n), trace3, squares, &f1, &stiff);
-            z *= fmax(1 + f1, 0);
-        }
+        gs4i_relaxation_of(k, e, n, &z, &swelling);
         age = z > 1e-3 ? 1 / z - 1 / expm1(z) : 0.5 - z / 12;
         if (ratio > 0) weight = (k->share - aged * age + past) / (ahead + past);
         GS4I_NTH(k->weight, n) = GS4I_C(weight);
         GS4I_NTH(k->left, n) = GS4I_C(gs4i_left_of_growth(z));
         GS4I_NTH(k->eta, n) =
             GS4I_C(k->share * weight * G * dt * gs4i_left_of_growth(k->share * z));
+        if (swelling < z)
+            GS4I_NTH(k->swelling, n) = GS4I_C(
+                2.0 / 3 * k->share * weight * G * dt
+                * (gs4i_left_of_growth(k->share * swelling) - gs4i_left_of_growth(k->share * z)));
     }
 }
 
-/* S of particle n after its share of the step, from that before, in units of G0: UCM and Oldroyd-B
- * as S, which may be far below c. */
+/* S of particle n after its share of the step, from that before, in units of G0. */
 static void gs4i_follow_one(const gs4i_solved_elastic *k, const gs4i_elastic *e, double L[3][3],
                             int n, double S[6], gs4i_elastic_count *count)
 {
     const gs4i_elastic_constants *l = k->constants;
     const double G = (double)GS4I_NTH_CONST(k->G, n), dt = k->share * (double)k->integrator->dt;
-    double c[6], A[3][3], H[6];
     gs4i_split p;
     int i;
     p.inv_lambda = (double)GS4I_NTH_CONST(l->inv_lambda, n);
@@ -11579,21 +11622,8 @@ static void gs4i_follow_one(const gs4i_solved_elastic *k, const gs4i_elastic *e,
     p.bounded = p.substeps = p.work = 0;
     p.patience = GS4I_PATIENCE;
     memcpy(p.L, L, sizeof p.L);
-    for (i = 0; i < 6; i++) {
-        S[i] = (double)GS4I_NTH_CONST(e->s[i], n) / G;
-        c[i] = S[i] + (i < 3);
-    }
-    if (p.stretch > 0 || !gs4i_is_round(c)) {
-        if (gs4i_split_advance(&p, c, dt) != GS4_OK) count->failed = n + 1;
-        for (i = 0; i < 6; i++) S[i] = c[i] - (i < 3);
-    } else {
-        gs4i_linear_map(&p, dt, A, H);
-        gs4i_convect(A, S);
-        for (i = 0; i < 6; i++) {
-            S[i] += H[i];
-            if (!(fabs(S[i]) < 1e290)) count->failed = n + 1;
-        }
-    }
+    for (i = 0; i < 6; i++) S[i] = (double)GS4I_NTH_CONST(e->s[i], n) / G;
+    if (gs4i_split_advance(&p, S, dt) != GS4_OK) count->failed = n + 1;
     count->bounded += p.bounded;
     count->work += p.work;
 }
@@ -11651,7 +11681,10 @@ static void gs4i_known_stress(const gs4i_solved_elastic *k, const gs4i_elastic *
     gs4i_follow_flow(k, e, L, stage, count);
     gs4i_strain_rate(L, D);
     for (c = 0; c < 6; c++)
-        GS4I_BATCH_LOOP(b) q[c][b] = stage[c][b] - 2 * k->eta[b] * D[c][b];
+        GS4I_BATCH_LOOP(b) {
+            q[c][b] = stage[c][b] - 2 * k->eta[b] * D[c][b];
+            if (c < 3) q[c][b] -= k->swelling[b] * (D[0][b] + D[1][b] + D[2][b]);
+        }
 }
 
 /* Density times the squared speed of elastic waves of each particle, Pa: 2 G0 c_max at most. The
@@ -12936,6 +12969,7 @@ typedef struct gs4i_response {
     gs4i_elastic_constants elastic;
     gs4i_solid_constants solid;
     gs4i_seen seen;
+    gs4i_lanes swelling; /* (VE3) of the batch */
 } gs4i_response;
 
 /* Turn to particles i to i + n: constants, and the temperature at the stage (Euler: now), which
@@ -13119,11 +13153,13 @@ static void gs4i_stress_to_solve(gs4i_response *r, gs4i_gradient L, const gs4i_w
     gs4i_see_thinnest(&r->seen, &r->constants, mu);
     memset(eta, 0, sizeof(gs4i_lanes));
     memset(solid, 0, sizeof(gs4i_lanes));
+    memset(r->swelling, 0, sizeof r->swelling);
     if (GS4I_WITH_SOLIDS && r->p->deformation_reals) gs4i_tangent_of_solid(r, L, J, solid);
     if (!GS4I_WITH_VISCOELASTIC || !r->p->elastic_reals || r->report->bad) return;
     k = gs4i_begin_solved(r, L, (double)r->integrator->alpha_f, G, &e, &count);
     gs4i_known_stress(&k, &e, L, q, stage, &count);
     memcpy(eta, k.eta, sizeof k.eta);
+    memcpy(r->swelling, k.swelling, sizeof k.swelling);
     gs4i_see_elastic(G, stage, stiffness);
     GS4I_BATCH_LOOP(b) stiffness[b] = (GS4I_C(0.5) * stiffness[b] - G[b]) * k.left[b];
     gs4i_see_elastic_count(r, &count);
@@ -15189,6 +15225,7 @@ typedef struct gs4i_staggered {
     gs4_real *force[3], *reach[3]; /* of stress; c of [[poisson]] at faces */
     /* where viscosity is in the solve, for [[stokes]]; NULL else */
     gs4_real *viscosity;                        /* of cells, Pa s */
+    gs4_real *swelling;                         /* (VE3) of cells, Pa s; NULL else */
     gs4_real *mass[3], *impulse[3], *solved[3]; /* its M, b and u */
     gs4_real *edge[3];                          /* what rows of edges count */
     /* where stress is, too: q of cells along axis a, of edges along e, and volume there; then
@@ -19172,12 +19209,13 @@ static void gs4i_fit_staggered(gs4i_staggered *f, const gs4i_grid *g, const gs4_
     }
 }
 
-/* Fields of viscosity in the solve: 13 numbers; of stress 9 more, of bodies 3. */
+/* Fields of viscosity in the solve: 13 numbers; of stress 10 more, of bodies 3. */
 static void gs4i_take_implicit(gs4i_staggered *f, int stress, int bodies)
 {
     const size_t real = sizeof(gs4_real);
     int a;
     f->viscosity = (gs4_real *)gs4i_box_take(&f->box, real);
+    f->swelling = stress ? (gs4_real *)gs4i_box_take(&f->box, real) : NULL;
     for (a = 0; a < 3; a++) {
         f->mass[a] = (gs4_real *)gs4i_box_take(&f->box, real);
         f->impulse[a] = (gs4_real *)gs4i_box_take(&f->box, real);
@@ -19286,6 +19324,8 @@ static void gs4i_clear_staggered(int z, void *context)
         memset(field + 4 * from, 0, 4 * n * sizeof *field);
         if (c < 3 && f->force[c]) memset(f->force[c] + from, 0, n * sizeof *field);
         if (c == 3 && f->is_implicit) memset(f->viscosity + from, 0, n * sizeof *field);
+        if (c == 3 && f->is_implicit && f->swelling)
+            memset(f->swelling + from, 0, n * sizeof *field);
     }
     if (f->is_implicit && f->normal[0]) gs4i_clear_stress(f, z);
 }
@@ -19323,7 +19363,7 @@ static int gs4i_begin_staggered(gs4_sim *sim)
     f->is_fitted = sim->particles.deformation_reals > 0;
     if (f->is_implicit)
         bytes +=
-            (size_t)((elastic ? 22 : 13) + (bodies && !f->is_fitted ? 3 : 0)) * sizeof(gs4_real) + 6
+            (size_t)((elastic ? 23 : 13) + (bodies && !f->is_fitted ? 3 : 0)) * sizeof(gs4_real) + 6
             + (f->is_fitted ? 3 * sizeof(double) : 0);
     if (stress && (!f->is_implicit || f->is_fitted)) bytes += 3 * sizeof(gs4_real);
     gs4i_fit_staggered(f, &sim->grid, sim->desc.walls);
@@ -20134,6 +20174,11 @@ static void gs4i_classify_cells(int z, void *context)
         f->kind[i] = q[GS4I_CELL_FILL] > GS4I_C(GS4I_LIQUID_FILL) ? GS4_CELL_LIQUID : GS4_CELL_AIR;
         if (q[GS4I_CELL_SOLID] > GS4I_C(0.95)) f->kind[i] = GS4_CELL_SOLID;
         f->diagonal[i] = q[GS4I_CELL_COMPLIANCE] / pass->sim->integrator.s;
+        if (f->is_implicit && f->swelling) { /* 1/(s K + kappa), and what that makes of J** - 1 */
+            const gs4_real share = 1 / (1 + f->swelling[i] * f->diagonal[i]);
+            f->diagonal[i] *= share;
+            q[GS4I_CELL_DILATION] *= share;
+        }
         if (!f->is_revised) f->pressure[i] = 0;
         for (a = 0; a < 3; a++)
             if (at[a] < f->from[a] || at[a] >= f->to[a])
@@ -22677,14 +22722,18 @@ static void gs4i_take_trace(gs4i_gradient L)
  * for q its mean weighed by 1/mu. Weighed by volume q of a stiff one would pull at cells that have
  * the viscosity of a thin one to bear it. */
 typedef struct gs4i_stress_tiles {
-    gs4i_number_tile resistance, normal[3], shear[3], weight[3];
+    gs4i_number_tile resistance, swelling, normal[3], shear[3], weight[3];
 } gs4i_stress_tiles;
 
 static void gs4i_scatter_known_stress(gs4i_stress_tiles *t, const gs4i_stencils s[4], int n,
-                                      const gs4i_wide *give, gs4i_symmetric q)
+                                      const gs4i_wide *give, gs4i_symmetric q,
+                                      const gs4i_wide *swelling)
 {
     gs4i_stencils edge;
     int b, e;
+    for (b = 0; b < n; b++)
+        gs4i_scatter_single(t->swelling, &s[0], b,
+                            GS4I_NTH_CONST(give, b) * GS4I_NTH_CONST(swelling, b));
     for (e = 0; e < 3; e++) {
         const int across = gs4i_place[(e + 1) % 3][(e + 2) % 3];
         gs4i_edge_stencil(s, e, &edge);
@@ -22754,16 +22803,16 @@ static void gs4i_scatter_viscosity(int index, void *context)
         GS4I_BATCH_LOOP(b) {
             const gs4i_wide inv_density = r.constants.inv_density[b],
                             at_least = least / inv_density;
-            gs4i_wide counts;
-            counts = mu[b] + solid[b];
+            gs4i_wide counts = mu[b] + solid[b];
             GS4I_WIDE_MAX(counts, counts, at_least);
             volume[b] = q.x[3][b] * inv_density * J[b];
             give[b] = f->is_fitted ? volume[b] * counts : volume[b] / counts;
         }
         for (b = 0; b < n; b++) gs4i_scatter_single(tiles.resistance, &s[0], b, GS4I_NTH(give, b));
-        if (known) gs4i_scatter_known_stress(&tiles, s, n, give, sigma);
+        if (known) gs4i_scatter_known_stress(&tiles, s, n, give, sigma, r.swelling);
     }
     gs4i_add_face_tile(sim, o, GS4I_AT_CELL, 1, tiles.resistance, f->viscosity);
+    if (known) gs4i_add_face_tile(sim, o, GS4I_AT_CELL, 1, tiles.swelling, f->swelling);
     for (c = 0; c < 3 && known; c++) {
         gs4i_add_face_tile(sim, o, GS4I_AT_CELL, 1, tiles.normal[c], f->normal[c]);
         gs4i_add_face_tile(sim, o, 7 ^ 1 << c, 1, tiles.shear[c], f->shear[c]);
@@ -22810,6 +22859,7 @@ static void gs4i_find_viscosities(int z, void *context)
             f->viscosity[i] = !(V > 0 && sum > 0) ? GS4I_C(0) : f->is_fitted ? sum / V : V / sum;
             f->viscosity[i] *= gs4i_open_share_of_cell(f, i);
             for (a = 0; a < 3 && elastic; a++) f->normal[a][i] /= gs4i_max(sum, GS4I_TINY);
+            if (elastic) f->swelling[i] /= gs4i_max(sum, GS4I_TINY);
         }
     for (a = 0; a < 3 && elastic; a++)
         if (z < gs4i_box_length(&f->box, 7 ^ 1 << a, 2))
@@ -22822,6 +22872,8 @@ static void gs4i_fold_known_stress(gs4_sim *sim)
 {
     gs4i_staggered *f = &sim->staggered;
     int a;
+    gs4i_each_mirror(sim, GS4I_AT_CELL, f->swelling, gs4i_fold_number);
+    gs4i_wrap_cells(sim, f->swelling, 1);
     for (a = 0; a < 3; a++) {
         gs4i_each_mirror(sim, GS4I_AT_CELL, f->normal[a], gs4i_fold_number);
         gs4i_each_mirror(sim, 7 ^ 1 << a, f->shear[a], gs4i_fold_number);
@@ -25553,9 +25605,11 @@ static void gs4i_lower(double *dt, double to, const char **by, const char *name)
 }
 
 /* Largest stable dt: what the scheme allows for waves and viscosity; one cell a step, the fall
- * within it included; a velocity gradient that turns or stretches by less than 1; and 1000
- * relaxation times, so that no particle needs more substeps than there may be. `by` is what sets
- * it. Steps of the semi-implicit scheme outlast a fall: what it holds falls no more. */
+ * within it included; and a velocity gradient that turns or stretches by less than 1. `by` is what
+ * sets it. Steps of the semi-implicit scheme outlast a fall: what it holds falls no more. Of
+ * pom-pom whose stretch relaxes more slowly than the rest it strains by the tolerance of the solve,
+ * which G0 remembers while viscosity, G0 lambda_b, is all that stands against it: waves were wrong
+ * at dt/lambda_b of 3e8 in double, 1000 is chosen. */
 static gs4_real gs4i_stable_dt(const gs4_sim *sim, const gs4i_report *seen, const char **by)
 {
     const gs4i_report r = gs4i_with_both_phases(sim, *seen);
@@ -25573,11 +25627,9 @@ static gs4_real gs4i_stable_dt(const gs4_sim *sim, const gs4i_report *seen, cons
     if (speed * dt + 0.5 * fall * dt * dt > h)
         gs4i_lower(&dt, 2 * h / (speed + sqrt(speed * speed + 2 * fall * h)), by, "flow");
     if ((double)r.max_gradient > 0) gs4i_lower(&dt, 1 / (double)r.max_gradient, by, "strain");
-    for (i = 0; i < sim->material_count; i++) {
+    for (i = 0; i < sim->material_count && sim->desc.scheme == GS4_SEMI_IMPLICIT; i++) {
         const gs4i_material_constants *l = &sim->constants[i];
-        /* in a solve only pom-pom takes substeps */
-        if (sim->desc.scheme == GS4_SEMI_IMPLICIT && !(l->stretch > 0)) continue;
-        if ((double)l->inv_lambda * dt > 1000)
+        if (l->stretch > 0 && l->stretch < 2 && (double)l->inv_lambda * dt > 1000)
             gs4i_lower(&dt, 1000 / (double)l->inv_lambda, by, "relaxation");
     }
     return GS4I_C(fmin(dt, (double)GS4I_HUGE));
@@ -31835,6 +31887,8 @@ GS4_API GS4I_COLD int gs4_estimate(const gs4_sim *sim, gs4_scheme scheme, gs4_in
  * Pom-pom that relaxes faster than a step: that costs at most 30 others, before 5000, or is
  * refused. With anisotropy above 1 results in the bounds differ from before, and stress_bounded
  * counts all particles that came to them. The warning of many substeps is gone.
+ * Relaxation times limit steps no more, which they did to 1000 of them, but semi-implicit ones of
+ * Pom-Pom with a longer stretch_time. Such Pom-Pom gains no energy where K is far below G0.
  * gs4_estimate. GS4_NO_SOLIDS and the like leave parts out. New: desc.affine.
  * The explicit schemes work on eight particles of a cell side by side: a step takes 0.74 to 0.87 of
  * the time it took. So each step may change the order of particles, not only one that sorts. What

@@ -80,6 +80,7 @@ int main(int count, char **values)
     RUN(test_stress_is_paid_for_where_it_is);
     RUN_ONCE(test_stress_counts);
     RUN_ONCE(test_stress_step_work);
+    RUN_ONCE(test_elastic_brief);
     RUN(test_stress_edited_euler);
     RUN_SLOW(test_drop_draws_back);
     RUN_SLOW(test_die_swell);

@@ -384,6 +384,121 @@ static void test_semi_pom_pom(void)
     }
 }
 
+/* --- pom-pom that swells ---------------------------------------------------------------------- *
+ *
+ * Whose shape relaxes within a step and whose stretch does not: swelling has 2/3 G0 beside K,
+ * all else is Newton's. */
+
+static gs4_material semi_swelling(double K, double G, double lambda, double stretch)
+{
+    gs4_material m = scene_liquid(1, G * lambda, 0);
+    m.bulk_modulus = (gs4_real)K;
+    m.liquid = GS4_POM_POM;
+    m.relaxation_time = (gs4_real)lambda;
+    m.stretch_time = (gs4_real)stretch;
+    m.arms = 4;
+    m.anisotropy = (gs4_real)0.1;
+    return m;
+}
+
+/* Velocity along `axis` a sine across `across` of the amplitude 1e-3, in a periodic box. */
+static gs4_sim *semi_swelling_wave(gs4_sim_desc d, const gs4_material *m, int axis, int across)
+{
+    const double k = 2 * acos(-1.0);
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    gs4_sim *sim;
+    gs4_view x;
+    gs4_edit v;
+    int i;
+    for (i = 0; i < 3; i++)
+        if (i != across) d.cells[i] = 4;
+    for (i = 0; i < 6; i++) d.walls[i] = GS4_WALL_PERIODIC;
+    CHECK_RESULT(NULL, gs4_create(&d, &sim), GS4_OK);
+    f.material = gs4_add_material(sim, m);
+    CHECK(gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1, 1, 1)), &f) > 0);
+    x = gs4_particles(sim, GS4_FIELD_POSITION);
+    v = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
+    for (i = 0; i < v.count; i++)
+        v.data[i * v.stride + axis] =
+            (gs4_real)(1e-3 * sin(k * (double)x.data[i * x.stride + across]));
+    return sim;
+}
+
+/* What is left of it; the largest velocity across, over 1e-3. */
+static double semi_swelling_left(const gs4_sim *sim, int axis, int across, double *beside)
+{
+    const double k = 2 * acos(-1.0);
+    const gs4_view x = gs4_particles(sim, GS4_FIELD_POSITION),
+                   v = gs4_particles(sim, GS4_FIELD_VELOCITY);
+    double left = 0;
+    int i;
+    *beside = 0;
+    for (i = 0; i < v.count; i++) {
+        left += (double)v.data[i * v.stride + axis] * sin(k * (double)x.data[i * x.stride + across])
+                / (0.5e-3 * v.count);
+        *beside = fmax(*beside, fabs((double)v.data[i * v.stride + across]) / 1e-3);
+    }
+    return left;
+}
+
+/* Shear waves, nu = 1, from 1 to e^(-1/2) in 16 steps of 250 lambda_b and a sixth of the stretch
+ * time, with the solvent's half: as Newton's liquid, whatever K is beside G0 = 1.6e5. That grew
+ * ninefold a step where K was 100. */
+static void test_semi_swelling_shear(void)
+{
+    static const double K[4] = { 100, 0.01, 1e4, 1e6 };
+    const double k = 2 * acos(-1.0), time = 0.5 / (k * k);
+    int n;
+    for (n = 0; n < (test_full ? 8 : 2); n++) {
+        const int axis = n % 3, across = (n + 1) % 3;
+        gs4_sim_desc d = semi_cube(12);
+        gs4_material m = semi_swelling(K[n / 2], 156250, 3.2e-6, 5e-3);
+        gs4_sim *sim;
+        double left, beside;
+        d.integrator = semi_integrators[n & 1];
+        m.viscosity = 1;
+        m.local_fraction = (gs4_real)0.5;
+        sim = semi_swelling_wave(d, &m, axis, across);
+        CHECK(partitioned_steps(sim, time, 16) == GS4_OK);
+        left = semi_swelling_left(sim, axis, across, &beside);
+        if (test_filter[0])
+            printf("K %g, integrator %d: %.4f left, %.1e across\n", K[n / 2], n & 1, left, beside);
+        CHECK_CLOSE(left, exp(-0.5), 0.015);
+        CHECK_BETWEEN(beside, 0, sizeof(gs4_real) == 4 ? 1e-3 : 1e-6);
+        gs4_destroy(sim);
+    }
+}
+
+/* Sound of it, at c = sqrt((K + 2/3 G0)/rho), of which K alone has 1/30, in steps of 0.6 and
+ * 1.8 h/c. GS4 lets it decay, as what strain does within a step counts by its end. */
+static void test_semi_swelling_sound(void)
+{
+    const double G = 150, K = 0.1, w = 2 * acos(-1.0) * sqrt(K + 2.0 / 3 * G), step = 0.35 / w;
+    int n, t;
+    if (sizeof(gs4_real) == 4) return; /* J - 1 of K alone is rounding */
+    for (n = 0; n < (test_full ? 4 : 2); n++) {
+        const int each = n & 1 ? 1 : 3, across = n % 3;
+        gs4_sim_desc d = semi_cube(32);
+        const gs4_material m = semi_swelling(K, G, 1e-5, 1e3);
+        double a[16], beside, decay, frequency;
+        gs4_sim *sim;
+        d.flip_decay_time = (gs4_real)INFINITY;
+        d.rho_inf = (gs4_real)(n < 2 ? 0 : 0.5);
+        sim = semi_swelling_wave(d, &m, across, across);
+        for (t = 0; t < 16; t++) {
+            a[t] = semi_swelling_left(sim, across, across, &beside);
+            CHECK(partitioned_steps(sim, step, each) == GS4_OK);
+        }
+        gs4_destroy(sim);
+        elastic_fit(a, step, w, w, &decay, &frequency);
+        if (test_filter[0])
+            printf("rho %g, w dt %.2f: frequency %.4f, decay %.4f w\n", (double)d.rho_inf,
+                   0.35 / each, frequency, decay);
+        CHECK_BETWEEN(frequency, each == 1 ? 0.965 : 0.99, each == 1 ? 1.02 : 1.001);
+        CHECK_BETWEEN(decay, 0, 0.3 * 0.35 / each);
+    }
+}
+
 /* --- limits ----------------------------------------------------------------------------------- */
 
 /* Freezes at 100 degrees less. */
@@ -549,4 +664,6 @@ static void run_semi_viscoelastic(void)
     RUN_FULL_ONCE(test_semi_overshoot);
     RUN_FULL(test_semi_elastic_steady);
     RUN_FULL(test_semi_pom_pom);
+    RUN_ONCE(test_semi_swelling_shear);
+    RUN_FULL(test_semi_swelling_sound);
 }

@@ -241,6 +241,16 @@ static double stress_split_error(const double c[6], const double S[4])
     return stress_error(s, S);
 }
 
+/* gs4i_split_advance of the conformation. */
+static int stress_advance(gs4i_split *p, double c[6], double dt)
+{
+    int i, result;
+    for (i = 0; i < 3; i++) c[i] -= 1;
+    result = gs4i_split_advance(p, c, dt);
+    for (i = 0; i < 3; i++) c[i] += 1;
+    return result;
+}
+
 /* Over the rows of a run, one call of gs4i_split_advance each. */
 static void stress_split_follow(const reference_row *rows, int n, double *error)
 {
@@ -252,7 +262,7 @@ static void stress_split_follow(const reference_row *rows, int n, double *error)
     for (i = 0; i < 3; i++) c[i] += 1;
     for (k = 0; k < n; k++) {
         p.work = 0;
-        CHECK(gs4i_split_advance(&p, c, rows[k].t - (k ? rows[k - 1].t : 0)) == GS4_OK);
+        CHECK(stress_advance(&p, c, rows[k].t - (k ? rows[k - 1].t : 0)) == GS4_OK);
         error[k] = stress_split_error(c, rows[k].S);
         if (test_filter[0] && p.work > 1000) printf("work %d\n", p.work);
     }
@@ -297,7 +307,7 @@ static void test_stress_steady(void)
             stress_start(row, c, L);
             p = stress_split(row->set, L);
             c[0] = c[1] = c[2] = 1;
-            result = gs4i_split_advance(&p, c, times[k]);
+            result = stress_advance(&p, c, times[k]);
             error = stress_split_error(c, row->S);
             CHECK(result == GS4_OK && error < 1e-3);
             worst = fmax(worst, error);
@@ -312,7 +322,7 @@ static void test_stress_steady(void)
                      S[4] = { 2 * Wi * Wi, Wi, 0, 0 };
         double c[6] = { 1, 1, 1, 0, 0, 0 };
         gs4i_split p = stress_split(-1, L);
-        CHECK(gs4i_split_advance(&p, c, times[k % 3]) == GS4_OK);
+        CHECK(stress_advance(&p, c, times[k % 3]) == GS4_OK);
         CHECK(stress_split_error(c, S) < 1e-3);
     }
     if (test_filter[0]) printf("worst error %.1e\n", worst);
@@ -647,7 +657,7 @@ static void test_stress_thin(void)
     const double L[9] = { -5, 0, 0, 0, 10, 0, 0, 0, -5 };
     gs4i_split p = stress_split(-1, L);
     double c[6] = { 1e11, -1e3, 1, 0, 0, 0 };
-    CHECK(gs4i_split_advance(&p, c, 1) == GS4_OK);
+    CHECK(stress_advance(&p, c, 1) == GS4_OK);
     CHECK(c[0] > 0 && c[1] > 0 && c[2] > 0);
 }
 
@@ -808,11 +818,11 @@ static void test_stress_work(void)
                 p.bounded = p.substeps = p.work = 0;
                 q.bounded = q.substeps = q.work = 0;
                 q.patience = GS4I_PATIENCE;
-                CHECK(gs4i_split_advance(&p, c, dt) == GS4_OK);
+                CHECK(stress_advance(&p, c, dt) == GS4_OK);
                 error = p.bounded ? 0 : stress_work_error(&p, before, c, dt);
                 CHECK(error < 1e-3);
                 /* as steps call it: against what is exact */
-                CHECK(gs4i_split_advance(&q, lenient, dt) == GS4_OK);
+                CHECK(stress_advance(&q, lenient, dt) == GS4_OK);
                 rough = p.bounded || q.bounded ? 0 : stress_difference(lenient, c);
                 CHECK(rough < 1e-3);
                 worst_rough = fmax(worst_rough, rough);
@@ -831,6 +841,64 @@ static void test_stress_work(void)
             printf("dt/lambda_b 1e%d: work %.1f, at most %d, worst error %.1e, in steps %.1e\n",
                    decade, all / (2.0 * draws), most, worst, worst_rough);
     }
+}
+
+/* UCM and Oldroyd-B: doublings of the map of a step that strains by up to 1, however fast all
+ * relaxes; 30 other steps of a particle would be some 800. What has relaxed is S of steady flow,
+ * 2 lambda_b D. */
+static void test_stress_linear_work(void)
+{
+    const int draws = test_slow ? 100000 : 1000;
+    int i, j, most = 0;
+    stress_seed = 8;
+    for (i = 0; i < draws; i++) {
+        const double dt = stress_log(1e-3, 1e290), rate = stress_log(1e-3, 1) / dt;
+        gs4i_split p = stress_draw_work(dt, 0);
+        double A[3][3], H[6];
+        int doublings;
+        p.stretch = 0;
+        for (j = 0; j < 9; j++) p.L[j / 3][j % 3] = rate * stress_random() / 3;
+        doublings = gs4i_linear_map(&p, dt, A, H);
+        most = doublings > most ? doublings : most;
+        for (j = 0; j < 6 && dt > 1e20; j++) {
+            const int a = j < 3 ? j : j < 5 ? 0 : 1, b = j < 3 ? j : j == 3 ? 1 : 2;
+            CHECK_CLOSE(H[j] * dt, (p.L[a][b] + p.L[b][a]) * dt, 1e-12);
+        }
+    }
+    CHECK_BETWEEN(most, 10, 18);
+    if (test_filter[0]) printf("at most %d doublings\n", most);
+}
+
+/* What relaxes within a step, however far within, is Newton's: S = 2 G0 lambda_b D, also where
+ * that is far below a rounding of the conformation. */
+static void test_stress_newtonian(void)
+{
+    const double digits = sizeof(gs4_real) == 4 ? 1e-6 : 1e-12;
+    const int draws = test_slow ? 10000 : 400;
+    double worst = 0, trace;
+    int i, j;
+    stress_seed = 12;
+    for (i = 0; i < draws; i++) {
+        const double dt = 1e-3, lambda = dt / stress_log(1e3, 1e14),
+                     rate = stress_log(1e-3, 1) / dt;
+        gs4_material m = stress_material(i % 2 ? -1 : 4, 1 / lambda, lambda, 0.1);
+        gs4_real L[9];
+        gs4_point p;
+        memset(&p, 0, sizeof p);
+        stress_draw_flow(rate, L);
+        trace = (double)(L[0] + L[4] + L[8]); /* pom-pom swells at another rate */
+        for (j = 0; j < 3; j++) L[4 * j] -= (gs4_real)(trace / 3);
+        for (j = 0; j < 2; j++)
+            CHECK(gs4_point_step(&m, &p, L, (gs4_real)dt, (gs4_real)(j ? 0.5 : 0), 0) == GS4_OK);
+        for (j = 0; j < 6; j++) {
+            const int a = j < 3 ? j : j < 5 ? 0 : 1, b = j < 3 ? j : j == 3 ? 1 : 2;
+            const double D = 0.5 * ((double)L[3 * a + b] + (double)L[3 * b + a]),
+                         off = fabs((double)p.stress[j] - 2 * D) / rate;
+            CHECK(off < 10 * lambda * rate + 10 * digits);
+            worst = fmax(worst, off / (10 * lambda * rate + 10 * digits));
+        }
+    }
+    if (test_filter[0]) printf("at most %.2f of the bound\n", worst);
 }
 
 /* --- bad arguments ---------------------------------------------------------------------------- */
@@ -962,5 +1030,7 @@ static void run_stress(void)
     RUN(test_stress_thin);
     RUN(test_stress_bounded);
     RUN_ONCE(test_stress_work);
+    RUN_ONCE(test_stress_linear_work);
+    RUN(test_stress_newtonian);
     RUN(test_stress_bad_arguments);
 }

@@ -276,6 +276,77 @@ static void test_stress_counts(void)
     }
 }
 
+/* What 16 steps take of a shear wave, nu k^2 far below 1/dt so that elasticity allows them. */
+static double elastic_brief_loss(gs4_scheme scheme, gs4_integrator how, double ratio,
+                                 const gs4_material *kind)
+{
+    const double k = 2 * acos(-1.0), dt = 1e-3, h = 1.0 / 12;
+    gs4_sim_desc d = scene_cube(12);
+    gs4_material m = *kind;
+    gs4_fill f = scene_fill(at(0, 0, 0));
+    double left = 0, first = 0;
+    gs4_sim *sim;
+    gs4_edit v;
+    gs4_view x;
+    int i;
+    d.scheme = scheme;
+    d.integrator = how;
+    d.cells[1] = d.cells[2] = 4;
+    d.solver_tolerance = (gs4_real)1e-9;
+    for (i = 0; i < 6; i++) d.walls[i] = GS4_WALL_PERIODIC;
+    if (how != GS4_INTEGRATOR_SYMPLECTIC_EULER) d.flip_decay_time = (gs4_real)INFINITY;
+    m.viscosity = (gs4_real)(h * h / (30 * dt * ratio));
+    if (m.liquid) m.relaxation_time = (gs4_real)(dt / ratio);
+    m.stretch_time = m.liquid == GS4_POM_POM ? m.relaxation_time : 0;
+    CHECK_RESULT(NULL, gs4_create(&d, &sim), GS4_OK);
+    f.material = gs4_add_material(sim, &m);
+    CHECK(gs4_add_particles(sim, gs4_box(at(0, 0, 0), at(1, 1, 1)), &f) > 0);
+    x = gs4_particles(sim, GS4_FIELD_POSITION);
+    v = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
+    for (i = 0; i < v.count; i++) {
+        const double mode = sin(k * (double)x.data[i * x.stride]);
+        v.data[i * v.stride + 1] = (gs4_real)mode;
+        first += mode * mode;
+    }
+    for (i = 0; i < 16; i++) CHECK_RESULT(sim, gs4_step(sim, (gs4_real)dt), GS4_OK);
+    x = gs4_particles(sim, GS4_FIELD_POSITION);
+    for (i = 0; i < x.count; i++)
+        left += (double)gs4_particles(sim, GS4_FIELD_VELOCITY).data[i * x.stride + 1]
+                * sin(k * (double)x.data[i * x.stride]);
+    gs4_destroy(sim);
+    return 1 - left / first;
+}
+
+/* Steps of 1e4 and 1e8 relaxation times, which nothing forbids: the loss of Newton's liquid. */
+static void test_elastic_brief(void)
+{
+    static const gs4_integrator how[5] = { GS4_INTEGRATOR_GS4, GS4_INTEGRATOR_SYMPLECTIC_EULER,
+                                           GS4_INTEGRATOR_GS4, GS4_INTEGRATOR_BACKWARD_EULER,
+                                           GS4_INTEGRATOR_GS4 };
+    int n, kind;
+    if (sizeof(gs4_real) == 4) return; /* losses from 1e-4 to 1e-9 */
+    for (n = 0; n < 10; n++) {
+        const gs4_scheme scheme = n / 2 < 2   ? GS4_EXPLICIT
+                                  : n / 2 < 4 ? GS4_PARTITIONED
+                                              : GS4_SEMI_IMPLICIT;
+        const double ratio = n & 1 ? 1e8 : 1e4;
+        gs4_material m = scene_liquid(1, 0, 20);
+        const double newton = elastic_brief_loss(scheme, how[n / 2], ratio, &m);
+        for (kind = 0; kind < 2; kind++) {
+            double loss;
+            m.liquid = kind ? GS4_POM_POM : GS4_OLDROYD_B;
+            m.local_fraction = (gs4_real)(kind ? 0.5 : 0);
+            m.arms = (gs4_real)(kind ? 4 : 0);
+            m.anisotropy = (gs4_real)(kind ? 0.1 : 0);
+            loss = elastic_brief_loss(scheme, how[n / 2], ratio, &m);
+            if (test_filter[0])
+                printf("scheme %d, integrator %d, dt %g lambda_b: %.6f of Newton's loss, %.1e\n",
+                       (int)scheme, (int)how[n / 2], ratio, loss / newton, newton);
+            CHECK_CLOSE(loss / newton, 1, 1e-3);
+        }
+    }
+}
+
 static double viscoelastic_random(uint64_t *seed) /* -1 to 1 */
 {
     *seed = *seed * 6364136223846793005u + 1442695040888963407u;

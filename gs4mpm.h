@@ -1000,8 +1000,8 @@ typedef struct gs4_sim_desc {
      * 1.2 times as long, and there are 1.5 (sound) to 2.3 (viscosity) times as many. */
     int sharp_gradients;
     /* 1: with explicit GS4 particles carry their velocity gradient beside their velocity, see
-     * AFFINE: a third to a fifth of the error at free surfaces, for 1.5 times the time a step. Other
-     * schemes and symplectic Euler give momentum affinely anyway. */
+     * AFFINE: a fifth to four fifths of the error of what has free surfaces, for 1.5 times the time
+     * a step. Other schemes and symplectic Euler give momentum affinely anyway. */
     int affine;
 } gs4_sim_desc;
 
@@ -9522,7 +9522,7 @@ typedef struct gs4i_integrator {
     gs4_real stopping;     /* how fast friction stops a node: k_max/2, 1/s */
     /* 1/h^2; 1 / mass of a node in the midst of the lightest material, and of the densest */
     gs4_real inv_area, inv_node_mass, inv_densest_node_mass;
-    gs4_real light, inv_fading; /* nodes filled by less are light, see gs4i_node_weight */
+    gs4_real light, inv_range; /* of fill, see gs4i_node_weight */
 } gs4i_integrator;
 
 /* `noise`: in, the rate of decay as noise; out, what that adds to `stable_decay`, 1/s. As in
@@ -13258,7 +13258,8 @@ static void gs4i_advance_solid(gs4i_response *r, gs4i_gradient L, gs4i_gathered_
         gs4i_load_deformation(gs4i_deformation_of(r), r->p->deformation_reals, r->n, &e);
         gs4i_correct_solid(&r->solid, &e, r->p->with_rates ? r->integrator : &euler, L, J, r->n,
                            &count);
-        if (rates) gs4i_correct_spin(&r->solid, &e, r->integrator, L, rates);
+        if (rates && r->p->deformation_reals == 24)
+            gs4i_correct_spin(&r->solid, &e, r->integrator, L, rates);
     }
     if (count.failed)
         gs4i_see_bad(r->report, GS4I_BAD_DEFORMATION, r->p->id[r->i + (size_t)count.failed - 1]);
@@ -17543,7 +17544,7 @@ GS4I_INLINE void gs4i_remembered_before(const gs4i_integrator *integrator, int f
  * damps, members with rho_inf = 1 came to 100 times their energy in 3000 steps with 10 to 43 %. */
 GS4I_INLINE gs4_real gs4i_node_weight(const gs4i_integrator *integrator, gs4_real filled)
 {
-    const gs4_real t = (filled - integrator->light) * integrator->inv_fading;
+    const gs4_real t = (filled - integrator->light) * integrator->inv_range;
     return integrator->restart || t >= 1 ? GS4I_C(1) : t <= 0 ? GS4I_C(0) : t * t * (3 - 2 * t);
 }
 
@@ -18596,8 +18597,7 @@ static void gs4i_correct(int index, void *context)
         if (near.particle) near.particle += n;
         gs4i_prepare_decay(&r, i, n, turns, tiles.sticks, &k);
         gs4i_correct_batch(integrator, &k, &q);
-        gs4i_advance_response(&r, i, n, k.L, p.with_gradient ? NULL : &k.rates, q.v[3],
-                              pass->commit);
+        gs4i_advance_response(&r, i, n, k.L, &k.rates, q.v[3], pass->commit);
         if (!pass->commit) {
             gs4i_validate_batch(&q, k.L, p.position + 4 * i, n, g->h, p.id + i, report);
             continue;
@@ -25830,9 +25830,26 @@ static void gs4i_damp_creeping(gs4i_integrator *k, gs4_real excess)
     k->inertia = gs4i_max(GS4I_C(0.9), 1 / gs4i_max(excess * excess, GS4I_C(1)));
 }
 
+/* What nodes hold in the midst of materials, and which of them are light. */
+static void gs4i_set_fill(gs4i_integrator *k, const gs4_sim *sim)
+{
+    const gs4_real h = sim->grid.h;
+    int i;
+    k->fast_decay = k->inv_node_mass = 0;
+    k->inv_densest_node_mass = GS4I_HUGE;
+    for (i = 0; i < sim->material_count; i++) {
+        const gs4_real inverse = sim->constants[i].inv_density / (h * h * h);
+        k->fast_decay = gs4i_max(k->fast_decay, sim->constants[i].sound_speed / h);
+        k->inv_node_mass = gs4i_max(k->inv_node_mass, inverse);
+        k->inv_densest_node_mass = gs4i_min(k->inv_densest_node_mass, inverse);
+    }
+    k->light = sim->particles.with_gradient ? GS4I_C(0.03) : GS4I_C(0.1);
+    k->inv_range = sim->particles.with_gradient ? GS4I_C(10) : GS4I_C(3);
+}
+
 static gs4i_integrator gs4i_make_integrator(const gs4_sim *sim, gs4_real dt)
 {
-    const gs4_real r = sim->desc.rho_inf, s = sim->desc.rho_inf_spurious, h = sim->grid.h;
+    const gs4_real r = sim->desc.rho_inf, s = sim->desc.rho_inf_spurious;
     const int with_rates = sim->particles.with_rates,
               grown = !sim->restart && gs4i_outgrows_rates(sim, dt);
     gs4i_integrator k;
@@ -25868,21 +25885,12 @@ static gs4i_integrator gs4i_make_integrator(const gs4_sim *sim, gs4_real dt)
     k.s = k.alpha_f * k.gamma * dt / k.alpha_m;
     k.before = with_rates && !grown ? k.prediction.ahead - k.s : GS4I_C(0);
     k.inv_area = sim->grid.inv_h * sim->grid.inv_h;
-    k.fast_decay = k.inv_node_mass = 0;
-    k.inv_densest_node_mass = GS4I_HUGE;
-    for (i = 0; i < sim->material_count; i++) {
-        const gs4_real inverse = sim->constants[i].inv_density / (h * h * h);
-        k.fast_decay = gs4i_max(k.fast_decay, sim->constants[i].sound_speed / h);
-        k.inv_node_mass = gs4i_max(k.inv_node_mass, inverse);
-        k.inv_densest_node_mass = gs4i_min(k.inv_densest_node_mass, inverse);
-    }
+    gs4i_set_fill(&k, sim);
     k.unpacking = !sim->particles.deformation_reals && !sim->grid.with_deconvolution
                           && k.inv_densest_node_mass >= GS4I_C(0.99) * k.inv_node_mass
                       ? GS4I_C(0.005) * k.fast_decay
                       : GS4I_C(0);
     gs4i_set_decay(&k, sim);
-    k.light = sim->particles.with_gradient ? GS4I_C(0.03) : GS4I_C(0.1);
-    k.inv_fading = sim->particles.with_gradient ? GS4I_C(10) : GS4I_C(3);
     k.volume_settles = 0;
     for (i = 0; i < sim->boundary.collider_count; i++)
         k.volume_settles |= gs4i_is_sticky(&sim->boundary.colliders[i])
@@ -26064,9 +26072,9 @@ static void gs4i_finish(gs4_sim *sim)
 }
 
 /* How solids turn, or with `affine` how all moves, whose velocities were set by hand: by the grid,
- * which sees less of it at a surface than there is, hence again with what it saw (kinetic energy that a stiff cube keeps in
- * a quarter of a turn: 0.996 after three times, 0.9999 after ten). A step that is refused
- * forgets it again. */
+ * which sees less of it at a surface than there is, hence again with what it saw (kinetic energy
+ * that a stiff cube keeps in a quarter of a turn: 0.996 after three times, 0.9999 after ten). A
+ * step that is refused forgets it again. */
 static void gs4i_forget_spin(gs4_sim *sim)
 {
     const gs4i_particles *p = &sim->particles;
@@ -26602,12 +26610,8 @@ static GS4I_COLD void gs4i_head_of(const gs4_sim *sim, gs4i_head *h)
     h->deconvolved = d->sharp_gradients != 0;
     h->affine = d->affine != 0;
     h->cell_size = (double)d->cell_size;
-    h->origin[0] = (double)d->origin.x;
-    h->origin[1] = (double)d->origin.y;
-    h->origin[2] = (double)d->origin.z;
-    h->gravity[0] = (double)d->gravity.x;
-    h->gravity[1] = (double)d->gravity.y;
-    h->gravity[2] = (double)d->gravity.z;
+    gs4i_to_double(d->origin, h->origin);
+    gs4i_to_double(d->gravity, h->gravity);
     h->rho[0] = (double)d->rho_inf;
     h->rho[1] = (double)d->rho_inf_spurious;
     h->decay = (double)d->flip_decay_time;
@@ -31643,6 +31647,8 @@ GS4_API GS4I_COLD int gs4_estimate(const gs4_sim *sim, gs4_scheme scheme, gs4_in
 #undef GS4I_CONDUCTS
 #undef GS4I_COST_OF_CELL
 #undef GS4I_DECONVOLVED_EIGENVALUES
+#undef GS4I_AFFINE_SOUND
+#undef GS4I_AFFINE_VISCOSITY
 #undef GS4I_DEFAULT_ITERATIONS
 #undef GS4I_DEFAULT_TOLERANCE
 #undef GS4I_DENSE

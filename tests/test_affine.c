@@ -54,8 +54,8 @@ static void test_affine_linear(void)
     gs4_destroy(sim);
 }
 
-/* Angular momentum about the axis of a free ball, with that of the gradients, m h^2/4 (C_ba - C_ab);
- * over that at first: what is left after 2 s, at 1 rad/s at first. A liquid ball spreads by
+/* Angular momentum about the axis of a free ball, with that of the gradients, m h^2/4 (C_ba -
+ * C_ab); over that at first: what is left after 2 s, at 1 rad/s at first. A liquid ball spreads by
  * then, so gradients fall, and what they have of it, of second order in h, with them: 4 % here. It
  * loses 32 % where particles carry velocities alone. */
 static double affine_turn(int affine, int axis, double G)

@@ -9822,7 +9822,7 @@ GS4I_INLINE void gs4i_prefetch_particles(const gs4i_particles *p, size_t i)
         GS4I_PREFETCH(p->elastic + (size_t)p->elastic_reals * i + b);
     for (b = 0; b < p->deformation_reals * GS4I_BATCH; b += 16)
         GS4I_PREFETCH(p->deformation + (size_t)p->deformation_reals * i + b);
-    for (b = 0; b < GS4I_GRADIENT_REALS * GS4I_BATCH && p->with_gradient; b += 16)
+    for (b = 0; b < (int)GS4I_GRADIENT_REALS * GS4I_BATCH && p->with_gradient; b += 16)
         GS4I_PREFETCH(p->gradient + GS4I_GRADIENT_REALS * i + b);
     for (b = 0; b < 4 * GS4I_BATCH && p->heat; b += 16) GS4I_PREFETCH(p->heat + 4 * i + b);
     for (b = 0; b < 4 * GS4I_BATCH && p->with_subgrid; b += 16)

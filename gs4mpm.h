@@ -268,7 +268,8 @@
  * keeps 96 % of its angular momentum (68), the rest is that of C, which h^2/4 has too small an
  * arm; sound is 0.994 of c0 at 32 cells a wave (0.989), a film of 2 cells flows 1.05 times as fast
  * as it should (1.17), tests: affine, film; a dam break of 16 cells is off by 1.6 % (7.8),
- * bench/tradeoff.c. It is for liquids, solids and both, not with sharp_gradients. S6 counts s
+ * bench/tradeoff.c. In time it is of order 1.94 to 2.06, any member (tests: order). It is for
+ * liquids, solids and both, not with sharp_gradients. S6 counts s
  * (acc_i - ag_i) from nodes filled by 3 % on, in full from 13 %; no spin is kept.
  *
  * THE PARTITIONED SCHEME has pressure from a solve, so that no step follows sound: for liquids of

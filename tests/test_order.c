@@ -66,8 +66,9 @@ static double order_of(const double *coarse, const double *fine, const double *f
 static void order_case(double rho, double spurious, double decay)
 {
     static order_run run[3];
-    const int steps = test_full ? 256 : 128;
-    const double most = test_full ? 2.06 : 2.1;
+    /* affine: the order comes to 2 from 1.87 (x) and 2.10 (v) at 128 steps */
+    const int steps = test_full || scene_affine ? 256 : 128;
+    const double most = steps == 256 ? 2.06 : 2.1;
     double x, v, J;
     int i;
     for (i = 0; i < 3; i++)
@@ -84,7 +85,8 @@ static void order_case(double rho, double spurious, double decay)
                order_difference(run[1].v, run[2].v, 3 * run[0].count),
                order_difference(run[1].J, run[2].J, run[0].count));
     CHECK_BETWEEN(x, 1.92, most);
-    CHECK_BETWEEN(v, test_full ? 1.955 : 1.92, test_full ? 2.015 : most); /* as in NOISE */
+    /* as in NOISE */
+    CHECK_BETWEEN(v, steps == 256 ? 1.955 : 1.92, test_full && !scene_affine ? 2.015 : most);
     CHECK_BETWEEN(J, 1.92, most);
 }
 

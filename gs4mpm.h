@@ -269,8 +269,8 @@
  * arm; sound is 0.994 of c0 at 32 cells a wave (0.989), a film of 2 cells flows 1.05 times as fast
  * as it should (1.17), tests: affine, film; a dam break of 16 cells is off by 1.6 % (7.8),
  * bench/tradeoff.c. In time it is of order 1.94 to 2.06, any member (tests: order). It is for
- * liquids, solids and both, not with sharp_gradients. S6 counts s
- * (acc_i - ag_i) from nodes filled by 3 % on, in full from 13 %; no spin is kept.
+ * liquids, solids and both, not with sharp_gradients. S6 counts s (acc_i - ag_i) from nodes filled
+ * by 3 % on, in full from 13 %; no spin is kept.
  *
  * THE PARTITIONED SCHEME has pressure from a solve, so that no step follows sound: for liquids of
  * any bulk modulus, `incompressible` too. Velocities are on faces of cells, one component each, and
@@ -17196,13 +17196,13 @@ static int gs4i_next_odd_images(const gs4i_image_particle *all, const int32_t *o
     return n;
 }
 
-/* What the nodes have of a field at the images, velocity (what 0) or acceleration (1). */
 /* Do particles of GS4 carry more of their motion than a velocity: a spin, or all its gradient? */
 GS4I_INLINE int gs4i_turns(const gs4i_particles *p)
 {
     return p->deformation_reals || p->with_gradient;
 }
 
+/* What the nodes have of a field at the images, velocity (what 0) or acceleration (1). */
 static void gs4i_gather_image_block(const gs4i_pass *pass, int index, int what)
 {
     gs4_sim *sim = pass->sim;
@@ -17711,6 +17711,22 @@ static void gs4i_finish_forces(gs4_sim *sim, gs4i_node_pass *nodes)
 
 /* --- S3 --------------------------------------------------------------------------------------- */
 
+/* Momentum m v~ + m Q (x_i - x~) of a batch, Q bounded, as that at the nodes of its cell and its
+ * change from node to node. */
+GS4I_INLINE void gs4i_about_nodes(const gs4_sim *sim, const gs4i_stencils *s, const gs4i_wide *mass,
+                                  gs4i_lanes mv[3], gs4i_gradient Q)
+{
+    gs4i_lanes bound;
+    int a, b, c;
+    gs4i_affine_bound(Q, sim->integrator.dt, bound);
+    for (a = 0; a < 9; a++)
+        GS4I_BATCH_LOOP(b) Q[a / 3][a % 3][b] *= bound[b] * (sim->grid.h * mass[b]);
+    for (c = 0; c < 3; c++)
+        GS4I_BATCH_LOOP(b)
+            mv[c][b] -=
+                Q[c][0][b] * s->xi[0][b] + Q[c][1][b] * s->xi[1][b] + Q[c][2][b] * s->xi[2][b];
+}
+
 /* Solids turn about their particles too: m v~ + m w~ x (x_i - x~) for particles i to i + n. 0
  * where none of them turns. */
 static int gs4i_spin_momentum(const gs4_sim *sim, size_t i, int n, const gs4i_stencils *s,
@@ -17719,7 +17735,7 @@ static int gs4i_spin_momentum(const gs4_sim *sim, size_t i, int n, const gs4i_st
     const gs4i_particles *p = &sim->particles;
     const gs4i_integrator *integrator = &sim->integrator;
     gs4_real own[4 * GS4I_BATCH], any = 0;
-    gs4i_lanes w[4], bound;
+    gs4i_lanes w[4];
     int a, b, c;
     for (b = 0; b < n; b++) {
         const gs4_real *spin = p->deformation + (size_t)p->deformation_reals * (i + (size_t)b) + 18;
@@ -17740,13 +17756,7 @@ static int gs4i_spin_momentum(const gs4_sim *sim, size_t i, int n, const gs4i_st
             Q[c][j][b] = -w[k][b];
         }
     }
-    gs4i_affine_bound(Q, integrator->dt, bound);
-    for (a = 0; a < 9; a++)
-        GS4I_BATCH_LOOP(b) Q[a / 3][a % 3][b] *= bound[b] * (sim->grid.h * mass[b]);
-    for (c = 0; c < 3; c++)
-        GS4I_BATCH_LOOP(b)
-            mv[c][b] -=
-                Q[c][0][b] * s->xi[0][b] + Q[c][1][b] * s->xi[1][b] + Q[c][2][b] * s->xi[2][b];
+    gs4i_about_nodes(sim, s, mass, mv, Q);
     return 1;
 }
 
@@ -17756,20 +17766,13 @@ static void gs4i_gradient_momentum(const gs4_sim *sim, size_t i, int n, const gs
 {
     const gs4_real ahead = sim->integrator.prediction.ahead;
     gs4i_gradient carried[2];
-    gs4i_lanes bound;
-    int a, b, c;
+    int a, b;
     gs4i_numbers_to_lanes(sim->particles.gradient + GS4I_GRADIENT_REALS * i, GS4I_GRADIENT_REALS, n,
                           carried[0][0]);
     for (a = 0; a < 9; a++)
         GS4I_BATCH_LOOP(b)
             Q[a / 3][a % 3][b] = carried[0][a / 3][a % 3][b] + ahead * carried[1][a / 3][a % 3][b];
-    gs4i_affine_bound(Q, sim->integrator.dt, bound);
-    for (a = 0; a < 9; a++)
-        GS4I_BATCH_LOOP(b) Q[a / 3][a % 3][b] *= bound[b] * (sim->grid.h * mass[b]);
-    for (c = 0; c < 3; c++)
-        GS4I_BATCH_LOOP(b)
-            mv[c][b] -=
-                Q[c][0][b] * s->xi[0][b] + Q[c][1][b] * s->xi[1][b] + Q[c][2][b] * s->xi[2][b];
+    gs4i_about_nodes(sim, s, mass, mv, Q);
 }
 
 /* S3: m_i = sum w m, m_i v_i = sum w m v~ with v~ = v + alpha_f dt a. */

@@ -11258,7 +11258,7 @@ static int gs4i_unsplit_advance(gs4i_split *p, double after[6], double dt)
         left = h < left * (1 - 1e-12) ? left - h : 0;
         for (i = 0; i < 8; i++) change[i] -= S[i];
         /* it has settled: what is left changes less than 1e-6 of S, chosen */
-        if (h > 0 && gs4i_size_of(change) * (left / h) < 1e-6 * gs4i_size_of(S)) left = 0;
+        if (h > 0 && gs4i_size_of(change) * (left / h) <= 1e-6 * gs4i_size_of(S)) left = 0;
     }
     if (outside) {
         gs4i_bounded_advance(p, &q, &w, S, left);

@@ -901,6 +901,27 @@ static void test_stress_newtonian(void)
     if (test_filter[0]) printf("at most %.2f of the bound\n", worst);
 }
 
+/* What is at rest, or turns as a whole, has no stress, however fast it would relax: S = 0 exactly,
+ * and exactly steady. */
+static void test_stress_rigid(void)
+{
+    static const double rates[] = { 0, 1, 1e3 };
+    int i, k, set;
+    for (set = -1; set < 5; set++)
+        for (k = 4; k <= 17; k++)
+            for (i = 0; i < 3; i++) {
+                const double lambda = pow(10, -k);
+                const gs4_material m = stress_material(set, 1 / lambda, lambda, 0.1);
+                const gs4_real r = (gs4_real)rates[i],
+                               L[9] = { 0, -r, r / 2, r, 0, r / 4, -r / 2, -r / 4, 0 };
+                gs4_point p;
+                int j;
+                memset(&p, 0, sizeof p);
+                CHECK(gs4_point_step(&m, &p, L, (gs4_real)1e-3, (gs4_real)0.5, 0) == GS4_OK);
+                for (j = 0; j < 6; j++) CHECK(p.stress[j] == 0 && p.stress_rate[j] == 0);
+            }
+}
+
 /* --- bad arguments ---------------------------------------------------------------------------- */
 
 static void stress_refused(const gs4_material *m, const gs4_point *p, const gs4_real *L, double dt,
@@ -1032,5 +1053,6 @@ static void run_stress(void)
     RUN_ONCE(test_stress_work);
     RUN_ONCE(test_stress_linear_work);
     RUN(test_stress_newtonian);
+    RUN(test_stress_rigid);
     RUN(test_stress_bad_arguments);
 }

@@ -15,6 +15,8 @@
  *   cc -O3 -march=native bench/tradeoff.c -I. -Iexamples -lm -o tradeoff
  *   ./tradeoff [--scene "dam break"] [--cells MOST] [--method "symplectic Euler"] > float.csv
  *   ./tradeoff --draw tradeoff.svg float.csv [double.csv]           and the fastest at 10, 3, 1 %
+ *   ./tradeoff --draw-bytes bytes.svg float.csv [double.csv]        against memory; the smallest,
+ *                                                                   and what double changes
  * With -DGS4_DOUBLE it is in double. A shorter step is not tried where the last one changed the
  * error by less than a fiftieth, a longer run not where the last one took 2 s: half an hour. */
 #ifndef GS4_LINKED
@@ -451,8 +453,10 @@ typedef struct row {
     double error, seconds, bytes;
 } row;
 static row rows[ROWS];
-static int row_count;
+static int row_count, by_bytes; /* what it costs: megabytes, or s */
 static double bounds[SCENES];
+
+static double cost_of(const row *r) { return by_bytes ? r->bytes * 1e-6 : r->seconds; }
 
 static int scene_of(const char *name)
 {
@@ -485,9 +489,9 @@ static void read_rows(const char *path)
     fclose(f);
 }
 
-static int row_by_seconds(const void *a, const void *b)
+static int row_by_cost(const void *a, const void *b)
 {
-    const double x = ((const row *)a)->seconds, y = ((const row *)b)->seconds;
+    const double x = cost_of((const row *)a), y = cost_of((const row *)b);
     return (x > y) - (x < y);
 }
 
@@ -513,7 +517,7 @@ static const char *colour_of(const char *name)
 
 static int inside(const chart_plane *p, const row *r)
 {
-    const double x = log10(r->seconds), y = log10(r->error);
+    const double x = log10(cost_of(r)), y = log10(r->error);
     return x >= p->x_first && x <= p->x_last && y >= p->y_first && y <= p->y_last;
 }
 
@@ -522,17 +526,17 @@ static void draw_row(FILE *f, const chart_plane *p, const row *r)
     const int is_double = strcmp(r->real, "double") == 0;
     fprintf(f,
             "<circle cx='%.1f' cy='%.1f' r='%.1f' fill='%s' fill-opacity='%g' stroke='%s' "
-            "stroke-opacity='.6'><title>%s, %s, %d a cell, %d cells, step %d: error %.2g, %.2g "
-            "s</title></circle>\n",
-            chart_x(p, log10(r->seconds)), chart_y(p, log10(r->error)),
+            "stroke-opacity='.6'><title>%s, %s, %d a cell, %d cells, step %d: error %.2g, %.2g s, "
+            "%.2g MB</title></circle>\n",
+            chart_x(p, log10(cost_of(r))), chart_y(p, log10(r->error)),
             r->particles_a_cell == 4   ? 1.5
             : r->particles_a_cell == 8 ? 2.5
                                        : 4,
             colour_of(r->method), is_double ? 0 : 0.35, colour_of(r->method), r->method, r->real,
-            r->particles_a_cell, r->cells, r->step, r->error, r->seconds);
+            r->particles_a_cell, r->cells, r->step, r->error, r->seconds, r->bytes * 1e-6);
 }
 
-/* Runs that nothing is both faster and more exact than, in rings. */
+/* Runs that nothing is both cheaper and more exact than, in rings. */
 static void draw_front(FILE *f, const chart_plane *p, const char *name)
 {
     chart_curve c;
@@ -543,9 +547,9 @@ static void draw_front(FILE *f, const chart_plane *p, const char *name)
         const row *r = &rows[i];
         if (strcmp(r->scene, name) != 0 || r->error >= least || !inside(p, r)) continue;
         least = r->error;
-        chart_add(&c, r->seconds, r->error);
+        chart_add(&c, cost_of(r), r->error);
         fprintf(f, "<circle cx='%.1f' cy='%.1f' r='5.5' fill='none' stroke='#000'/>\n",
-                chart_x(p, log10(r->seconds)), chart_y(p, log10(r->error)));
+                chart_x(p, log10(cost_of(r))), chart_y(p, log10(r->error)));
     }
     chart_draw(f, p, &c, "#000", 1);
 }
@@ -553,12 +557,12 @@ static void draw_front(FILE *f, const chart_plane *p, const char *name)
 static void draw_scene(FILE *f, int s)
 {
     const chart_plane p = { scenes[s].name,
-                            "seconds",
+                            by_bytes ? "megabytes" : "seconds",
                             60 + 440.0 * (s % 2),
                             40 + 350.0 * (s / 2),
                             370,
                             270,
-                            -3,
+                            by_bytes ? -1 : -3,
                             2,
                             -3,
                             0 };
@@ -582,17 +586,60 @@ static void draw_legend(FILE *f)
                                          "semi-implicit GS4",   "semi-implicit backward Euler" };
     static const char *const notes[] = { "small, middle, large: 4, 8, 27 particles a cell",
                                          "filled: float; hollow: double",
-                                         "rings: nothing is both faster and more exact",
-                                         "grey: truth is not known better",
-                                         "error against seconds of one thread" };
+                                         "rings: nothing is both cheaper and more exact",
+                                         "grey: truth is not known better" };
     int i;
     for (i = 0; i < 8; i++)
         fprintf(f, "<text x='520' y='%d' fill='%s' font-size='14'>%s</text>\n", 766 + 22 * i,
                 colour_of(names[i]), names[i]);
-    for (i = 0; i < 5; i++) fprintf(f, "<text x='520' y='%d'>%s</text>\n", 940 + 18 * i, notes[i]);
+    for (i = 0; i < 4; i++) fprintf(f, "<text x='520' y='%d'>%s</text>\n", 940 + 18 * i, notes[i]);
+    fprintf(f, "<text x='520' y='%d'>error against %s</text>\n", 940 + 18 * i,
+            by_bytes ? "memory of the whole simulation" : "seconds of one thread");
 }
 
-/* The chart, and for each scene and method the fastest run at 10, 3 and 1 %. */
+/* The same run in double, NULL if there is none. */
+static const row *in_double(const row *r)
+{
+    int i;
+    for (i = 0; i < row_count; i++)
+        if (strcmp(rows[i].real, "double") == 0 && strcmp(rows[i].scene, r->scene) == 0
+            && strcmp(rows[i].method, r->method) == 0
+            && rows[i].particles_a_cell == r->particles_a_cell && rows[i].cells == r->cells
+            && rows[i].step == r->step)
+            return &rows[i];
+    return NULL;
+}
+
+/* What double changes, for each scene and scheme: medians of bytes and seconds, double over float,
+ * and the largest |change of the error| over the error in float. */
+static void compare_precisions(void)
+{
+    static const char *const schemes[] = { "explicit GS4", "symplectic Euler", "partitioned",
+                                           "semi-implicit" };
+    static double bytes[ROWS], seconds[ROWS];
+    int s, k, i;
+    puts("scene,scheme,runs,bytes double/float,seconds double/float,largest change of the error");
+    for (s = 0; s < SCENES; s++)
+        for (k = 0; k < 4; k++) {
+            double most = 0;
+            int n = 0;
+            for (i = 0; i < row_count; i++) {
+                const row *r = &rows[i], *d;
+                if (strcmp(r->real, "float") != 0 || strcmp(r->scene, scenes[s].name) != 0
+                    || strncmp(r->method, schemes[k], strlen(schemes[k])) != 0
+                    || (d = in_double(r)) == NULL)
+                    continue;
+                bytes[n] = d->bytes / r->bytes;
+                seconds[n++] = d->seconds / r->seconds;
+                most = fmax(most, fabs(d->error / r->error - 1));
+            }
+            if (!n) continue;
+            printf("%s,%s,%d,%.2f,%.2f,%.2g\n", scenes[s].name, schemes[k], n,
+                   bench_median(bytes, n), bench_median(seconds, n), most);
+        }
+}
+
+/* The chart, and for each scene and method the cheapest run at 10, 3 and 1 %. */
 static void draw(const char *path)
 {
     static const double targets[] = { 0.1, 0.03, 0.01 };
@@ -602,7 +649,7 @@ static void draw(const char *path)
         fprintf(stderr, "%s cannot be written\n", path);
         exit(1);
     }
-    qsort(rows, (size_t)row_count, sizeof *rows, row_by_seconds);
+    qsort(rows, (size_t)row_count, sizeof *rows, row_by_cost);
     chart_begin(f, 890, 1080);
     for (s = 0; s < SCENES; s++) draw_scene(f, s);
     draw_legend(f);
@@ -627,9 +674,11 @@ int main(int count, char **values)
 {
     const char *only = "", *method = "";
     int s, i, most = 1000;
-    if (count > 3 && strcmp(values[1], "--draw") == 0) {
+    by_bytes = count > 3 && strcmp(values[1], "--draw-bytes") == 0;
+    if (by_bytes || (count > 3 && strcmp(values[1], "--draw") == 0)) {
         for (i = 3; i < count; i++) read_rows(values[i]);
         draw(values[2]);
+        compare_precisions();
         return 0;
     }
     for (i = 1; i + 1 < count; i += 2) {

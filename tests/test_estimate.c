@@ -108,7 +108,7 @@ static void test_estimate_larger_cells(void)
 static void test_estimate_schemes(void)
 {
     int kind, m;
-    if (!test_full) {
+    if (!TEST_FULL_ONCE) {
         estimate_check(ESTIMATE_HONEY, 8, &estimate_modes[1], 0.003);
         estimate_check(ESTIMATE_POUR, 8, &estimate_modes[2], 0.05);
         estimate_check(ESTIMATE_BALL, 8, &estimate_modes[2], 0.05);

@@ -495,7 +495,11 @@ static void semi_extremes_run(uint32_t seed, int steps, extremes_sum *sum)
  * draws run to their end. */
 static void test_semi_extremes_draws(void)
 {
-    const int draws = test_slow ? 200 : test_full ? 24 : 4, steps = test_full ? 15 : 6;
+    const int draws = test_slow        ? 200
+                      : TEST_FULL_ONCE ? 24
+                      : test_full      ? 6
+                                       : 2,
+              steps = test_full ? 15 : 6;
     const uint32_t first = test_slow ? (uint32_t)(time(NULL) / 86400) % 100000u * 200u : 0;
     extremes_sum sum;
     int n;

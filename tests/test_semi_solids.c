@@ -310,7 +310,7 @@ static void semi_solids_turn(const gs4_material *m, int a, double jitter, int st
 static void test_semi_solids_turn(void)
 {
     int n;
-    for (n = 0; n < (test_full ? 6 : 1); n++) {
+    for (n = 0; n < (TEST_FULL_ONCE ? 6 : 1); n++) {
         const int a = (n + 2) % 3, steps = test_full ? 32 : 8;
         gs4_material m = scene_liquid(1000, 0, 0);
         double out[3];

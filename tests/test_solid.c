@@ -534,6 +534,52 @@ static void test_solid_spin(void)
     }
 }
 
+/* A ball that turns on for 1e4 steps of 0.7 ms: mean square distance from axis a over that at
+ * first. */
+static double solid_turns_on(int a, double rate)
+{
+    gs4_sim_desc d = scene_cube(10);
+    gs4_material m = solid_material(GS4_NEO_HOOKEAN, 1000, 1e4, 10);
+    const gs4_fill f = scene_fill(at(0, 0, 0));
+    const int b = (a + 1) % 3, c = (a + 2) % 3;
+    double square[2] = { 0, 0 };
+    gs4_sim *sim;
+    int i, k;
+    d.cell_size = (gs4_real)0.01;
+    for (i = 0; i < 6; i++) d.walls[i] = GS4_WALL_OPEN;
+    sim = physics_create(&d, &m);
+    CHECK(gs4_add_particles(sim, gs4_sphere(at(0.05, 0.05, 0.05), (gs4_real)0.02), &f) > 0);
+    for (k = 0; k < 2; k++) {
+        const gs4_view x = gs4_particles(sim, GS4_FIELD_POSITION);
+        const gs4_edit v = gs4_edit_particles(sim, GS4_FIELD_VELOCITY);
+        for (i = 0; i < x.count; i++) {
+            const gs4_real *p = x.data + (size_t)i * (size_t)x.stride;
+            const double y = (double)p[b] - 0.05, z = (double)p[c] - 0.05;
+            square[k] += y * y + z * z;
+            if (k) continue;
+            v.data[(size_t)i * (size_t)v.stride + (size_t)b] = (gs4_real)(-rate * z);
+            v.data[(size_t)i * (size_t)v.stride + (size_t)c] = (gs4_real)(rate * y);
+        }
+        for (i = 0; i < 10000 && k == 0; i++)
+            CHECK_RESULT(sim, gs4_step(sim, (gs4_real)7e-4), GS4_OK);
+    }
+    gs4_destroy(sim);
+    return square[1] / square[0];
+}
+
+/* Round an arc of which a step is 1e-4, the second order of a position is less than its rounding.
+ * It must not get lost in it: that was a ball that grew by that much with each step, 1e-3 here. */
+static void test_solid_turns_on(void)
+{
+    static const double rates[3] = { 0.15, 0.3, 0.6 };
+    int a;
+    for (a = 0; a < 3; a++) {
+        const double grown = solid_turns_on(a, rates[a]);
+        if (test_filter[0]) printf("%g rad/s about axis %d: %.2e\n", rates[a], a, grown - 1);
+        CHECK_CLOSE(grown, 1, SOLID_DOUBLE ? 1e-5 : 1e-4);
+    }
+}
+
 /* A cube falls on a floor that lets go: energy over what it was, at its highest point
  * thereafter, and how high that is over where it started. */
 static void solid_bounce(gs4_integrator integrator, gs4_solid model, double decay, double viscosity,
@@ -1047,6 +1093,7 @@ static void run_solid(void)
     RUN_FULL(test_solid_waves);
     RUN_FULL(test_solid_order);
     RUN_FULL(test_solid_spin);
+    RUN_FULL(test_solid_turns_on);
     RUN_FULL(test_solid_bounce);
     RUN_FULL(test_solid_ring);
     RUN_FULL(test_solid_yield);

@@ -31899,5 +31899,5 @@ GS4_API GS4I_COLD int gs4_estimate(const gs4_sim *sim, gs4_scheme scheme, gs4_in
  * gs4_estimate. GS4_NO_SOLIDS and the like leave parts out. New: desc.affine.
  * The explicit schemes work on eight particles of a cell side by side: a step takes 0.74 to 0.87 of
  * the time it took. So each step may change the order of particles, not only one that sorts. What
- * turns or shears needs no trial pass. In float what turns slowly does not grow: the second order of
- * a step's motion was lost in the rounding of places, 1e-7 of a square a step at 2e-4 rad each. */
+ * turns or shears needs no trial pass. What turns slowly does not grow in float: the second order
+ * of a step's motion was lost in the rounding of places, 1e-7 of a square a step at 2e-4 rad. */

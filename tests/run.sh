@@ -1,5 +1,5 @@
 #!/bin/sh
-# The tests: sh tests/run.sh            quick ones in float and in double, and the cheap part of portability.sh: 60 to 70 s
+# The tests: sh tests/run.sh            quick ones in float and in double, and the cheap part of portability.sh: 60 to 80 s
 #                                      of processor time by the machine, half to compile (user + sys of `time`)
 #            sh tests/run.sh --full     all but the slow tests, and all compilers, machines and sanitizers that are installed
 #            sh tests/run.sh --nightly  the slow tests, too, and whether the tests catch mutants.sh

@@ -678,7 +678,7 @@ int main(int count, char **values)
     if (by_bytes || (count > 3 && strcmp(values[1], "--draw") == 0)) {
         for (i = 3; i < count; i++) read_rows(values[i]);
         draw(values[2]);
-        compare_precisions();
+        if (by_bytes) compare_precisions();
         return 0;
     }
     for (i = 1; i + 1 < count; i += 2) {

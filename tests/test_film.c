@@ -112,7 +112,7 @@ static void test_film_flow(void)
 static void test_film_noise(void)
 {
     int n, i;
-    for (n = 0; n < (TEST_FULL_ONCE ? 15 : 5); n++)
+    for (n = 0; n < (test_full ? 15 : 5); n++)
         for (i = 0; i < 3; i++) {
             const struct film_bound *b = &film_bounds[n % 5];
             film_case k = { 1 << i, n % 3, b->scheme, b->how, 0.5 };
